@@ -1,0 +1,106 @@
+//! Points, sizes and rectangles in pixels at scale 1, x to the right, y down.
+
+/// A point, or a vector between two.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// Pixels to the right.
+    pub x: f64,
+    /// Pixels down.
+    pub y: f64,
+}
+
+impl Point {
+    /// The point `(x, y)`.
+    pub const fn new(x: f64, y: f64) -> Self {
+        Self { x, y }
+    }
+}
+
+/// A width and a height, 0...
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Size {
+    /// Pixels from left to right.
+    pub w: f64,
+    /// Pixels from top to bottom.
+    pub h: f64,
+}
+
+impl Size {
+    /// `w` by `h`.
+    pub const fn new(w: f64, h: f64) -> Self {
+        Self { w, h }
+    }
+}
+
+/// An upright rectangle by its top left corner and its size.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rect {
+    /// The left edge.
+    pub x: f64,
+    /// The top edge.
+    pub y: f64,
+    /// The width, 0...
+    pub w: f64,
+    /// The height, 0...
+    pub h: f64,
+}
+
+impl Rect {
+    /// The rectangle with its top left corner at `(x, y)`.
+    pub const fn new(x: f64, y: f64, w: f64, h: f64) -> Self {
+        Self { x, y, w, h }
+    }
+
+    /// The rectangle of this size around a centre.
+    pub fn around(centre: Point, size: Size) -> Self {
+        Self::new(
+            centre.x - size.w / 2.0,
+            centre.y - size.h / 2.0,
+            size.w,
+            size.h,
+        )
+    }
+
+    /// The right edge.
+    pub fn right(&self) -> f64 {
+        self.x + self.w
+    }
+
+    /// The bottom edge.
+    pub fn bottom(&self) -> f64 {
+        self.y + self.h
+    }
+
+    /// The middle.
+    pub fn centre(&self) -> Point {
+        Point::new(self.x + self.w / 2.0, self.y + self.h / 2.0)
+    }
+
+    /// Whether the two share more than a line.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.x < other.right()
+            && other.x < self.right()
+            && self.y < other.bottom()
+            && other.y < self.bottom()
+    }
+
+    /// Grown by `by` on every side (shrunk if negative).
+    #[must_use]
+    pub fn grown(&self, by: f64) -> Self {
+        Self::new(
+            self.x - by,
+            self.y - by,
+            self.w + 2.0 * by,
+            self.h + 2.0 * by,
+        )
+    }
+
+    /// The smallest rectangle around both.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        let (x, y) = (self.x.min(other.x), self.y.min(other.y));
+        let right = self.right().max(other.right());
+        let bottom = self.bottom().max(other.bottom());
+        Self::new(x, y, right - x, bottom - y)
+    }
+}

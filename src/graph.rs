@@ -1,0 +1,195 @@
+//! The computation graph of one window: which nodes and topics are there, who talks to whom, how often.
+//!
+//! A graph holds numbers only; names stand once, in the [`Elements`] of the whole mission, sorted, so that an index
+//! is an order and equal graphs are equal bytes.
+
+use std::sync::Arc;
+
+use crate::evidence::{Degree, Evidence};
+use crate::name::{NodeName, TopicName};
+use crate::time::Stamp;
+
+/// A node's place in [`Elements::nodes`].
+pub type NodeId = u32;
+/// A topic's place in [`Elements::topics`].
+pub type TopicId = u32;
+/// An edge's place in [`Elements::publishes`] or [`Elements::subscribes`].
+pub type EdgeId = u32;
+
+/// A node, over the whole mission.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// The name as recorded.
+    pub name: NodeName,
+    /// The name with anonymous suffixes folded; equal to the name for most.
+    pub role: Arc<str>,
+    /// What proves it.
+    pub evidence: Evidence,
+    /// Its first sign of life in the mission.
+    pub first: Option<Stamp>,
+    /// Its last sign of life.
+    pub last: Option<Stamp>,
+}
+
+/// A topic, over the whole mission.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Topic {
+    /// The name as recorded.
+    pub name: TopicName,
+    /// Its types, sorted; more than one is a mistake of the robot's worth seeing.
+    pub types: Vec<Arc<str>>,
+    /// What proves it.
+    pub evidence: Evidence,
+    /// Its first message or sign of life.
+    pub first: Option<Stamp>,
+    /// Its last.
+    pub last: Option<Stamp>,
+    /// The quality of service offered, in short words, if known: `reliable transient_local depth 1`.
+    pub qos: Option<Arc<str>>,
+}
+
+/// A publication or a subscription, over the whole mission.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Edge {
+    /// Who publishes or subscribes.
+    pub node: NodeId,
+    /// What.
+    pub topic: TopicId,
+    /// What proves it.
+    pub evidence: Evidence,
+    /// Its first message or sign of life.
+    pub first: Option<Stamp>,
+    /// Its last.
+    pub last: Option<Stamp>,
+}
+
+/// Everything that ever is in the mission: nodes and topics sorted by name, publications by (node, topic),
+/// subscriptions by (topic, node).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Elements {
+    /// Nodes, sorted by name.
+    pub nodes: Vec<Node>,
+    /// Topics, sorted by name.
+    pub topics: Vec<Topic>,
+    /// Publications, sorted by (node, topic).
+    pub publishes: Vec<Edge>,
+    /// Subscriptions, sorted by (topic, node).
+    pub subscribes: Vec<Edge>,
+}
+
+/// How alive something is in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum State {
+    /// Messages or evidence fall into the window.
+    Active,
+    /// Alive without a message.
+    Silent,
+    /// Alive by a latched or transient-local message.
+    Latched,
+    /// Known from a header or metadata only.
+    Declared,
+}
+
+impl State {
+    /// All of them, the liveliest first.
+    pub const ALL: [Self; 4] = [Self::Active, Self::Silent, Self::Latched, Self::Declared];
+
+    /// Its word in JSON and in class names.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Active => "active",
+            Self::Silent => "silent",
+            Self::Latched => "latched",
+            Self::Declared => "declared",
+        }
+    }
+}
+
+/// A node in a window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeState {
+    /// Which.
+    pub id: NodeId,
+    /// How alive.
+    pub state: State,
+    /// How well known in this window.
+    pub degree: Degree,
+    /// The sum of what it publishes, in messages per second: its intensity. `None` where not known.
+    pub hz: Option<f64>,
+    /// The lifecycle state, if it has one: `inactive`, `active`, …
+    pub lifecycle: Option<Arc<str>>,
+}
+
+/// A topic in a window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TopicState {
+    /// Which.
+    pub id: TopicId,
+    /// How alive.
+    pub state: State,
+    /// How well known in this window.
+    pub degree: Degree,
+    /// Messages in the window, 0...
+    pub count: u64,
+    /// Their payload bytes, if known.
+    pub bytes: Option<u64>,
+    /// Messages per second over the window's true length; `None` below 1 ms of length.
+    pub hz: Option<f64>,
+    /// The median time between messages in seconds; `None` with fewer than two.
+    pub median_period_s: Option<f64>,
+    /// The longest time between messages in seconds; `None` with fewer than two.
+    pub max_gap_s: Option<f64>,
+}
+
+/// A publication or subscription in a window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EdgeState {
+    /// Which.
+    pub id: EdgeId,
+    /// How alive.
+    pub state: State,
+    /// How well known in this window.
+    pub degree: Degree,
+    /// Messages over this edge in the window, if known.
+    pub count: Option<u64>,
+    /// The same per second; `None` where not known.
+    pub hz: Option<f64>,
+}
+
+/// The computation graph of one window. Each list is sorted by id; an element that is not there is not listed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Graph {
+    /// Nodes in the window.
+    pub nodes: Vec<NodeState>,
+    /// Topics in the window.
+    pub topics: Vec<TopicState>,
+    /// Publications in the window.
+    pub publishes: Vec<EdgeState>,
+    /// Subscriptions in the window.
+    pub subscribes: Vec<EdgeState>,
+}
+
+/// One element of the mission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Element {
+    /// A node.
+    Node(NodeId),
+    /// A topic.
+    Topic(TopicId),
+    /// A publication.
+    Publish(EdgeId),
+    /// A subscription.
+    Subscribe(EdgeId),
+}
+
+impl Element {
+    /// The word for its kind in JSON: `node`, `topic`, `publish` or `subscribe`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Node(_) => "node",
+            Self::Topic(_) => "topic",
+            Self::Publish(_) => "publish",
+            Self::Subscribe(_) => "subscribe",
+        }
+    }
+}

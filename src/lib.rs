@@ -1,0 +1,18 @@
+//! See how a robot's software reconfigures during a mission, straight from its bag files.
+//!
+//! ```text
+//! bag ──> evidence ──> window ──> graph ──> diff ──> layout ──> scene ──> frame ──> encoder
+//! ```
+
+pub mod bag;
+pub mod diff;
+pub mod error;
+pub mod evidence;
+pub mod evolution;
+pub mod geometry;
+pub mod graph;
+pub mod layout;
+pub mod name;
+pub mod notice;
+pub mod time;
+pub mod view;

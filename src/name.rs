@@ -1,0 +1,86 @@
+//! Names of nodes and topics, kept as recorded, cheap to clone, ordered.
+
+use std::fmt;
+use std::sync::Arc;
+
+macro_rules! name {
+    ($(#[$doc:meta])* $type:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $type(Arc<str>);
+
+        impl $type {
+            /// The name as recorded; may hold anything, so escape it where it is written.
+            pub fn as_str(&self) -> &str {
+                &self.0
+            }
+
+            /// A shared handle on the text.
+            pub fn shared(&self) -> Arc<str> {
+                Arc::clone(&self.0)
+            }
+        }
+
+        impl From<&str> for $type {
+            fn from(name: &str) -> Self {
+                Self(name.into())
+            }
+        }
+
+        impl From<String> for $type {
+            fn from(name: String) -> Self {
+                Self(name.into())
+            }
+        }
+
+        impl From<Arc<str>> for $type {
+            fn from(name: Arc<str>) -> Self {
+                Self(name)
+            }
+        }
+
+        impl fmt::Display for $type {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(&self.0)
+            }
+        }
+    };
+}
+
+name! {
+    /// The resolved name of a node, such as `/base/driver`.
+    NodeName
+}
+name! {
+    /// The resolved name of a topic, such as `/scan`.
+    TopicName
+}
+
+/// The namespace of a resolved name: all before its last slash, `/` for a name at the root.
+pub fn namespace(name: &str) -> &str {
+    match name.rfind('/') {
+        Some(0) | None => "/",
+        Some(at) => &name[..at],
+    }
+}
+
+/// The last part of a resolved name; the whole name if that part would be empty.
+pub fn last_part(name: &str) -> &str {
+    match name.rsplit('/').next() {
+        Some(part) if !part.is_empty() => part,
+        _ => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_split_at_their_last_slash() {
+        assert_eq!((namespace("/a/b/c"), last_part("/a/b/c")), ("/a/b", "c"));
+        assert_eq!((namespace("/a"), last_part("/a")), ("/", "a"));
+        assert_eq!((namespace("a"), last_part("a")), ("/", "a"));
+        assert_eq!(last_part("/a/"), "/a/");
+    }
+}

@@ -1,0 +1,127 @@
+//! What went wrong without stopping us, grouped by kind and counted.
+
+use std::collections::BTreeMap;
+
+/// What a notice is about. The word in JSON is [`NoticeKind::word`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum NoticeKind {
+    /// Part of the bag was lost: cut, unreadable or skipped. The command exits 3.
+    Damaged,
+    /// The bag's end is missing. The command exits 3.
+    Truncated,
+    /// Read another way than by its index, and why; nothing was lost.
+    Downgraded,
+    /// A bag that a tool rewrote, so that its headers name false publishers.
+    Rewritten,
+    /// A bag that was recorded while another was played back.
+    Playback,
+    /// A payload that does not have the layout its type promises.
+    Undecodable,
+    /// Messages set aside because their time is impossible.
+    ImpossibleTime,
+    /// Something that the picture leaves out or collapses, and how to see it.
+    Hidden,
+    /// A choice made for the user, such as the period.
+    Chosen,
+    /// A character that the bundled font lacks.
+    Glyph,
+    /// Anything else worth saying.
+    Note,
+}
+
+impl NoticeKind {
+    /// Whether data was skipped, so that the command exits 3.
+    pub fn is_loss(self) -> bool {
+        matches!(self, Self::Damaged | Self::Truncated)
+    }
+
+    /// Its word in JSON.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Damaged => "damaged",
+            Self::Truncated => "truncated",
+            Self::Downgraded => "downgraded",
+            Self::Rewritten => "rewritten",
+            Self::Playback => "playback",
+            Self::Undecodable => "undecodable",
+            Self::ImpossibleTime => "impossible_time",
+            Self::Hidden => "hidden",
+            Self::Chosen => "chosen",
+            Self::Glyph => "glyph",
+            Self::Note => "note",
+        }
+    }
+}
+
+/// One thing worth saying.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Notice {
+    /// What it is about.
+    pub kind: NoticeKind,
+    /// How often it happened, 1...
+    pub count: u64,
+    /// One sentence, lower case, no period; names in it are as recorded, so escape it where it is written.
+    pub text: String,
+}
+
+impl Notice {
+    /// A notice that happened once.
+    pub fn new(kind: NoticeKind, text: impl Into<String>) -> Self {
+        Self {
+            kind,
+            count: 1,
+            text: text.into(),
+        }
+    }
+}
+
+/// How many different texts are kept; more of them only add to the count of a last one.
+const MOST: usize = 200;
+
+/// Notices in order of kind and text, equal ones counted. Bounded: a hostile bag cannot fill memory with them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Notices(BTreeMap<(NoticeKind, String), u64>);
+
+impl Notices {
+    /// None yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds one; an equal one only counts up.
+    pub fn add(&mut self, notice: Notice) {
+        let full = self.0.len() >= MOST;
+        let key = (notice.kind, notice.text);
+        let key = if full && !self.0.contains_key(&key) {
+            (key.0, "more of the same kind".to_owned())
+        } else {
+            key
+        };
+        *self.0.entry(key).or_default() += notice.count;
+    }
+
+    /// Adds all of `others`.
+    pub fn extend(&mut self, others: impl IntoIterator<Item = Notice>) {
+        others.into_iter().for_each(|n| self.add(n));
+    }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> impl Iterator<Item = Notice> + '_ {
+        self.0.iter().map(|((kind, text), count)| Notice {
+            kind: *kind,
+            count: *count,
+            text: text.clone(),
+        })
+    }
+
+    /// Whether any of them says that data was skipped.
+    pub fn any_loss(&self) -> bool {
+        self.0.keys().any(|(kind, _)| kind.is_loss())
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}

@@ -1,0 +1,266 @@
+//! Points in time and lengths of time, in whole nanoseconds, and how they are written by people.
+
+use std::fmt;
+use std::num::NonZeroI64;
+
+/// A point in time: nanoseconds since 1970-01-01T00:00:00Z, by the clock of the recorder.
+///
+/// Bags hold any value: 0, simulated time near 0, negative numbers. All of `i64` is allowed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Stamp(pub i64);
+
+const SECOND: i64 = 1_000_000_000;
+
+impl Stamp {
+    /// The earliest stamp that can be held.
+    pub const MIN: Self = Self(i64::MIN);
+    /// The latest stamp that can be held.
+    pub const MAX: Self = Self(i64::MAX);
+
+    /// The stamp of a ROS time, `secs` since 1970 and `nanos` on top (0.. ; values of a second or more carry over).
+    pub const fn from_ros(secs: u32, nanos: u32) -> Self {
+        Self(secs as i64 * SECOND + nanos as i64)
+    }
+
+    /// The stamp of an unsigned nanosecond count as MCAP writes it; past the year 2262 it stays at [`Stamp::MAX`].
+    pub fn from_nanos(nanos: u64) -> Self {
+        Self(i64::try_from(nanos).unwrap_or(i64::MAX))
+    }
+
+    /// `nanos` later (earlier if negative), held at the ends of the range.
+    #[must_use]
+    pub const fn plus(self, nanos: i64) -> Self {
+        Self(self.0.saturating_add(nanos))
+    }
+
+    /// Nanoseconds from `earlier` to here, held at the ends of the range.
+    pub const fn since(self, earlier: Self) -> i64 {
+        self.0.saturating_sub(earlier.0)
+    }
+
+    /// As RFC 3339 in UTC, to the nanosecond if needed; `None` outside the years that RFC 3339 can write.
+    pub fn rfc3339(self) -> Option<String> {
+        jiff::Timestamp::from_nanosecond(i128::from(self.0))
+            .ok()
+            .map(|t| t.to_string())
+    }
+
+    /// The UTC clock as `hh:mm:ss`, for a frame's title bar.
+    pub fn clock(self) -> String {
+        let second = self.0.div_euclid(SECOND).rem_euclid(86_400);
+        format!(
+            "{:02}:{:02}:{:02}",
+            second / 3600,
+            second / 60 % 60,
+            second % 60
+        )
+    }
+}
+
+impl fmt::Display for Stamp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.rfc3339() {
+            Some(text) => f.write_str(&text),
+            None => write!(f, "{} ns", self.0),
+        }
+    }
+}
+
+/// A half-open interval `[start, end)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// The first moment inside.
+    pub start: Stamp,
+    /// The first moment after it; never before `start`.
+    pub end: Stamp,
+}
+
+impl Span {
+    /// Its length in nanoseconds, 0...
+    pub const fn nanos(&self) -> i64 {
+        self.end.since(self.start)
+    }
+
+    /// Whether `at` lies inside.
+    pub fn contains(&self, at: Stamp) -> bool {
+        self.start <= at && at < self.end
+    }
+}
+
+/// A length of time, 1 ns or more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Period(NonZeroI64);
+
+impl Period {
+    /// A period of `nanos` nanoseconds; `None` unless positive.
+    pub const fn from_nanos(nanos: i64) -> Option<Self> {
+        match NonZeroI64::new(nanos) {
+            Some(n) if nanos > 0 => Some(Self(n)),
+            _ => None,
+        }
+    }
+
+    /// Its length in nanoseconds, 1...
+    pub const fn nanos(self) -> i64 {
+        self.0.get()
+    }
+
+    /// Reads `60`, `30s`, `1m`, `2h`, `1d`, `500ms`, `1.5s`; a bare number is seconds.
+    /// `None` for anything else, for 0, and past 292 years.
+    pub fn parse(text: &str) -> Option<Self> {
+        Self::from_nanos(parse_nanos(text)?)
+    }
+}
+
+impl fmt::Display for Period {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&short(self.nanos()))
+    }
+}
+
+/// Reads a length in nanoseconds, 0 included: `90`, `1:30`, `1:02:03`, `2m`, `500ms`. `None` if it is none.
+pub fn parse_nanos(text: &str) -> Option<i64> {
+    let text = text.trim();
+    if text.contains(':') {
+        let mut total = 0.0;
+        for part in text.split(':') {
+            total = total * 60.0 + parse_number(part)?;
+        }
+        return to_nanos(total);
+    }
+    let digits = text
+        .find(|c: char| c.is_ascii_alphabetic())
+        .unwrap_or(text.len());
+    let scale = match text[digits..].trim() {
+        "" | "s" | "sec" => 1.0,
+        "ms" => 1e-3,
+        "us" => 1e-6,
+        "ns" => 1e-9,
+        "m" | "min" => 60.0,
+        "h" => 3600.0,
+        "d" => 86_400.0,
+        _ => return None,
+    };
+    to_nanos(parse_number(text[..digits].trim())? * scale)
+}
+
+/// A plain decimal number, 0 or more: digits and at most one point.
+fn parse_number(text: &str) -> Option<f64> {
+    let plain = !text.is_empty() && text.chars().all(|c| c.is_ascii_digit() || c == '.');
+    plain.then(|| text.parse().ok()).flatten()
+}
+
+fn to_nanos(secs: f64) -> Option<i64> {
+    let nanos = libm::round(secs * 1e9);
+    // i64::MAX is not an f64; everything below 9.2e18 converts exactly enough.
+    #[expect(clippy::cast_possible_truncation, reason = "bounded on this line")]
+    (nanos.is_finite() && nanos < 9.2e18).then_some(nanos as i64)
+}
+
+/// A moment on the axis of a bag, as `--start` and `--end` take it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// Nanoseconds after the bag's start.
+    AfterStart(i64),
+    /// Nanoseconds before the bag's end.
+    BeforeEnd(i64),
+    /// A point in absolute time.
+    Absolute(Stamp),
+}
+
+impl Moment {
+    /// Reads `90`, `1:30`, `2m` (after the start), `-30s` (before the end) or RFC 3339. `None` if it is none of these.
+    pub fn parse(text: &str) -> Option<Self> {
+        let text = text.trim();
+        if let Ok(t) = text.parse::<jiff::Timestamp>() {
+            return i64::try_from(t.as_nanosecond())
+                .ok()
+                .map(|n| Self::Absolute(Stamp(n)));
+        }
+        match text.strip_prefix('-') {
+            Some(rest) => parse_nanos(rest).map(Self::BeforeEnd),
+            None => parse_nanos(text).map(Self::AfterStart),
+        }
+    }
+
+    /// Where it lies for a bag that covers `bag`.
+    pub fn on(self, bag: Span) -> Stamp {
+        match self {
+            Self::AfterStart(n) => bag.start.plus(n),
+            Self::BeforeEnd(n) => bag.end.plus(-n),
+            Self::Absolute(at) => at,
+        }
+    }
+}
+
+/// A length as short as it can be said exactly: `10 s`, `1.5 s`, `2 min`, `500 ms`, `1 d`.
+pub fn short(nanos: i64) -> String {
+    const DAY: i64 = 86_400 * SECOND;
+    const HOUR: i64 = 3600 * SECOND;
+    const MINUTE: i64 = 60 * SECOND;
+    match nanos {
+        0 => "0 s".to_owned(),
+        n if n % DAY == 0 => format!("{} d", n / DAY),
+        n if n % HOUR == 0 => format!("{} h", n / HOUR),
+        n if n % MINUTE == 0 => format!("{} min", n / MINUTE),
+        n if n.abs() >= SECOND => format!("{} s", n as f64 / 1e9),
+        n => format!("{} ms", n as f64 / 1e6),
+    }
+}
+
+/// An offset into a mission as `mm:ss`, `h:mm:ss` from an hour on, with a fraction below a second if it has one.
+pub fn offset(nanos: i64) -> String {
+    let sign = if nanos < 0 { "-" } else { "" };
+    let nanos = nanos.unsigned_abs();
+    let second = nanos / 1_000_000_000;
+    let milli = nanos / 1_000_000 % 1000;
+    let fraction = if milli == 0 {
+        String::new()
+    } else {
+        format!(".{milli:03}").trim_end_matches('0').to_owned()
+    };
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    if hour > 0 {
+        format!("{sign}{hour}:{minute:02}:{second:02}{fraction}")
+    } else {
+        format!("{sign}{minute:02}:{second:02}{fraction}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn periods_are_read_as_people_write_them() {
+        let nanos = |t| Period::parse(t).map(Period::nanos);
+        assert_eq!(nanos("60"), Some(60 * SECOND));
+        assert_eq!(nanos("500ms"), Some(500_000_000));
+        assert_eq!(nanos("1.5s"), Some(1_500_000_000));
+        assert_eq!(nanos("2m"), Some(120 * SECOND));
+        for bad in ["", "0", "-5", "ten", "5 parsecs", "1e9", "nan"] {
+            assert_eq!(nanos(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn moments_count_from_either_end() {
+        let bag = Span {
+            start: Stamp(100 * SECOND),
+            end: Stamp(200 * SECOND),
+        };
+        let at = |t| Moment::parse(t).map(|m| m.on(bag).0 / SECOND);
+        assert_eq!(at("1:30"), Some(190));
+        assert_eq!(at("-30s"), Some(170));
+        assert_eq!(at("1970-01-01T00:02:00Z"), Some(120));
+        assert_eq!(at("noon"), None);
+    }
+
+    #[test]
+    fn offsets_and_lengths_read_well() {
+        assert_eq!(offset(430 * SECOND), "07:10");
+        assert_eq!(offset(3_723_500_000_000), "1:02:03.5");
+        assert_eq!(short(90 * SECOND), "90 s");
+        assert_eq!(short(120 * SECOND), "2 min");
+    }
+}
