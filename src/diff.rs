@@ -1,8 +1,9 @@
 //! What changed from one graph to the next.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::graph::{Element, NodeId, TopicId};
+use crate::graph::{EdgeState, Element, Graph, NodeId, NodeState, TopicId, TopicState};
 use crate::time::Stamp;
 
 /// One reconfiguration, as JSON and the log of events tell it.
@@ -80,4 +81,125 @@ impl ValueKind {
             Self::Lifecycle => "lifecycle",
         }
     }
+}
+
+/// What turns one graph into the next, exactly: [`apply`] of it to the first gives the second.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Diff {
+    /// Nodes.
+    pub nodes: Delta<NodeState>,
+    /// Topics.
+    pub topics: Delta<TopicState>,
+    /// Publications.
+    pub publishes: Delta<EdgeState>,
+    /// Subscriptions.
+    pub subscribes: Delta<EdgeState>,
+}
+
+/// What happened in one list of a graph. Each part is sorted by id.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Delta<T> {
+    /// States of what is new.
+    pub added: Vec<T>,
+    /// Ids of what is gone.
+    pub removed: Vec<u32>,
+    /// States before and after of what differs in anything.
+    pub changed: Vec<(T, T)>,
+}
+
+impl<T> Default for Delta<T> {
+    fn default() -> Self {
+        Self {
+            added: Vec::new(),
+            removed: Vec::new(),
+            changed: Vec::new(),
+        }
+    }
+}
+
+impl Diff {
+    /// Whether the graphs are equal.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether an element appeared or vanished.
+    pub fn is_structural(&self) -> bool {
+        fn moved<T>(delta: &Delta<T>) -> bool {
+            !delta.added.is_empty() || !delta.removed.is_empty()
+        }
+        moved(&self.nodes)
+            || moved(&self.topics)
+            || moved(&self.publishes)
+            || moved(&self.subscribes)
+    }
+}
+
+/// What changed from `before` to `after`.
+pub fn diff(before: &Graph, after: &Graph) -> Diff {
+    Diff {
+        nodes: delta(&before.nodes, &after.nodes),
+        topics: delta(&before.topics, &after.topics),
+        publishes: delta(&before.publishes, &after.publishes),
+        subscribes: delta(&before.subscribes, &after.subscribes),
+    }
+}
+
+/// The graph that `diff` makes of `before`.
+pub fn apply(before: &Graph, diff: &Diff) -> Graph {
+    Graph {
+        nodes: patched(&before.nodes, &diff.nodes),
+        topics: patched(&before.topics, &diff.topics),
+        publishes: patched(&before.publishes, &diff.publishes),
+        subscribes: patched(&before.subscribes, &diff.subscribes),
+    }
+}
+
+/// Something with a place in the mission's list of elements.
+trait Placed {
+    fn place(&self) -> u32;
+}
+
+macro_rules! placed {
+    ($($type:ty),*) => { $(impl Placed for $type { fn place(&self) -> u32 { self.id } })* };
+}
+placed!(NodeState, TopicState, EdgeState);
+
+/// Walks two lists that are sorted by id, in step.
+fn delta<T: Placed + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
+    let mut delta = Delta::default();
+    let (mut old, mut new) = (before.iter().peekable(), after.iter().peekable());
+    loop {
+        match (old.peek(), new.peek()) {
+            (None, None) => return delta,
+            (Some(b), a) if a.is_none_or(|a| b.place() < a.place()) => {
+                delta.removed.push(b.place());
+                old.next();
+            }
+            (b, Some(a)) if b.is_none_or(|b| a.place() < b.place()) => {
+                delta.added.push((*a).clone());
+                new.next();
+            }
+            (Some(b), Some(a)) => {
+                if b != a {
+                    delta.changed.push(((*b).clone(), (*a).clone()));
+                }
+                old.next();
+                new.next();
+            }
+            (Some(_), None) | (None, Some(_)) => return delta,
+        }
+    }
+}
+
+fn patched<T: Placed + Clone>(before: &[T], delta: &Delta<T>) -> Vec<T> {
+    let gone: BTreeSet<u32> = delta.removed.iter().copied().collect();
+    let kept = before.iter().filter(|s| !gone.contains(&s.place()));
+    let mut all: BTreeMap<u32, T> = kept.map(|s| (s.place(), s.clone())).collect();
+    let fresh = delta
+        .added
+        .iter()
+        .chain(delta.changed.iter().map(|(_, after)| after));
+    all.extend(fresh.map(|s| (s.place(), s.clone())));
+    all.into_values().collect()
 }

@@ -16,3 +16,4 @@ pub mod name;
 pub mod notice;
 pub mod time;
 pub mod view;
+pub mod window;
