@@ -1,5 +1,9 @@
 //! What changed from one graph to the next.
 
+mod changes;
+
+pub use changes::{Changes, RATE_CHANGE};
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -59,6 +63,20 @@ pub enum Change {
         /// Now, empty if none.
         to: Arc<str>,
     },
+}
+
+impl Change {
+    /// The word for its kind in JSON and in the log of events.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Added { .. } => "added",
+            Self::Removed { .. } => "removed",
+            Self::Rate { .. } => "rate",
+            Self::HandedOver { .. } => "handed_over",
+            Self::Restarted { .. } => "restarted",
+            Self::Value { kind, .. } => kind.word(),
+        }
+    }
 }
 
 /// The values that [`Change::Value`] tells of.
@@ -171,23 +189,22 @@ fn delta<T: Placed + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
     let (mut old, mut new) = (before.iter().peekable(), after.iter().peekable());
     loop {
         match (old.peek(), new.peek()) {
-            (None, None) => return delta,
-            (Some(b), a) if a.is_none_or(|a| b.place() < a.place()) => {
-                delta.removed.push(b.place());
-                old.next();
-            }
-            (b, Some(a)) if b.is_none_or(|b| a.place() < b.place()) => {
-                delta.added.push((*a).clone());
-                new.next();
-            }
-            (Some(b), Some(a)) => {
+            (Some(b), Some(a)) if b.place() == a.place() => {
                 if b != a {
                     delta.changed.push(((*b).clone(), (*a).clone()));
                 }
                 old.next();
                 new.next();
             }
-            (Some(_), None) | (None, Some(_)) => return delta,
+            (Some(b), a) if a.is_none_or(|a| b.place() < a.place()) => {
+                delta.removed.push(b.place());
+                old.next();
+            }
+            (_, Some(a)) => {
+                delta.added.push((*a).clone());
+                new.next();
+            }
+            _ => return delta,
         }
     }
 }

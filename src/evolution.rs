@@ -1,8 +1,16 @@
 //! The whole sequence: every window with its graph and what changed; written as JSON and read back as an input.
 
+mod lines;
+mod read;
+mod write;
+
+pub use read::read_json;
+pub use write::write_json;
+
 use crate::bag::Report;
-use crate::diff::Change;
-use crate::graph::{Elements, Graph};
+use crate::diff::{Change, Changes};
+use crate::geometry::Rect;
+use crate::graph::{Elements, Graph, NodeId};
 use crate::notice::Notices;
 use crate::time::{Period, Span, Stamp};
 
@@ -40,11 +48,51 @@ pub struct Evolution {
     pub elements: Elements,
     /// The windows in order; those without a message are there too.
     pub windows: Vec<Window>,
+    /// Where everything was drawn, if it was.
+    pub layout: Option<Places>,
     /// What went wrong without stopping us.
     pub notices: Notices,
 }
 
+/// The places of a drawing, in pixels at scale 1, y down.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Places {
+    /// The width of the whole.
+    pub width: f64,
+    /// The height of the whole.
+    pub height: f64,
+    /// `LR` or `TB`.
+    pub orientation: String,
+    /// A box per node and topic drawn, sorted by (what, name).
+    pub boxes: Vec<Place>,
+}
+
+/// The place of one node or topic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// `node` or `topic`.
+    pub what: String,
+    /// Its full name.
+    pub name: String,
+    /// Where it stands.
+    pub rect: Rect,
+}
+
 impl Evolution {
+    /// Finds what changed from each window to the next, anew. A rate must change by more than the share `threshold`;
+    /// `restarts` are nodes that began anew under the same name, and when, sorted by time.
+    pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
+        let mut changes = Changes::new(&self.elements, threshold);
+        for window in &mut self.windows {
+            let inside: Vec<_> = restarts
+                .iter()
+                .copied()
+                .filter(|(_, at)| window.span.contains(*at))
+                .collect();
+            window.changes = changes.next(window.span, &window.graph, &inside);
+        }
+    }
+
     /// Nanoseconds from the mission's start to `at`.
     pub fn offset(&self, at: Stamp) -> i64 {
         at.since(self.span.start)

@@ -193,3 +193,16 @@ impl Element {
         }
     }
 }
+
+impl Elements {
+    /// The first and the last sign of life of an element, where known.
+    pub fn life(&self, element: Element) -> (Option<Stamp>, Option<Stamp>) {
+        match element {
+            Element::Node(id) => self.nodes.get(id as usize).map(|n| (n.first, n.last)),
+            Element::Topic(id) => self.topics.get(id as usize).map(|t| (t.first, t.last)),
+            Element::Publish(id) => self.publishes.get(id as usize).map(|e| (e.first, e.last)),
+            Element::Subscribe(id) => self.subscribes.get(id as usize).map(|e| (e.first, e.last)),
+        }
+        .unwrap_or_default()
+    }
+}

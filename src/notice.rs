@@ -36,6 +36,25 @@ impl NoticeKind {
         matches!(self, Self::Damaged | Self::Truncated)
     }
 
+    const ALL: [Self; 11] = [
+        Self::Damaged,
+        Self::Truncated,
+        Self::Downgraded,
+        Self::Rewritten,
+        Self::Playback,
+        Self::Undecodable,
+        Self::ImpossibleTime,
+        Self::Hidden,
+        Self::Chosen,
+        Self::Glyph,
+        Self::Note,
+    ];
+
+    /// The kind of this word in JSON.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.word() == word)
+    }
+
     /// Its word in JSON.
     pub fn word(self) -> &'static str {
         match self {
@@ -107,7 +126,7 @@ impl Notices {
     }
 
     /// All of them, in order.
-    pub fn iter(&self) -> impl Iterator<Item = Notice> + '_ {
+    pub fn iter(&self) -> impl Iterator<Item = Notice> + Clone + '_ {
         self.0.iter().map(|((kind, text), count)| Notice {
             kind: *kind,
             count: *count,

@@ -13,7 +13,7 @@ pub enum ItemKind {
     Node,
     /// A topic: drawn as a rectangle.
     Topic,
-    /// Several topics in one box (`box3d` in rqt_graph): an action, `/tf` with `/tf_static`, image transports.
+    /// Several topics in one box (`box3d` in `rqt_graph`): an action, `/tf` with `/tf_static`, image transports.
     Group,
     /// A whole namespace, collapsed to one box.
     Namespace,

@@ -1,0 +1,224 @@
+//! Tells a diff as reconfigurations: thresholds for rates, hand-overs, and the hints that the evidence gave.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::{Change, Delta, Diff, ValueKind, diff};
+use crate::graph::{EdgeState, Element, Elements, Graph, NodeId, TopicId, TopicState};
+use crate::time::{Span, Stamp};
+
+/// A rate counts as changed from this share on, unless the user says otherwise.
+pub const RATE_CHANGE: f64 = 0.25;
+
+/// Types that many nodes write to in turn, so that a new writer takes over nothing.
+const SHARED: [&str; 8] = [
+    "Log",
+    "ParameterEvent",
+    "TFMessage",
+    "DiagnosticArray",
+    "Status",
+    "Clock",
+    "tfMessage",
+    "TopicStatistics",
+];
+
+/// Finds the reconfigurations of a mission, window by window in order.
+#[derive(Debug)]
+pub struct Changes<'a> {
+    elements: &'a Elements,
+    /// The share by which a rate must change, 0...
+    threshold: f64,
+    before: Option<(Span, Graph)>,
+    /// Who last sent messages on each topic.
+    senders: BTreeMap<TopicId, BTreeSet<NodeId>>,
+}
+
+impl<'a> Changes<'a> {
+    /// Nothing seen yet.
+    pub fn new(elements: &'a Elements, threshold: f64) -> Self {
+        Self {
+            elements,
+            threshold,
+            before: None,
+            senders: BTreeMap::new(),
+        }
+    }
+
+    /// What changed from the window before to this one; nothing in the first, which is the base.
+    /// `restarts` are nodes that began anew in it under the same name, and when.
+    ///
+    /// Order: added, removed, rates, hand-overs, restarts, values; each by kind of element and name.
+    pub fn next(&mut self, span: Span, graph: &Graph, restarts: &[(NodeId, Stamp)]) -> Vec<Change> {
+        let mut changes = Vec::new();
+        if let Some((old_span, old)) = self.before.take() {
+            let diff = diff(&old, graph);
+            self.appeared(&diff, span, &mut changes);
+            self.vanished(&diff, span, &mut changes);
+            self.rates(&diff, graph, (old_span, span), &mut changes);
+            self.handed_over(&old, graph, &mut changes);
+            let again = restarts.iter().map(|(node, time)| Change::Restarted {
+                node: *node,
+                time: *time,
+            });
+            changes.extend(again);
+            lifecycles(&diff, &mut changes);
+        } else {
+            self.handed_over(graph, graph, &mut Vec::new());
+        }
+        self.before = Some((span, graph.clone()));
+        changes
+    }
+
+    fn appeared(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
+        let all = ids(&diff.nodes.added, |s| Element::Node(s.id))
+            .chain(ids(&diff.topics.added, |s| Element::Topic(s.id)))
+            .chain(ids(&diff.publishes.added, |s| Element::Publish(s.id)))
+            .chain(ids(&diff.subscribes.added, |s| Element::Subscribe(s.id)));
+        changes.extend(all.map(|what| {
+            let time = self.elements.life(what).0.filter(|t| span.contains(*t));
+            Change::Added { what, time }
+        }));
+    }
+
+    fn vanished(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
+        let all = ids(&diff.nodes.removed, |id| Element::Node(*id))
+            .chain(ids(&diff.topics.removed, |id| Element::Topic(*id)))
+            .chain(ids(&diff.publishes.removed, |id| Element::Publish(*id)))
+            .chain(ids(&diff.subscribes.removed, |id| Element::Subscribe(*id)));
+        changes.extend(all.map(|what| {
+            let time = self.elements.life(what).1.filter(|t| *t < span.end);
+            Change::Removed { what, time }
+        }));
+    }
+
+    fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
+        let secs = (spans.0.nanos() as f64 / 1e9, spans.1.nanos() as f64 / 1e9);
+        let differs = |from: f64, to: f64| rate_differs(from, to, secs, self.threshold);
+        for (old, new) in &diff.topics.changed {
+            if let (Some(from_hz), Some(to_hz)) = (old.hz, new.hz)
+                && differs(from_hz, to_hz)
+            {
+                changes.push(Change::Rate {
+                    what: Element::Topic(new.id),
+                    from_hz,
+                    to_hz,
+                });
+            }
+        }
+        let crowded = self.crowded(graph);
+        for (old, new) in &diff.publishes.changed {
+            // With one publisher the topic's own change says it all.
+            let alone = !crowded.contains(&self.elements.publishes[new.id as usize].topic);
+            if let (Some(from_hz), Some(to_hz), false) = (old.hz, new.hz, alone)
+                && differs(from_hz, to_hz)
+            {
+                changes.push(Change::Rate {
+                    what: Element::Publish(new.id),
+                    from_hz,
+                    to_hz,
+                });
+            }
+        }
+    }
+
+    /// Topics with more than one publisher in this graph.
+    fn crowded(&self, graph: &Graph) -> BTreeSet<TopicId> {
+        let mut seen = BTreeSet::new();
+        let topics = graph
+            .publishes
+            .iter()
+            .map(|s| self.elements.publishes[s.id as usize].topic);
+        topics.filter(|topic| !seen.insert(*topic)).collect()
+    }
+
+    /// A topic changes hands when those who send on it now are all others than those who sent on it last.
+    fn handed_over(&mut self, before: &Graph, after: &Graph, changes: &mut Vec<Change>) {
+        let there = |graph: &Graph, topic| {
+            graph
+                .topics
+                .binary_search_by_key(&topic, |t: &TopicState| t.id)
+                .is_ok()
+        };
+        for (topic, to) in self.sending(after) {
+            let from = self.senders.insert(topic, to.clone()).unwrap_or_default();
+            let other = !from.is_empty() && from.is_disjoint(&to);
+            if other && there(before, topic) && !self.is_shared(topic) {
+                let (from, to) = (from.into_iter().collect(), to.into_iter().collect());
+                changes.push(Change::HandedOver { topic, from, to });
+            }
+        }
+    }
+
+    /// Per topic the nodes that sent messages on it in a window.
+    fn sending(&self, graph: &Graph) -> BTreeMap<TopicId, BTreeSet<NodeId>> {
+        let mut sending: BTreeMap<TopicId, BTreeSet<NodeId>> = BTreeMap::new();
+        for state in graph
+            .publishes
+            .iter()
+            .filter(|s: &&EdgeState| s.count.unwrap_or(0) > 0)
+        {
+            let edge = &self.elements.publishes[state.id as usize];
+            sending.entry(edge.topic).or_default().insert(edge.node);
+        }
+        sending
+    }
+
+    fn is_shared(&self, topic: TopicId) -> bool {
+        let types = &self.elements.topics[topic as usize].types;
+        types
+            .iter()
+            .any(|t| SHARED.contains(&t.rsplit('/').next().unwrap_or(t)))
+    }
+}
+
+fn ids<'s, T>(
+    list: &'s [T],
+    element: impl Fn(&T) -> Element + 's,
+) -> impl Iterator<Item = Element> + 's {
+    list.iter().map(element)
+}
+
+/// Whether a rate changed: by more than the share `threshold` of what it was, and by more than the one message that
+/// two windows of the same steady topic may differ by, so that a topic slower than the period does not flicker.
+fn rate_differs(from: f64, to: f64, secs: (f64, f64), threshold: f64) -> bool {
+    let by = (to - from).abs();
+    let messages = by * secs.0.min(secs.1);
+    by > threshold * from && messages > 1.5
+}
+
+fn lifecycles(diff: &Diff, changes: &mut Vec<Change>) {
+    let Delta { changed, .. } = &diff.nodes;
+    for (old, new) in changed
+        .iter()
+        .filter(|(old, new)| old.lifecycle != new.lifecycle)
+    {
+        let word = |state: &Option<Arc<str>>| state.clone().unwrap_or_default();
+        changes.push(Change::Value {
+            kind: ValueKind::Lifecycle,
+            what: Element::Node(new.id),
+            from: word(&old.lifecycle),
+            to: word(&new.lifecycle),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_must_change_by_the_share_and_by_more_than_one_message() {
+        let ten = (10.0, 10.0);
+        assert!(rate_differs(15.0, 7.4, ten, 0.25));
+        assert!(!rate_differs(15.0, 12.0, ten, 0.25));
+        assert!(
+            !rate_differs(0.1, 0.0, ten, 0.25),
+            "one message of a slow topic"
+        );
+        assert!(
+            !rate_differs(1.0, 2.0, (10.0, 1.0), 0.25),
+            "one message more in a short last window"
+        );
+        assert!(rate_differs(0.0, 1.0, ten, 0.25));
+    }
+}
