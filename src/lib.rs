@@ -14,6 +14,8 @@ pub mod graph;
 pub mod layout;
 pub mod name;
 pub mod notice;
+pub mod output;
+pub mod palette;
 pub mod time;
 pub mod view;
 pub mod window;
