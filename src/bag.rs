@@ -3,13 +3,19 @@
 //! A reader owns a file and feeds a [`Sink`]; it knows nothing of evidence, windows or graphs. Adding a format is
 //! one file below `bag/` and one row in `FORMATS`.
 
+use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::name::{NodeName, TopicName};
 use crate::notice::Notice;
+use crate::source::{Source, Stream};
 use crate::time::{Span, Stamp};
+
+mod rosbag1;
+mod unknown;
 
 /// How a payload is written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,9 +151,9 @@ pub struct Report {
 }
 
 /// A bag, open.
-pub trait Reader {
+pub trait Reader: Send {
     /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index tells it without
-    /// reading the bag. `None` when only reading will tell.
+    /// reading the bag. `None` when only reading will tell. A big bag with a lying tail may hold stamps outside.
     fn span(&mut self) -> Result<Option<Span>>;
 
     /// Reads the bag once, front to back or by its index, into `sink`. With `range` only messages inside it are
@@ -180,6 +186,119 @@ impl Input {
         match self {
             Self::Path(path) => file_name(path),
             Self::Stdin => "standard input".to_owned(),
+        }
+    }
+}
+
+/// A row of [`FORMATS`].
+pub struct FormatRow {
+    /// Its word in JSON.
+    pub name: &'static str,
+    /// What it is, for people.
+    pub what: &'static str,
+    /// The names that such bags usually end in. Only told, never asked: the first bytes decide.
+    pub extensions: &'static [&'static str],
+    /// Whether a bag begins so.
+    sniff: fn(&Place, &[u8]) -> bool,
+    /// Makes a reader.
+    open: fn(Place, &OpenOptions) -> Result<Box<dyn Reader>>,
+}
+
+/// Every format that can be read.
+pub const FORMATS: &[FormatRow] = &[rosbag1::FORMAT];
+
+/// Where a bag lies.
+pub(crate) enum Place {
+    /// A folder.
+    Folder(PathBuf),
+    /// A regular file.
+    File(Source),
+    /// A pipe: its name and its bytes.
+    Pipe(String, Stream<'static>),
+}
+
+/// What an input is, from its first bytes.
+#[derive(Clone, Copy)]
+pub enum Kind {
+    /// A bag of this format. Standard input is not looked into and counts as a ROS 1 bag here.
+    Bag(&'static FormatRow),
+    /// JSON text, such as an evolution of ours: no bag.
+    Json,
+}
+
+/// How many first bytes tell a format.
+const HEAD: usize = 512;
+
+/// Tells what `input` is from its first bytes. Standard input is left untouched.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`] with a hint if it is none of ours.
+pub fn sniff(input: &Input) -> Result<Kind> {
+    let Input::Path(path) = input else {
+        return Ok(Kind::Bag(&FORMATS[0]));
+    };
+    if !path.is_dir() && !path.is_file() && path.exists() {
+        return Ok(Kind::Bag(&FORMATS[0]));
+    }
+    let mut place = place(input)?;
+    let head = head(&mut place)?;
+    let json = head.trim_ascii_start().first() == Some(&b'{');
+    match FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
+        Some(row) => Ok(Kind::Bag(row)),
+        None if json => Ok(Kind::Json),
+        None => Err(unknown::explain(path, &head, path.is_dir())),
+    }
+}
+
+/// Opens a bag of any format, told by its first bytes.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`], [`Error::Unsupported`] or [`Error::Malformed`] with a
+/// hint if nothing in it can be.
+pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+    let mut place = place(input)?;
+    let head = head(&mut place)?;
+    match FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
+        Some(row) => (row.open)(place, options),
+        None => {
+            let path = match input {
+                Input::Path(path) => path.clone(),
+                Input::Stdin => PathBuf::from(input.name()),
+            };
+            let folder = matches!(place, Place::Folder(_));
+            Err(unknown::explain(&path, &head, folder))
+        }
+    }
+}
+
+fn place(input: &Input) -> Result<Place> {
+    let Input::Path(path) = input else {
+        return Ok(Place::Pipe(input.name(), Stream::of_reader(io::stdin())));
+    };
+    let meta = path.metadata().map_err(Error::io("read", path))?;
+    if meta.is_dir() {
+        return Ok(Place::Folder(path.clone()));
+    }
+    if meta.is_file() {
+        return Source::open(path).map(Place::File);
+    }
+    let pipe = File::open(path).map_err(Error::io("read", path))?;
+    Ok(Place::Pipe(file_name(path), Stream::of_reader(pipe)))
+}
+
+/// The first bytes; none for a folder.
+fn head(place: &mut Place) -> Result<Vec<u8>> {
+    match place {
+        Place::Folder(_) => Ok(Vec::new()),
+        Place::File(source) => {
+            let mut head = vec![0; HEAD];
+            let got = source.read_at(0, &mut head);
+            head.truncate(got.map_err(Error::io("read", source.path()))?);
+            Ok(head)
+        }
+        Place::Pipe(name, stream) => {
+            let head = stream.peek(HEAD).map(<[u8]>::to_vec);
+            head.map_err(Error::io("read", Path::new(name)))
         }
     }
 }

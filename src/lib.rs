@@ -5,6 +5,7 @@
 //! ```
 
 pub mod bag;
+mod decompress;
 pub mod diff;
 pub mod error;
 pub mod evidence;
@@ -16,6 +17,8 @@ pub mod name;
 pub mod notice;
 pub mod output;
 pub mod palette;
+mod source;
 pub mod time;
 pub mod view;
 pub mod window;
+mod yaml;

@@ -1,0 +1,76 @@
+//! What a file that is no bag of ours is instead, and what to do about it.
+
+use std::path::Path;
+
+use crate::error::Error;
+
+/// The error for `path`, which begins with `head` and is no bag.
+pub(super) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
+    let (looks_like, hint) = if folder {
+        (
+            "a folder without a recording",
+            "name a `.bag`, `.db3` or `.mcap` file, or the folder that holds `metadata.yaml`",
+        )
+    } else {
+        guess(head)
+    };
+    Error::UnknownBag {
+        path: path.to_owned(),
+        looks_like: looks_like.to_owned(),
+        hint: hint.to_owned(),
+    }
+}
+
+fn guess(head: &[u8]) -> (&'static str, &'static str) {
+    const KNOWN: &[(&[u8], &str, &str)] = &[
+        (
+            b"version https://git-lfs",
+            "a git-LFS pointer",
+            "`git lfs pull` fetches the bag itself",
+        ),
+        (b"PK\x03\x04", "a zip archive", "unpack it first"),
+        (b"\x1f\x8b", "a gzip file", "unpack it first (`gunzip`)"),
+        (b"BZh", "a bzip2 file", "unpack it first (`bunzip2`)"),
+        (b"\xfd7zXZ", "an xz file", "unpack it first (`unxz`)"),
+        (
+            b"\x04\x22\x4d\x18",
+            "an LZ4 file",
+            "unpack it first (`lz4 -d`)",
+        ),
+        (
+            b"rosbag2_bagfile",
+            "the metadata of a recording",
+            "name the folder that it lies in",
+        ),
+        (
+            b"<!DOCTYPE",
+            "a web page",
+            "the download went wrong; fetch the bag again",
+        ),
+        (
+            b"<html",
+            "a web page",
+            "the download went wrong; fetch the bag again",
+        ),
+    ];
+    if head.is_empty() {
+        return (
+            "empty",
+            "the recording or the copy went wrong; record or copy it again",
+        );
+    }
+    if head.iter().all(|b| *b == 0) {
+        return (
+            "all zeros",
+            "the copy went wrong, or the disk was full; copy it again",
+        );
+    }
+    let found = KNOWN.iter().find(|(magic, ..)| head.starts_with(magic));
+    found.map_or(
+        (
+            "of another kind",
+            "bags are ROS 1 `.bag`, ROS 2 `.db3` and `.mcap`, and folders that hold `metadata.yaml`",
+        ),
+        |(_, what, hint)| (*what, *hint),
+    )
+}

@@ -1,0 +1,79 @@
+//! YAML text as plain data, bounded against documents that unfold to more than they are.
+
+use serde_json::Value;
+
+/// What is wrong with a YAML document.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct BadYaml {
+    /// The line, 1..; 0 where none can be named.
+    pub(crate) line: usize,
+    /// What is wrong, in the parser's words, one line.
+    pub(crate) reason: String,
+}
+
+/// The longest document that is read, in bytes.
+const LONGEST: usize = 8 << 20;
+
+/// The document as JSON data: mappings as objects with keys in order, scalars typed as YAML 1.2 has it.
+///
+/// # Errors
+/// [`BadYaml`] with its line: broken syntax, several documents, nesting past 64, more than 8 MiB, or aliases that
+/// unfold past 100,000 values.
+pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
+    if text.len() > LONGEST {
+        return Err(BadYaml {
+            line: 0,
+            reason: "longer than 8 MiB".to_owned(),
+        });
+    }
+    let options = serde_saphyr::options! {
+        alias_limits: serde_saphyr::alias_limits! {
+            max_total_replayed_events: 100_000,
+            max_replay_stack_depth: 16,
+            max_alias_expansions_per_anchor: 10_000,
+        },
+    };
+    serde_saphyr::from_str_with_options(text, options).map_err(|e| BadYaml {
+        line: e
+            .location()
+            .map_or(0, |l| usize::try_from(l.line()).unwrap_or(0)),
+        reason: e.to_string().lines().next().unwrap_or_default().to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn documents_become_plain_data() {
+        let text = "a: 1\nb: [x, 2.5, true, null]\nc:\n  - d: 'yes'\n    e: \"0x10\"\n";
+        let data = json!({"a": 1, "b": ["x", 2.5, true, null], "c": [{"d": "yes", "e": "0x10"}]});
+        assert_eq!(parse(text), Ok(data));
+    }
+
+    #[test]
+    fn numbers_past_an_i64_and_empty_documents_are_data_too() {
+        assert_eq!(parse("a: 9223372036854775807"), Ok(json!({"a": i64::MAX})));
+        assert_eq!(parse("a: 18446744073709551615"), Ok(json!({"a": u64::MAX})));
+        assert_eq!(parse(""), Ok(Value::Null));
+    }
+
+    #[test]
+    fn a_broken_document_names_its_line() {
+        let bad = parse("a: 1\nb: [1, 2\nc: 3\n").unwrap_err();
+        assert!(bad.line >= 2 && !bad.reason.is_empty(), "{bad:?}");
+    }
+
+    #[test]
+    fn an_alias_bomb_is_refused() {
+        let mut text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_owned();
+        for i in 1..12 {
+            let one = format!("*a{}, ", i - 1).repeat(10);
+            text += &format!("a{i}: &a{i} [{one}]\n");
+        }
+        assert!(parse(&text).is_err());
+        assert!(parse(&"[".repeat(100_000)).is_err());
+    }
+}
