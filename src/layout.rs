@@ -2,7 +2,15 @@
 //!
 //! An engine sees sizes and connections only, never colours, rates or changes.
 
-use crate::error::Result;
+mod acyclic;
+mod layered;
+mod order;
+mod pack;
+mod place;
+mod rank;
+mod route;
+
+use crate::error::{Error, Result};
 use crate::geometry::{Point, Rect, Size};
 
 /// The outline that a route must end at.
@@ -121,4 +129,140 @@ pub trait Engine {
     /// # Errors
     /// Where the engine cannot do this plan; the caller may then take another.
     fn lay_out(&self, plan: &Plan, wish: &Wish) -> Result<Layout>;
+}
+
+/// Every engine: its word on the command line, and itself. The first is the default.
+pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[("layered", &layered::Layered)];
+
+/// The engine of this word.
+///
+/// # Errors
+/// [`Error::Usage`] for a word that no engine has.
+pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
+    let found = ENGINES.iter().find(|(name, _)| *name == word);
+    found.map(|(_, engine)| *engine).ok_or_else(|| {
+        let words: Vec<&str> = ENGINES.iter().map(|(name, _)| *name).collect();
+        Error::usage(
+            format!("unknown layout `{word}`"),
+            format!("layouts: {}", words.join(", ")),
+        )
+    })
+}
+
+/// The layout of this plan by this engine; where the engine cannot, by the default one with a remark.
+///
+/// Impossible numbers are taken for zero, links and clusters that name nothing are left out.
+pub fn lay_out(plan: &Plan, wish: &Wish, engine: &dyn Engine) -> Layout {
+    let (plan, wish) = (plan.sane(), wish.sane());
+    engine.lay_out(&plan, &wish).unwrap_or_else(|error| {
+        let mut layout = layered::lay_out(&plan, &wish);
+        layout.remarks.push(error.to_string());
+        layout
+    })
+}
+
+impl Plan {
+    /// This plan with every size finite and every reference valid; a link that names nothing gets a route without pieces.
+    fn sane(&self) -> Self {
+        let mut plan = self.clone();
+        for (at, cluster) in plan.clusters.iter_mut().enumerate() {
+            cluster.title = sane_size(cluster.title);
+            cluster.parent = cluster.parent.filter(|parent| *parent < at);
+        }
+        let clusters = plan.clusters.len();
+        for vertex in &mut plan.vertices {
+            vertex.size = sane_size(vertex.size);
+            vertex.cluster = vertex.cluster.filter(|cluster| *cluster < clusters);
+        }
+        for link in &mut plan.links {
+            link.label = link.label.map(sane_size);
+        }
+        plan
+    }
+
+    /// The places of the links of which both ends exist.
+    fn valid_links(&self) -> impl Iterator<Item = usize> {
+        let n = self.vertices.len();
+        (0..self.links.len()).filter(move |&i| self.links[i].from < n && self.links[i].to < n)
+    }
+}
+
+impl Wish {
+    fn sane(&self) -> Self {
+        let page = sane_size(self.page);
+        Self {
+            page: Size::new(page.w.max(1.0), page.h.max(1.0)),
+            ..*self
+        }
+    }
+}
+
+/// A length that arithmetic survives: 0 to 100,000 pixels.
+fn sane_size(size: Size) -> Size {
+    let sane = |length: f64| {
+        if length.is_finite() {
+            length.clamp(0.0, 1e5)
+        } else {
+            0.0
+        }
+    };
+    Size::new(sane(size.w), sane(size.h))
+}
+
+/// What an item of a layer stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// A vertex of the plan.
+    Vertex,
+    /// A long edge on its way through a layer.
+    Bend,
+    /// The first border of a cluster in a layer.
+    Top,
+    /// The last border of a cluster in a layer.
+    Bottom,
+}
+
+/// The items of each layer, in order across.
+type Rows = Vec<Vec<usize>>;
+
+/// One component cut into layers: what the steps of the layered engine hand on. `along` is the way the edges run,
+/// `across` the way along a layer. Items `0..vertices` are the vertices; bends and borders follow.
+#[derive(Clone, Debug, Default)]
+struct Layers {
+    /// How many items are vertices.
+    vertices: usize,
+    /// What each item is.
+    kind: Vec<Kind>,
+    /// The layer of each item.
+    rank: Vec<usize>,
+    /// The innermost cluster of each item; 0 is the outside.
+    home: Vec<usize>,
+    /// The neighbours of each item in the layer before.
+    up: Vec<Vec<usize>>,
+    /// The neighbours of each item in the layer after.
+    down: Vec<Vec<usize>>,
+    /// The items that each edge passes, by growing rank; empty for a self loop.
+    chains: Vec<Vec<usize>>,
+    /// The cluster around each cluster; the outside is its own.
+    parent: Vec<usize>,
+    /// The first and last layer of each cluster.
+    span: Vec<(usize, usize)>,
+    /// The top and bottom border of each cluster in its first layer; the next layers' follow.
+    borders: Vec<(usize, usize)>,
+    /// How many layers.
+    ranks: usize,
+}
+
+impl Layers {
+    /// The cluster of `item` that is a child of `around`; `None` if the item stands directly in it.
+    fn child(&self, around: usize, item: usize) -> Option<usize> {
+        let mut cluster = self.home[item];
+        if cluster == around {
+            return None;
+        }
+        while self.parent[cluster] != around {
+            cluster = self.parent[cluster];
+        }
+        Some(cluster)
+    }
 }

@@ -1,0 +1,72 @@
+//! Where to put blocks side by side: shelves, tallest first, towards the page's aspect.
+
+use crate::geometry::{Point, Size};
+
+/// Top left corners for blocks of these sizes, `gap` apart, and the size of the whole. The width is the one of several
+/// tries that lets the whole be drawn largest on the page.
+pub(super) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
+    let widest = sizes.iter().map(|size| size.w).fold(0.0, f64::max);
+    let area: f64 = sizes.iter().map(|s| (s.w + gap) * (s.h + gap)).sum();
+    let ideal = (area * page.w / page.h).sqrt();
+    (0..24)
+        .map(|step| {
+            shelves(
+                sizes,
+                widest.max(ideal * (0.8 + 0.05 * f64::from(step))),
+                gap,
+            )
+        })
+        .map(|(places, whole)| (fit(whole, page), places, whole))
+        .reduce(|best, next| if next.0 > best.0 { next } else { best })
+        .map_or_else(
+            || (Vec::new(), Size::default()),
+            |(_, places, whole)| (places, whole),
+        )
+}
+
+/// The scale at which a drawing fills the page.
+pub(super) fn fit(whole: Size, page: Size) -> f64 {
+    (page.w / whole.w.max(1.0)).min(page.h / whole.h.max(1.0))
+}
+
+fn shelves(sizes: &[Size], width: f64, gap: f64) -> (Vec<Point>, Size) {
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    order.sort_by(|&a, &b| sizes[b].h.total_cmp(&sizes[a].h).then(a.cmp(&b)));
+    let mut places = vec![Point::default(); sizes.len()];
+    let (mut x, mut y, mut shelf, mut whole) = (0.0, 0.0, 0.0_f64, Size::default());
+    for i in order {
+        if x > 0.0 && x + sizes[i].w > width {
+            (x, y) = (0.0, y + shelf + gap);
+            shelf = 0.0;
+        }
+        places[i] = Point::new(x, y);
+        whole = Size::new(whole.w.max(x + sizes[i].w), whole.h.max(y + sizes[i].h));
+        x += sizes[i].w + gap;
+        shelf = shelf.max(sizes[i].h);
+    }
+    (places, whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twelve_squares_fill_a_wide_page() {
+        let (places, whole) = pack(
+            &[Size::new(100.0, 100.0); 12],
+            Size::new(1600.0, 900.0),
+            10.0,
+        );
+        assert_eq!(places.len(), 12);
+        assert!((1.2..2.5).contains(&(whole.w / whole.h)), "{whole:?}");
+    }
+
+    #[test]
+    fn nothing_needs_no_room() {
+        assert_eq!(
+            pack(&[], Size::new(1.0, 1.0), 10.0),
+            (Vec::new(), Size::default())
+        );
+    }
+}
