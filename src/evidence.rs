@@ -1,39 +1,28 @@
-//! Who talks to whom, and how we know: what proves a node, a topic or an edge, and how strongly.
+//! Who talks to whom, and how we know: one file per kind of proof, one row each in [`SOURCES`].
 
-/// How well something is known. Ordered: the stronger is the smaller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Degree {
-    /// Messages of this very connection, or the middleware's own statistics.
-    Measured,
-    /// Somebody says so: a log record's topic list, a graph snapshot, the user's own file.
-    Stated,
-    /// A convention says so: an action, a bond, every node publishes `/rosout`.
-    Inferred,
-    /// Known from a header or metadata only.
-    Declared,
+mod connection;
+
+use crate::facts::SourceId;
+pub use crate::facts::{Degree, Piece};
+use crate::proof::Known;
+
+/// A kind of evidence.
+pub struct Source {
+    /// Its word in JSON.
+    pub word: &'static str,
+    /// What follows from the whole mission; run in the order of the rows.
+    pub(crate) conclude: Option<fn(SourceId, &mut Known<'_>)>,
 }
 
-impl Degree {
-    /// All of them, strongest first.
-    pub const ALL: [Self; 4] = [Self::Measured, Self::Stated, Self::Inferred, Self::Declared];
-
-    /// Its word in JSON and in class names.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Stated => "stated",
-            Self::Inferred => "inferred",
-            Self::Declared => "declared",
-        }
-    }
-}
+/// All kinds of evidence; a set of them ([`Evidence`]) holds at most 64.
+pub const SOURCES: &[Source] = &[Source {
+    word: "connection",
+    conclude: Some(connection::conclude),
+}];
 
 /// A set of kinds of evidence: the places of rows in [`SOURCES`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Evidence(u64);
-
-/// The words of all kinds of evidence, as JSON holds them. A set holds at most 64.
-pub const SOURCES: &[&str] = &["connection", "rosout", "parameter_events"];
 
 impl Evidence {
     /// No evidence.
@@ -43,8 +32,17 @@ impl Evidence {
     pub fn of(word: &str) -> Self {
         SOURCES
             .iter()
-            .position(|s| *s == word)
-            .map_or(Self::NONE, |at| Self(1 << at))
+            .position(|s| s.word == word)
+            .map_or(Self::NONE, Self::row)
+    }
+
+    /// The set of this one row.
+    pub(crate) fn row(source: SourceId) -> Self {
+        Self(
+            1_u64
+                .checked_shl(u32::try_from(source).unwrap_or(64))
+                .unwrap_or(0),
+        )
     }
 
     /// Both together.
@@ -64,6 +62,6 @@ impl Evidence {
             .iter()
             .enumerate()
             .filter(move |(at, _)| self.0 >> at & 1 == 1)
-            .map(|(_, word)| *word)
+            .map(|(_, source)| source.word)
     }
 }

@@ -3,11 +3,19 @@
 //! A graph holds numbers only; names stand once, in the [`Elements`] of the whole mission, sorted, so that an index
 //! is an order and equal graphs are equal bytes.
 
+mod assemble;
+mod build;
+mod lives;
+mod rates;
+mod windows;
+
 use std::sync::Arc;
 
 use crate::evidence::{Degree, Evidence};
 use crate::name::{NodeName, TopicName};
 use crate::time::Stamp;
+
+pub use build::{Built, Options, build};
 
 /// A node's place in [`Elements::nodes`].
 pub type NodeId = u32;

@@ -5,11 +5,13 @@
 //! ```
 
 pub mod bag;
+pub mod collect;
 mod decompress;
 pub mod diff;
 pub mod error;
 pub mod evidence;
 pub mod evolution;
+mod facts;
 pub mod geometry;
 pub mod graph;
 pub mod layout;
@@ -18,12 +20,15 @@ pub mod notice;
 pub mod output;
 pub mod palette;
 pub mod pixels;
+mod proof;
 pub mod scene;
 mod source;
+pub mod stamps;
 pub mod style;
 pub mod svg;
 pub mod text;
 pub mod time;
 pub mod view;
 pub mod window;
+pub mod wire;
 mod yaml;

@@ -1,0 +1,253 @@
+//! Takes in any number of bags: where every message lies in time, and what their contents claim.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
+use crate::error::{Error, Result};
+use crate::facts::Facts;
+use crate::notice::{Notice, NoticeKind, Notices};
+use crate::proof::Stream;
+use crate::stamps::Stamps;
+use crate::time::{Span, Stamp};
+
+/// What to look at while reading.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Know every payload's size, even if that means reading more than the index.
+    pub sizes: bool,
+}
+
+/// Takes in bags, one after another.
+#[derive(Debug, Default)]
+pub struct Collector {
+    options: Options,
+    streams: Vec<Stream>,
+    messages: Stamps,
+    facts: Facts,
+    notices: Notices,
+    bags: usize,
+}
+
+impl Collector {
+    /// A collector of nothing yet.
+    pub fn new(options: Options) -> Self {
+        Self {
+            options,
+            ..Self::default()
+        }
+    }
+
+    /// The sink for the next bag; `progress` hears how far its reader is (bytes done, bytes in all).
+    pub fn bag<'a>(&'a mut self, progress: &'a mut dyn FnMut(u64, u64)) -> BagSink<'a> {
+        self.bags += 1;
+        BagSink {
+            streams: Vec::new(),
+            bag: self.bags - 1,
+            collector: self,
+            progress,
+        }
+    }
+
+    /// Ends the taking in.
+    ///
+    /// # Errors
+    /// If times had to be put into a temporary file and that failed.
+    pub fn finish(mut self) -> Result<Collected> {
+        self.messages.finish().map_err(spool_error)?;
+        self.facts.times.finish().map_err(spool_error)?;
+        let believed = believed(self.messages.days());
+        let mut all = Collected {
+            streams: self.streams,
+            messages: self.messages,
+            facts: self.facts,
+            notices: self.notices,
+            believed,
+            span: None,
+        };
+        all.span = all.measure().map_err(spool_error)?;
+        Ok(all)
+    }
+}
+
+/// The temporary file of times could not be written or read.
+pub(crate) fn spool_error(source: io::Error) -> Error {
+    Error::Io {
+        path: "a temporary file".into(),
+        doing: "use",
+        source,
+    }
+}
+
+/// Feeds one bag into a [`Collector`].
+pub struct BagSink<'a> {
+    collector: &'a mut Collector,
+    progress: &'a mut dyn FnMut(u64, u64),
+    bag: usize,
+    /// The stream of each connection of this bag.
+    streams: Vec<usize>,
+}
+
+impl BagSink<'_> {
+    fn stream(&self, connection: ConnectionId) -> Option<usize> {
+        self.streams.get(connection.0 as usize).copied()
+    }
+}
+
+impl Sink for BagSink<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let all = &mut *self.collector;
+        let topic = all.facts.name(connection.topic.as_str());
+        let publisher = connection.publisher.as_ref();
+        let stream = Stream {
+            bag: self.bag,
+            connection: connection.clone(),
+            topic,
+            publisher: publisher.map(|p| all.facts.name(p.as_str())),
+            latched: connection.latching,
+            trusted: true,
+            times: all.messages.series(),
+        };
+        self.streams.push(all.streams.len());
+        all.streams.push(stream);
+        if all.options.sizes {
+            Want::Sizes
+        } else {
+            Want::Stamps
+        }
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        if let Some(stream) = self.stream(connection) {
+            let times = self.collector.streams[stream].times;
+            self.collector.messages.add(times, stamps, sizes);
+        }
+    }
+
+    fn message(&mut self, _message: Message<'_>) {}
+
+    fn notice(&mut self, notice: Notice) {
+        self.collector.notices.add(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        (self.progress)(done, total);
+    }
+}
+
+/// Everything that the bags of a mission hold about its graph.
+#[derive(Debug)]
+pub struct Collected {
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) messages: Stamps,
+    pub(crate) facts: Facts,
+    /// What went wrong without stopping us.
+    pub notices: Notices,
+    /// The times that are no accident; `None` if all of them may be believed.
+    pub(crate) believed: Option<Span>,
+    /// From the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is no
+    /// message.
+    pub span: Option<Span>,
+}
+
+impl Collected {
+    /// Whether a time may be believed.
+    pub(crate) fn believes(&self, time: Stamp) -> bool {
+        self.believed.is_none_or(|span| span.contains(time))
+    }
+
+    /// Finds the span of all believable messages, and counts the others.
+    fn measure(&mut self) -> io::Result<Option<Span>> {
+        let mut span: Option<Span> = None;
+        let mut aside = 0;
+        for at in 0..self.streams.len() {
+            let id = self.streams[at].times;
+            let Some(bounds) = self.messages.bounds(id) else {
+                continue;
+            };
+            if self.believes(bounds.0) && self.believes(bounds.1) {
+                widen(&mut span, bounds);
+                continue;
+            }
+            let believed = self.believed;
+            self.messages.merge(&[id], |t| {
+                if believed.is_none_or(|span| span.contains(t.time)) {
+                    widen(&mut span, (t.time, t.time));
+                } else {
+                    aside += 1;
+                }
+            })?;
+        }
+        if aside > 0 {
+            self.notices.add(Notice {
+                kind: NoticeKind::ImpossibleTime,
+                count: aside,
+                text: "message at an impossible time, set aside".to_owned(),
+            });
+        }
+        Ok(span)
+    }
+}
+
+fn widen(span: &mut Option<Span>, (first, last): (Stamp, Stamp)) {
+    let all = span.get_or_insert(Span {
+        start: first,
+        end: last.plus(1),
+    });
+    all.start = all.start.min(first);
+    all.end = all.end.max(last.plus(1));
+}
+
+const DAY: i64 = 86_400_000_000_000;
+/// Times further than this from all others are strangers.
+const FAR_DAYS: i64 = 365;
+/// Of so many messages at most one may be a stranger that is set aside.
+const RARE: u64 = 10;
+
+/// The times to believe, if a few messages lie far from the bulk; `None` to believe all.
+fn believed(days: &BTreeMap<i64, u64>) -> Option<Span> {
+    let mut clusters: Vec<(i64, i64, u64)> = Vec::new();
+    for (day, count) in days {
+        match clusters.last_mut() {
+            Some((_, last, sum)) if day - *last <= FAR_DAYS => {
+                *last = *day;
+                *sum += count;
+            }
+            _ => clusters.push((*day, *day, *count)),
+        }
+    }
+    let total: u64 = days.values().sum();
+    let (first, last, count) = clusters.iter().max_by_key(|c| c.2)?;
+    let strangers = total - count;
+    let rare = strangers <= (total / RARE).max(1) && strangers < *count;
+    (strangers > 0 && rare).then(|| Span {
+        start: Stamp(first.saturating_mul(DAY)),
+        end: Stamp((last + 1).saturating_mul(DAY)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
+        let span = believed(&days.iter().copied().collect())?;
+        Some((span.start.0 / DAY, span.end.0 / DAY))
+    }
+
+    #[test]
+    fn a_few_messages_far_from_the_bulk_are_set_aside() {
+        assert_eq!(kept(&[(0, 3), (20_000, 500)]), Some((20_000, 20_001)));
+        assert_eq!(kept(&[(0, 1), (20_000, 2)]), Some((20_000, 20_001)));
+        assert_eq!(kept(&[(0, 500), (20_000, 3)]), Some((0, 1)));
+    }
+
+    #[test]
+    fn a_bag_that_is_one_piece_or_two_halves_is_kept_whole() {
+        assert_eq!(kept(&[(0, 500)]), None);
+        assert_eq!(kept(&[(20_000, 2), (20_006, 3)]), None);
+        assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
+        assert_eq!(kept(&[(0, 1), (20_000, 1)]), None);
+        assert_eq!(kept(&[]), None);
+    }
+}

@@ -1,0 +1,222 @@
+//! The elements with their ids, and the graph of each window.
+
+use std::collections::BTreeMap;
+
+use super::build::Built;
+use super::lives::Track;
+use super::rates::{Rates, Tally};
+use super::windows::Windows;
+use super::{Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, Topic, TopicState};
+use crate::collect::Collected;
+use crate::facts::Name;
+use crate::proof::What;
+use crate::time::Span;
+
+/// What happened on each topic: its streams, and their messages per window.
+pub(super) type Traffic = BTreeMap<Name, (Vec<usize>, Rates)>;
+
+/// Windows shorter than this have no rates.
+const SHORTEST_NS: i64 = 1_000_000;
+
+/// Lists every element and its state in every window. Tracks come in the order of the elements' names.
+pub(super) fn assemble(
+    tracks: &BTreeMap<What, Track>,
+    traffic: &Traffic,
+    windows: &Windows<'_>,
+    collected: &Collected,
+) -> Built {
+    let mut all = Assembly {
+        built: Built {
+            graphs: vec![Graph::default(); windows.len()],
+            messages: vec![0; windows.len()],
+            ..Built::default()
+        },
+        windows,
+        collected,
+        traffic,
+        nodes: BTreeMap::new(),
+        topics: BTreeMap::new(),
+        sent: BTreeMap::new(),
+    };
+    all.count_sent();
+    for (what, track) in tracks {
+        match *what {
+            What::Node(node) => all.node(node, track),
+            What::Topic(topic) => all.topic(topic, track),
+            What::Publish(node, topic) => all.publish(node, topic, track),
+            What::Subscribe(topic, node) => all.subscribe(topic, node, track),
+        }
+    }
+    all.built
+}
+
+struct Assembly<'a> {
+    built: Built,
+    windows: &'a Windows<'a>,
+    collected: &'a Collected,
+    traffic: &'a Traffic,
+    nodes: BTreeMap<Name, NodeId>,
+    topics: BTreeMap<Name, u32>,
+    /// Messages of each known publisher: per topic, then per window.
+    sent: BTreeMap<Name, BTreeMap<Name, BTreeMap<usize, u64>>>,
+}
+
+impl Assembly<'_> {
+    /// Adds up the messages of each publisher.
+    fn count_sent(&mut self) {
+        for (topic, (streams, rates)) in self.traffic {
+            for tally in &rates.tallies {
+                self.built.messages[tally.window] += tally.count;
+            }
+            for (place, stream) in streams.iter().enumerate() {
+                let stream = &self.collected.streams[*stream];
+                let Some(node) = stream.publisher.filter(|_| stream.trusted) else {
+                    continue;
+                };
+                let of = self
+                    .sent
+                    .entry(node)
+                    .or_default()
+                    .entry(*topic)
+                    .or_default();
+                for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
+                    *of.entry(tally.window).or_default() += tally.streams[place];
+                }
+            }
+        }
+    }
+
+    fn node(&mut self, name: Name, track: &Track) {
+        let id = next(self.nodes.len());
+        self.nodes.insert(name, id);
+        let (first, last) = track.bounds();
+        let text = self.collected.facts.text(name);
+        self.built.elements.nodes.push(Node {
+            role: text.clone(),
+            name: text.into(),
+            evidence: track.evidence,
+            first,
+            last,
+        });
+        let sent = self.sent.get(&name);
+        for (window, span) in self.windows.0.iter().enumerate() {
+            let Some((state, degree)) = track.state(window, *span) else {
+                continue;
+            };
+            let count = sent.map(|topics| topics.values().filter_map(|w| w.get(&window)).sum());
+            self.built.graphs[window].nodes.push(NodeState {
+                id,
+                state,
+                degree,
+                hz: count.and_then(|n| per_second(n, *span)),
+                lifecycle: None,
+            });
+        }
+    }
+
+    fn topic(&mut self, name: Name, track: &Track) {
+        let id = next(self.topics.len());
+        self.topics.insert(name, id);
+        let (first, last) = track.bounds();
+        let traffic = self.traffic.get(&name);
+        let mut types: Vec<_> = traffic
+            .iter()
+            .flat_map(|(streams, _)| streams)
+            .map(|s| self.collected.streams[*s].connection.type_name.clone())
+            .filter(|name| !name.is_empty())
+            .collect();
+        types.sort_unstable();
+        types.dedup();
+        self.built.elements.topics.push(Topic {
+            name: self.collected.facts.text(name).into(),
+            types,
+            evidence: track.evidence,
+            first,
+            last,
+            qos: None,
+        });
+        let tallies = traffic.map_or(&[][..], |(_, rates)| &rates.tallies);
+        let mut tallies = tallies.iter().peekable();
+        for (window, span) in self.windows.0.iter().enumerate() {
+            let tally = tallies.next_if(|t| t.window == window);
+            if let Some((state, degree)) = track.state(window, *span) {
+                self.built.graphs[window].topics.push(TopicState {
+                    id,
+                    state,
+                    degree,
+                    count: tally.map_or(0, |t| t.count),
+                    bytes: bytes(tally, traffic.is_some()),
+                    hz: per_second(tally.map_or(0, |t| t.count), *span),
+                    median_period_s: tally.and_then(|t| t.median_period_s),
+                    max_gap_s: tally.and_then(|t| t.max_gap_s),
+                });
+            }
+        }
+    }
+
+    fn publish(&mut self, node: Name, topic: Name, track: &Track) {
+        let id = next(self.built.elements.publishes.len());
+        let edge = self.edge(node, topic, track);
+        self.built.elements.publishes.push(edge);
+        let sent = self.sent.get(&node).and_then(|topics| topics.get(&topic));
+        for (window, span) in self.windows.0.iter().enumerate() {
+            let count = sent.map(|windows| windows.get(&window).copied().unwrap_or(0));
+            let state = edge_state(id, track, window, *span, count);
+            self.built.graphs[window].publishes.extend(state);
+        }
+    }
+
+    fn subscribe(&mut self, topic: Name, node: Name, track: &Track) {
+        let id = next(self.built.elements.subscribes.len());
+        let edge = self.edge(node, topic, track);
+        self.built.elements.subscribes.push(edge);
+        for (window, span) in self.windows.0.iter().enumerate() {
+            let state = edge_state(id, track, window, *span, None);
+            self.built.graphs[window].subscribes.extend(state);
+        }
+    }
+
+    fn edge(&self, node: Name, topic: Name, track: &Track) -> Edge {
+        let (first, last) = track.bounds();
+        Edge {
+            node: self.nodes.get(&node).copied().unwrap_or(NodeId::MAX),
+            topic: self.topics.get(&topic).copied().unwrap_or(u32::MAX),
+            evidence: track.evidence,
+            first,
+            last,
+        }
+    }
+}
+
+fn edge_state(
+    id: EdgeId,
+    track: &Track,
+    window: usize,
+    span: Span,
+    count: Option<u64>,
+) -> Option<EdgeState> {
+    let (state, degree) = track.state(window, span)?;
+    Some(EdgeState {
+        id,
+        state,
+        degree,
+        count,
+        hz: count.and_then(|n| per_second(n, span)),
+    })
+}
+
+fn bytes(tally: Option<&Tally>, recorded: bool) -> Option<u64> {
+    match tally {
+        Some(tally) => tally.bytes,
+        None => recorded.then_some(0),
+    }
+}
+
+fn per_second(count: u64, span: Span) -> Option<f64> {
+    let nanos = span.nanos();
+    (nanos >= SHORTEST_NS).then(|| count as f64 / (nanos as f64 / 1e9))
+}
+
+fn next(len: usize) -> u32 {
+    u32::try_from(len).unwrap_or(u32::MAX)
+}

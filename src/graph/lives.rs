@@ -1,0 +1,195 @@
+//! When something is alive: from its first sign to its last, held on by latched messages, ended by proofs of an end.
+
+use std::collections::BTreeMap;
+
+use super::State;
+use super::windows::Windows;
+use crate::evidence::{Degree, Evidence};
+use crate::time::{Span, Stamp};
+
+/// One stretch of being alive, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Life {
+    pub(super) from: Stamp,
+    /// The last sign; from here on it is only held.
+    pub(super) spoke: Stamp,
+    pub(super) to: Stamp,
+}
+
+/// What is known about the life of one element.
+#[derive(Clone, Debug)]
+pub(super) struct Track {
+    pub(super) evidence: Evidence,
+    /// How well it is known where no message proves it.
+    pub(super) quiet: Degree,
+    /// Signs that bound lives: sorted later.
+    pub(super) signs: Vec<Stamp>,
+    /// Proofs of an end.
+    pub(super) ends: Vec<Stamp>,
+    /// Whether it lives on after its last sign.
+    pub(super) held: bool,
+    /// Since when a latched message stands for it.
+    pub(super) latched: Option<Stamp>,
+    /// Windows with signs, and how strong the best one is.
+    pub(super) active: BTreeMap<usize, Degree>,
+    /// Known for the whole mission from a header or a file.
+    pub(super) whole: bool,
+    pub(super) lives: Vec<Life>,
+}
+
+impl Default for Track {
+    fn default() -> Self {
+        Self {
+            evidence: Evidence::NONE,
+            quiet: Degree::Declared,
+            signs: Vec::new(),
+            ends: Vec::new(),
+            held: false,
+            latched: None,
+            active: BTreeMap::new(),
+            whole: false,
+            lives: Vec::new(),
+        }
+    }
+}
+
+impl Track {
+    /// Marks a window as one with a sign.
+    pub(super) fn mark(&mut self, window: usize, degree: Degree) {
+        let best = self.active.entry(window).or_insert(degree);
+        *best = degree.min(*best);
+    }
+
+    /// Adds signs, sorted, that mark their windows; of those with no end between them only the outer two are kept.
+    pub(super) fn sign_all(
+        &mut self,
+        signs: &[Stamp],
+        ends: &[Stamp],
+        degree: Degree,
+        windows: &Windows<'_>,
+    ) {
+        for time in signs {
+            for window in windows.over(*time, *time) {
+                self.mark(window, degree);
+            }
+        }
+        let before = |time: &Stamp| ends.partition_point(|end| end < time);
+        for run in signs.chunk_by(|a, b| before(a) == before(b)) {
+            self.signs.extend(run.first());
+            self.signs.extend(run.last());
+        }
+        self.ends.extend(ends);
+    }
+
+    /// Takes on what another element proves about this one: an edge proves its node and its topic.
+    pub(super) fn learn(&mut self, other: &Self) {
+        self.evidence = self.evidence.and(other.evidence);
+        self.quiet = self.quiet.min(other.quiet);
+        self.signs.extend(&other.signs);
+        self.held |= other.held;
+        self.whole |= other.whole;
+        self.latched = match (self.latched, other.latched) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+        for (window, degree) in &other.active {
+            self.mark(*window, *degree);
+        }
+    }
+
+    /// Works out the lives; `to` is the mission's end, `linger` the last moment of somebody whose last sign is known.
+    pub(super) fn live(&mut self, mission: (Stamp, Stamp), linger: impl Fn(Stamp) -> Stamp) {
+        self.signs.sort_unstable();
+        self.ends.sort_unstable();
+        self.lives = lives(&self.signs, &self.ends);
+        if let Some(life) = self.lives.last_mut() {
+            let ended = self.ends.last().is_some_and(|end| *end >= life.spoke);
+            life.to = match (ended, self.held) {
+                (true, _) => life.to,
+                (false, true) => mission.1,
+                (false, false) => linger(life.spoke),
+            };
+        }
+        if self.whole && self.signs.is_empty() {
+            self.lives = vec![Life {
+                from: mission.0,
+                spoke: mission.1,
+                to: mission.1,
+            }];
+        }
+    }
+
+    /// How alive it is in a window, and how well that is known; `None` if it is not there.
+    pub(super) fn state(&self, window: usize, span: Span) -> Option<(State, Degree)> {
+        if let Some(degree) = self.active.get(&window) {
+            return Some((State::Active, *degree));
+        }
+        let alive = |life: &&Life| life.from < span.end && span.start <= life.to;
+        let life = self.lives.iter().find(alive)?;
+        let state = if self.signs.is_empty() && self.whole {
+            State::Declared
+        } else if life.spoke < span.start && self.latched.is_some_and(|since| since < span.end) {
+            State::Latched
+        } else {
+            State::Silent
+        };
+        Some((state, self.quiet))
+    }
+
+    /// The first and last sign.
+    pub(super) fn bounds(&self) -> (Option<Stamp>, Option<Stamp>) {
+        (self.signs.first().copied(), self.signs.last().copied())
+    }
+}
+
+/// Lives between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it.
+fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Life> {
+    let mut lives: Vec<Life> = Vec::new();
+    let mut ends = ends.iter().copied().peekable();
+    let mut open = false;
+    for sign in signs {
+        while let Some(end) = ends.next_if(|end| end < sign) {
+            if let Some(life) = lives.last_mut().filter(|_| open) {
+                life.to = end;
+            }
+            open = false;
+        }
+        match lives.last_mut() {
+            Some(life) if open => (life.spoke, life.to) = (*sign, *sign),
+            _ => lives.push(Life {
+                from: *sign,
+                spoke: *sign,
+                to: *sign,
+            }),
+        }
+        open = true;
+    }
+    if let (Some(life), Some(end)) = (lives.last_mut(), ends.next()) {
+        life.to = life.to.max(end);
+    }
+    lives
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stretches(signs: &[i64], ends: &[i64]) -> Vec<(i64, i64)> {
+        let stamps = |list: &[i64]| list.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
+        let lives = lives(&stamps(signs), &stamps(ends));
+        lives.iter().map(|l| (l.from.0, l.to.0)).collect()
+    }
+
+    #[test]
+    fn a_life_spans_its_signs() {
+        assert_eq!(stretches(&[1, 5, 9], &[]), [(1, 9)]);
+        assert_eq!(stretches(&[], &[4]), []);
+    }
+
+    #[test]
+    fn an_end_closes_a_life_and_the_next_sign_opens_another() {
+        assert_eq!(stretches(&[1, 5, 9, 10], &[6]), [(1, 6), (9, 10)]);
+        assert_eq!(stretches(&[1, 5], &[0, 7, 8]), [(1, 7)]);
+        assert_eq!(stretches(&[1, 5], &[5]), [(1, 5)]);
+    }
+}

@@ -1,0 +1,190 @@
+//! What the claims of a mission amount to: every reason to believe in a node, a topic or an edge.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::sync::Arc;
+
+use crate::bag::Connection;
+use crate::facts::{Claim, Degree, Facts, Name, SourceId};
+use crate::stamps::SeriesId;
+use crate::time::Stamp;
+
+/// A connection of one of the bags.
+#[derive(Clone, Debug)]
+pub(crate) struct Stream {
+    /// The place of its bag among the inputs.
+    pub(crate) bag: usize,
+    /// As the reader announced it.
+    pub(crate) connection: Connection,
+    pub(crate) topic: Name,
+    pub(crate) publisher: Option<Name>,
+    /// Whether a message outlives its moment: latched (ROS 1) or transient local (ROS 2).
+    pub(crate) latched: bool,
+    /// Whether its publisher's name is believed.
+    pub(crate) trusted: bool,
+    /// The log times of its messages.
+    pub(crate) times: SeriesId,
+}
+
+/// A node, a topic or an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum What {
+    Node(Name),
+    Topic(Name),
+    /// Node, topic.
+    Publish(Name, Name),
+    /// Topic, node.
+    Subscribe(Name, Name),
+}
+
+impl What {
+    /// The same element by new names.
+    fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
+        match self {
+            Self::Node(a) => Self::Node(to(a)),
+            Self::Topic(a) => Self::Topic(to(a)),
+            Self::Publish(a, b) => Self::Publish(to(a), to(b)),
+            Self::Subscribe(a, b) => Self::Subscribe(to(a), to(b)),
+        }
+    }
+}
+
+/// When a reason holds.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum When {
+    /// While the messages of this stream come.
+    Messages(usize),
+    /// From the first sign to the last; after an end only from the next sign on.
+    Signs {
+        signs: Vec<Stamp>,
+        ends: Vec<Stamp>,
+        held: bool,
+    },
+    /// As long as this other element lives.
+    Like(What),
+    /// For the whole mission.
+    Whole,
+}
+
+/// One reason to believe in an element.
+#[derive(Clone, Debug)]
+pub(crate) struct Proof {
+    pub(crate) what: What,
+    pub(crate) source: SourceId,
+    pub(crate) degree: Degree,
+    pub(crate) when: When,
+}
+
+impl Proof {
+    /// The same proof by new names.
+    pub(crate) fn rename(&mut self, to: &impl Fn(Name) -> Name) {
+        self.what = self.what.renamed(to);
+        if let When::Like(other) = &mut self.when {
+            *other = other.renamed(to);
+        }
+    }
+}
+
+/// Everything known about a mission once all bags are read, and what follows from it so far.
+#[derive(Debug)]
+pub(crate) struct Known<'a> {
+    pub(crate) streams: &'a [Stream],
+    pub(crate) facts: &'a mut Facts,
+    pub(crate) proofs: Vec<Proof>,
+    publishers: BTreeMap<Name, BTreeSet<Name>>,
+    nodes: BTreeSet<Name>,
+}
+
+impl<'a> Known<'a> {
+    pub(crate) fn new(streams: &'a [Stream], facts: &'a mut Facts) -> Self {
+        Self {
+            streams,
+            facts,
+            proofs: Vec::new(),
+            publishers: BTreeMap::new(),
+            nodes: BTreeSet::new(),
+        }
+    }
+
+    /// Adds a reason.
+    pub(crate) fn prove(&mut self, proof: Proof) {
+        match proof.what {
+            What::Node(node) | What::Subscribe(_, node) => {
+                self.nodes.insert(node);
+            }
+            What::Publish(node, topic) => {
+                self.nodes.insert(node);
+                self.publishers.entry(topic).or_default().insert(node);
+            }
+            What::Topic(_) => {}
+        }
+        self.proofs.push(proof);
+    }
+
+    /// Everybody who is known to publish `topic` so far.
+    pub(crate) fn publishers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
+        self.publishers.get(&topic).into_iter().flatten().copied()
+    }
+
+    /// Every node known so far.
+    pub(crate) fn nodes(&self) -> &BTreeSet<Name> {
+        &self.nodes
+    }
+
+    /// The text of a name.
+    pub(crate) fn text(&self, name: Name) -> Arc<str> {
+        self.facts.text(name)
+    }
+
+    /// What the claims say without any rule: nodes, topics, publications and subscriptions.
+    pub(crate) fn take_at_their_word(&mut self) -> io::Result<()> {
+        for fact in self.facts.list.clone() {
+            let what = match fact.claim {
+                Claim::Node(node) => What::Node(node),
+                Claim::Topic(topic) => What::Topic(topic),
+                Claim::Publish(node, topic) => What::Publish(node, topic),
+                Claim::Subscribe(node, topic) => What::Subscribe(topic, node),
+                _ => continue,
+            };
+            let signs = self.facts.times(&fact)?;
+            let (ends, held) = self.ends(&fact, &signs)?;
+            self.prove(Proof {
+                what,
+                source: fact.source,
+                degree: fact.degree,
+                when: When::Signs { signs, ends, held },
+            });
+        }
+        Ok(())
+    }
+
+    /// When a claim was taken back, and whether it holds until then even without a further word.
+    fn ends(
+        &mut self,
+        fact: &crate::facts::Fact,
+        signs: &[Stamp],
+    ) -> io::Result<(Vec<Stamp>, bool)> {
+        let mut ends = Vec::new();
+        let mut held = false;
+        for other in self.facts.list.clone() {
+            let ended = match (fact.claim, other.claim) {
+                (Claim::Node(a), Claim::NodeGone(b)) => a == b,
+                (Claim::Subscribe(a, t), Claim::Unsubscribe(b, u)) => (a, t) == (b, u),
+                (_, Claim::Snapshot(name)) => fact.snapshot == Some(name),
+                _ => false,
+            };
+            if ended {
+                let snapshot = matches!(other.claim, Claim::Snapshot(_));
+                held |= snapshot;
+                let times = self.facts.times(&other)?;
+                ends.extend(
+                    times
+                        .into_iter()
+                        .filter(|t| !snapshot || signs.binary_search(t).is_err()),
+                );
+            }
+        }
+        ends.sort_unstable();
+        Ok((ends, held))
+    }
+}
