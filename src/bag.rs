@@ -10,10 +10,13 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::name::{NodeName, TopicName};
-use crate::notice::Notice;
+use crate::notice::{Notice, NoticeKind};
 use crate::source::{Source, Stream};
 use crate::time::{Span, Stamp};
 
+use relay::{Clip, Gather, in_order};
+
+mod relay;
 mod rosbag1;
 mod unknown;
 
@@ -258,17 +261,15 @@ pub fn sniff(input: &Input) -> Result<Kind> {
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let mut place = place(input)?;
     let head = head(&mut place)?;
-    match FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
-        Some(row) => (row.open)(place, options),
-        None => {
-            let path = match input {
-                Input::Path(path) => path.clone(),
-                Input::Stdin => PathBuf::from(input.name()),
-            };
-            let folder = matches!(place, Place::Folder(_));
-            Err(unknown::explain(&path, &head, folder))
-        }
+    if let Some(row) = FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
+        return (row.open)(place, options);
     }
+    let path = match input {
+        Input::Path(path) => path.clone(),
+        Input::Stdin => PathBuf::from(input.name()),
+    };
+    let folder = matches!(place, Place::Folder(_));
+    Err(unknown::explain(&path, &head, folder))
 }
 
 fn place(input: &Input) -> Result<Place> {
@@ -301,6 +302,14 @@ fn head(place: &mut Place) -> Result<Vec<u8>> {
             head.map_err(Error::io("read", Path::new(name)))
         }
     }
+}
+
+/// The longest payload, or connection record, that is held in memory, in bytes.
+const MOST_PAYLOAD: usize = 16 << 20;
+
+/// Tells `sink` that something was lost because the system refused.
+fn lost(sink: &mut dyn Sink, what: &str, why: &io::Error) {
+    sink.notice(Notice::new(NoticeKind::Damaged, format!("{what}: {why}")));
 }
 
 /// The last part of a path as text.

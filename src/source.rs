@@ -42,11 +42,6 @@ impl Source {
         self.len
     }
 
-    /// Whether it was empty when it was opened.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
     /// The bytes read from it so far.
     pub(crate) fn bytes_read(&self) -> u64 {
         self.read.load(Ordering::Relaxed)

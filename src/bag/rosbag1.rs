@@ -1,9 +1,27 @@
 //! ROS 1 bags, version 2: by the index behind each chunk, else record by record.
 //!
-//! The format: <https://wiki.ros.org/Bags/Format/2.0>.
+//! The format: <https://wiki.ros.org/Bags/Format/2.0>. The files `rosbag1_*.rs` are parts of this one.
 
-use super::{FormatRow, OpenOptions, Place, Reader};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::{Clip, FormatRow, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order};
+use crate::decompress::Compression;
 use crate::error::{Error, Result};
+use crate::notice::{Notice, NoticeKind};
+use crate::source::{FAR, Source, Stream};
+use crate::time::Span;
+use chunk::{Chunk, Chunks};
+use plan::{Plan, Unindexed};
+
+#[path = "rosbag1_chunk.rs"]
+mod chunk;
+#[path = "rosbag1_forward.rs"]
+mod forward;
+#[path = "rosbag1_plan.rs"]
+mod plan;
+#[path = "rosbag1_records.rs"]
+mod records;
 
 /// ROS 1 bags.
 pub(super) const FORMAT: FormatRow = FormatRow {
@@ -14,15 +32,165 @@ pub(super) const FORMAT: FormatRow = FormatRow {
     open,
 };
 
+/// A bag in a file, with its tail if that can be relied on.
+struct Indexed {
+    source: Source,
+    plan: Result<Plan, Unindexed>,
+}
+
+/// A bag from a pipe.
+struct Piped {
+    name: String,
+    stream: Stream<'static>,
+}
+
 fn open(place: Place, _options: &OpenOptions) -> Result<Box<dyn Reader>> {
-    let path = match &place {
-        Place::File(source) => source.path().to_owned(),
-        Place::Folder(path) => path.clone(),
-        Place::Pipe(name, _) => name.into(),
-    };
+    match place {
+        Place::File(source) => {
+            let mut head = [0; 32];
+            let got = source.read_at(0, &mut head);
+            let got = got.map_err(Error::io("read", source.path()))?;
+            version(source.path(), &head[..got])?;
+            let plan = plan::of(&source).map_err(Error::io("read", source.path()))?;
+            Ok(Box::new(Indexed { source, plan }))
+        }
+        Place::Pipe(name, mut stream) => {
+            let head = stream
+                .peek(32)
+                .map_err(Error::io("read", Path::new(&name)))?;
+            version(Path::new(&name), head)?;
+            Ok(Box::new(Piped { name, stream }))
+        }
+        Place::Folder(path) => Err(super::unknown::explain(&path, &[], true)),
+    }
+}
+
+/// Refuses what is older than version 2.
+fn version(path: &Path, head: &[u8]) -> Result<()> {
+    if head.starts_with(b"#ROSBAG V2.") {
+        return Ok(());
+    }
+    let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
     Err(Error::Unsupported {
-        path,
-        what: "not yet".to_owned(),
-        hint: String::new(),
+        path: path.to_owned(),
+        what: format!(
+            "it is of an old format, `{}`",
+            String::from_utf8_lossy(line)
+        ),
+        hint: "`rosbag fix old.bag new.bag` of a ROS 1 installation brings it to version 2"
+            .to_owned(),
     })
+}
+
+impl Reader for Indexed {
+    fn span(&mut self) -> Result<Option<Span>> {
+        let Ok(plan) = &self.plan else {
+            return Ok(None);
+        };
+        Ok(plan.span(&self.source))
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        let mut sink = Clip::new(range, sink);
+        match &self.plan {
+            Ok(plan) => Ok(by_index(&self.source, plan, range, &mut sink)),
+            Err(reason) => Ok(from_the_front(&self.source, reason, &mut sink)),
+        }
+    }
+}
+
+/// What every report of this format begins with.
+fn report(name: String, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
+    Report {
+        name,
+        format: FORMAT.name.to_owned(),
+        compression: compression.iter().map(|c| c.word().to_owned()).collect(),
+        tier,
+        tier_reason: None,
+        complete: true,
+        bytes_read: 0,
+        file_bytes: 0,
+        facts: Vec::new(),
+    }
+}
+
+fn by_index(source: &Source, plan: &Plan, range: Option<Span>, sink: &mut Clip<'_>) -> Report {
+    let wants: Vec<_> = plan
+        .table
+        .list()
+        .iter()
+        .map(|c| sink.connection(c))
+        .collect();
+    plan.notices(sink);
+    let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
+    let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();
+    let reader = Chunks {
+        source,
+        table: &plan.table,
+        wants: &wants,
+        range,
+    };
+    let work = |at: usize, sink: &mut dyn Sink| reader.read(chunks[at], sink);
+    let total = chunks.len() as u64;
+    in_order(
+        chunks.len(),
+        plan.threads(chunks.len()),
+        &work,
+        sink,
+        |at, sink| {
+            if at % 64 == 0 {
+                sink.progress(at as u64, total);
+            }
+        },
+    );
+    let complete = !sink.lost;
+    let samples = [chunks.first(), chunks.get(chunks.len() / 2), chunks.last()];
+    let compression = samples.into_iter().flatten();
+    let compression = compression.filter_map(|c| reader.compression(c)).collect();
+    Report {
+        complete,
+        bytes_read: source.bytes_read(),
+        file_bytes: source.len(),
+        ..report(file_name(source.path()), Tier::Index, &compression)
+    }
+}
+
+fn from_the_front(source: &Source, reason: &Unindexed, sink: &mut dyn Sink) -> Report {
+    let mut stream = Stream::of_file(source, 0, source.len(), FAR);
+    sink.notice(Notice::new(
+        NoticeKind::Downgraded,
+        format!("read from the front, since {}", reason.0),
+    ));
+    let found = forwards(&mut stream, source.len(), sink);
+    Report {
+        complete: found.complete,
+        tier_reason: Some(reason.0.clone()),
+        bytes_read: source.bytes_read(),
+        file_bytes: source.len(),
+        ..report(file_name(source.path()), Tier::Forward, &found.compression)
+    }
+}
+
+fn forwards(stream: &mut Stream<'_>, total: u64, sink: &mut dyn Sink) -> forward::Found {
+    if let Ok(head) = stream.peek(32) {
+        let line = head.iter().position(|b| *b == b'\n');
+        stream.advance(line.map_or(0, |at| at + 1));
+    }
+    forward::read(stream, total, sink)
+}
+
+impl Reader for Piped {
+    fn span(&mut self) -> Result<Option<Span>> {
+        Ok(None)
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        let found = forwards(&mut self.stream, 0, &mut Clip::new(range, sink));
+        Ok(Report {
+            complete: found.complete,
+            tier_reason: Some("a pipe has no index".to_owned()),
+            bytes_read: self.stream.position(),
+            ..report(self.name.clone(), Tier::Forward, &found.compression)
+        })
+    }
 }

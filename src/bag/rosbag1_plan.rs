@@ -1,0 +1,226 @@
+//! The tail of a ROS 1 bag: which connections and chunks it has, and whether that can be relied on.
+
+use std::io;
+
+use super::chunk::{Chunk, Chunks, LONGEST_INDEX, Tally};
+use super::records::{self, Record, Stop, Table};
+use crate::bag::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
+use crate::notice::{Notice, NoticeKind};
+use crate::source::{FAR, NEAR, Source, Stream};
+use crate::time::{Span, Stamp};
+
+/// What the tail says.
+pub(super) struct Plan {
+    pub(super) table: Table,
+    /// In the order of the file, none twice.
+    pub(super) chunks: Vec<Chunk>,
+    encryptor: String,
+}
+
+/// Why a bag cannot be read by its index.
+#[derive(Clone, Debug)]
+pub(super) struct Unindexed(pub(super) String);
+
+/// More chunks than this are not planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
+const MOST_CHUNKS: usize = 1 << 20;
+
+/// Reads the head and the tail of `source`.
+pub(super) fn of(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
+    let mut stream = Stream::of_file(source, 0, source.len(), NEAR);
+    let head = stream.peek(32)?;
+    let line = head.iter().position(|b| *b == b'\n').unwrap_or(0);
+    stream.advance(line + 1);
+    let (record, len) = match records::next(&mut stream) {
+        Ok(found) => found,
+        Err(Stop::Io(e)) => return Err(e),
+        Err(_) => return Ok(Err(Unindexed("its head is damaged".to_owned()))),
+    };
+    let Record::Bag {
+        index_pos,
+        connections,
+        chunks,
+        encryptor,
+    } = record
+    else {
+        return Ok(Err(Unindexed("it has no head".to_owned())));
+    };
+    let body = stream.position() + u64::from(len);
+    if let Some(reason) = misplaced(index_pos, body, source.len()) {
+        return Ok(Err(Unindexed(reason)));
+    }
+    let mut plan = Plan {
+        table: Table::default(),
+        chunks: Vec::new(),
+        encryptor,
+    };
+    let told = plan.tail(source, index_pos, (connections, chunks));
+    match told {
+        Ok(()) => Ok(plan.settle(body, index_pos).map(|()| plan)),
+        Err(Stop::Io(e)) => Err(e),
+        Err(_) => Ok(Err(Unindexed("its index is cut or damaged".to_owned()))),
+    }
+}
+
+fn misplaced(index_pos: u64, body: u64, len: u64) -> Option<String> {
+    if index_pos == 0 {
+        Some("it was never closed and has no index".to_owned())
+    } else if index_pos > len {
+        Some(format!("its index at byte {index_pos} is cut off"))
+    } else if index_pos < body {
+        Some(format!("its index cannot be at byte {index_pos}"))
+    } else {
+        None
+    }
+}
+
+impl Plan {
+    /// The records from `index_pos` on: `expected` connections and chunks. What follows them does not matter.
+    fn tail(&mut self, source: &Source, index_pos: u64, expected: (u32, u32)) -> Result<(), Stop> {
+        let mut stream = Stream::of_file(source, index_pos, source.len(), FAR);
+        let (mut connections, mut chunks) = (0, 0);
+        while (connections, chunks) != expected {
+            let (record, len) = records::next(&mut stream)?;
+            let end = stream.position() + u64::from(len);
+            match record {
+                Record::Connection { id, topic } => {
+                    connections += 1;
+                    if len as usize > MOST_PAYLOAD {
+                        return Err(Stop::Broken);
+                    }
+                    let data = stream.peek(len as usize)?;
+                    self.table.add(id, &topic, data);
+                }
+                Record::ChunkInfo {
+                    pos,
+                    start,
+                    end,
+                    count,
+                } => {
+                    chunks += 1;
+                    let tally = tally(&mut stream, count, len)?;
+                    self.chunks.push(Chunk {
+                        pos,
+                        end: 0,
+                        first: start,
+                        last: end,
+                        tally,
+                    });
+                }
+                _ => {}
+            }
+            if connections > expected.0 || chunks > expected.1 || self.chunks.len() > MOST_CHUNKS {
+                return Err(Stop::Broken);
+            }
+            let left = end.saturating_sub(stream.position());
+            if stream.skip(left)? < left {
+                return Err(Stop::Cut);
+            }
+        }
+        Ok(())
+    }
+
+    /// Orders the chunks and tells each where it ends.
+    fn settle(&mut self, body: u64, index_pos: u64) -> Result<(), Unindexed> {
+        self.chunks.sort_by_key(|c| c.pos);
+        self.chunks.dedup_by_key(|c| c.pos);
+        let mut end = index_pos;
+        for chunk in self.chunks.iter_mut().rev() {
+            chunk.end = end;
+            end = chunk.pos;
+        }
+        let outside = |c: &Chunk| c.pos < body || c.pos >= index_pos;
+        if self.chunks.iter().any(outside) {
+            return Err(Unindexed(
+                "its index names chunks outside the bag".to_owned(),
+            ));
+        }
+        Ok(())
+    }
+
+    /// How many threads pay: the reads wait for the disk, and a long index takes memory.
+    pub(super) fn threads(&self, chunks: usize) -> usize {
+        let long = |c: &Chunk| c.tally.index_len() > LONGEST_INDEX / 16;
+        if self.chunks.iter().any(long) {
+            return 1;
+        }
+        (chunks / 256).clamp(1, 8)
+    }
+
+    /// Says what names cannot be known.
+    pub(super) fn notices(&self, sink: &mut dyn Sink) {
+        if !self.encryptor.is_empty() {
+            let text = format!(
+                "the bag is encrypted by `{}`: counts are right, names are not known",
+                self.encryptor
+            );
+            sink.notice(Notice::new(NoticeKind::Note, text));
+        }
+    }
+
+    /// The time covered. The chunks that the tail calls first and last are looked into; all, if they are few.
+    pub(super) fn span(&self, source: &Source) -> Option<Span> {
+        let full: Vec<&Chunk> = self
+            .chunks
+            .iter()
+            .filter(|c| c.tally.messages > 0)
+            .collect();
+        let mut seen = Extremes(None);
+        let wants = vec![Want::Stamps; self.table.list().len()];
+        let reader = Chunks {
+            source,
+            table: &self.table,
+            wants: &wants,
+            range: None,
+        };
+        if full.len() <= 512 {
+            for chunk in full {
+                reader.read(chunk, &mut seen);
+            }
+        } else {
+            let first = full.iter().min_by_key(|c| c.first)?;
+            let last = full.iter().max_by_key(|c| c.last)?;
+            reader.read(first, &mut seen);
+            reader.read(last, &mut seen);
+        }
+        let (first, last) = seen.0?;
+        Some(Span {
+            start: first,
+            end: last.plus(1),
+        })
+    }
+}
+
+/// The counts of a chunk info record.
+fn tally(stream: &mut Stream<'_>, count: u32, len: u32) -> Result<Tally, Stop> {
+    let mut tally = Tally::default();
+    if u64::from(count) * 8 > u64::from(len) {
+        return Err(Stop::Broken);
+    }
+    for _ in 0..count {
+        let pair = stream.peek(8)?;
+        let id = records::u32_at(pair, 0).ok_or(Stop::Cut)?;
+        tally.add(id, records::u32_at(pair, 4).ok_or(Stop::Cut)?);
+        stream.advance(8);
+    }
+    Ok(tally)
+}
+
+/// A sink that only keeps the first and the last stamp.
+struct Extremes(Option<(Stamp, Stamp)>);
+
+impl Sink for Extremes {
+    fn connection(&mut self, _: &crate::bag::Connection) -> Want {
+        Want::Stamps
+    }
+
+    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+        for at in stamps {
+            let (first, last) = self.0.unwrap_or((*at, *at));
+            self.0 = Some((first.min(*at), last.max(*at)));
+        }
+    }
+
+    fn message(&mut self, _: Message<'_>) {}
+
+    fn notice(&mut self, _: Notice) {}
+}
