@@ -23,6 +23,7 @@ pub mod pixels;
 mod proof;
 pub mod scene;
 mod source;
+pub mod spells;
 pub mod stamps;
 pub mod style;
 pub mod svg;
