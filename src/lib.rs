@@ -10,6 +10,7 @@ mod decompress;
 pub mod diff;
 pub mod error;
 pub mod evidence;
+pub mod events;
 pub mod evolution;
 mod facts;
 pub mod geometry;

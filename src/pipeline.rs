@@ -1,0 +1,53 @@
+//! The whole program in the order it happens: read, divide, build, compare, draw, write.
+
+mod read;
+
+pub use read::{Reading, read};
+
+/// A part of the work, as progress and timings tell it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Bags are read; progress counts bytes.
+    Read,
+    /// Bags are read a second time and compared; progress counts bytes.
+    Verify,
+    /// Graphs are built; progress counts windows.
+    Graphs,
+    /// Everything gets its place.
+    Layout,
+    /// Frames are drawn and written; progress counts frames.
+    Draw,
+}
+
+impl Stage {
+    /// Its word for people.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Read => "reading",
+            Self::Verify => "verifying",
+            Self::Graphs => "graphs",
+            Self::Layout => "layout",
+            Self::Draw => "drawing",
+        }
+    }
+}
+
+/// Who watches the work: hears how far it is, and may stop it.
+pub trait Watch {
+    /// A new stage begins; the one before is over.
+    fn stage(&mut self, _stage: Stage) {}
+
+    /// How far the stage is: `done` of `total`.
+    fn progress(&mut self, _done: u64, _total: u64) {}
+
+    /// Whether to stop at the next good moment, leaving nothing half-written.
+    fn stopped(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody watches.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unwatched;
+
+impl Watch for Unwatched {}

@@ -1,0 +1,228 @@
+//! From bags to the evolution: read once, divide time, build the graphs, find what changed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{Stage, Watch};
+use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
+use crate::collect::{self, Collected, Collector};
+use crate::diff::Change;
+use crate::error::{Error, Result};
+use crate::evolution::{Evolution, Window, read_json};
+use crate::graph;
+use crate::notice::{Notice, NoticeKind, Notices};
+use crate::time::{Span, Stamp};
+use crate::window::{self, Division, Length, Windows};
+
+/// What to read and how.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// Bags of one mission, or one evolution.
+    pub inputs: Vec<Input>,
+    /// Whether to read everything by a second reader too, and compare.
+    pub verify: bool,
+    /// How time is divided.
+    pub division: Division,
+    /// Whether to merge runs of windows without a change.
+    pub skip_unchanged: bool,
+    /// What to look at while reading.
+    pub collect: collect::Options,
+    /// How graphs are built.
+    pub graph: graph::Options,
+    /// The share by which a rate must change to count, 0...
+    pub rate_change: f64,
+}
+
+/// Reads the inputs into an evolution.
+///
+/// # Errors
+/// Where an input cannot be read at all or none holds a message, and for times that make no sense.
+pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Evolution> {
+    watch.stage(Stage::Read);
+    if let Some(path) = evolution_file(&reading.inputs)? {
+        return reread(path, reading);
+    }
+    let mission = Mission::read(reading, false, watch)?;
+    let mut evolution = build(mission, reading, watch)?;
+    if reading.verify {
+        watch.stage(Stage::Verify);
+        let second = build(Mission::read(reading, true, watch)?, reading, watch)?;
+        compare(&mut evolution, &second);
+    }
+    Ok(evolution)
+}
+
+/// The path of the evolution that is the only input; `None` for bags.
+fn evolution_file(inputs: &[Input]) -> Result<Option<&Path>> {
+    let is_json = |input: &Input| -> Result<bool> { Ok(matches!(bag::sniff(input)?, Kind::Json)) };
+    match inputs {
+        [Input::Path(path)] if is_json(&inputs[0])? => Ok(Some(path)),
+        _ => Ok(None),
+    }
+}
+
+/// The largest evolution that is read, in bytes.
+const MOST_JSON: u64 = 4 << 30;
+
+fn reread(path: &Path, reading: &Reading) -> Result<Evolution> {
+    let length = fs::metadata(path).map_err(Error::io("read", path))?.len();
+    if length > MOST_JSON {
+        return Err(Error::Unsupported {
+            path: path.to_owned(),
+            what: format!("{length} bytes of JSON are too many"),
+            hint: "render the bag itself".to_owned(),
+        });
+    }
+    let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let mut evolution = read_json(&text, path)?;
+    drop(text);
+    evolution.find_changes(reading.rate_change, &[]);
+    Ok(evolution)
+}
+
+/// Everything that was read of a mission.
+struct Mission {
+    bags: Vec<Report>,
+    collected: Collected,
+    /// The time that the windows divide.
+    range: Span,
+}
+
+impl Mission {
+    /// Reads every bag once.
+    fn read(reading: &Reading, verify: bool, watch: &mut dyn Watch) -> Result<Self> {
+        let options = OpenOptions { verify };
+        let mut readers = reading.inputs.iter().map(|i| bag::open(i, &options)).collect::<Result<Vec<_>>>()?;
+        let cut = reading.division.start.is_some() || reading.division.end.is_some();
+        let known = if cut { known_span(&mut readers)? } else { None };
+        let range = known.map(|span| window::range(&reading.division, span)).transpose()?;
+        let mut collector = Collector::new(reading.collect.clone());
+        let mut bags = Vec::new();
+        for reader in &mut readers {
+            let mut progress = |done, total| watch.progress(done, total);
+            bags.push(reader.read(range, &mut collector.bag(&mut progress))?);
+        }
+        let collected = collector.finish()?;
+        let Some(span) = collected.span else {
+            return Err(no_messages(&reading.inputs));
+        };
+        let range = match range {
+            Some(range) => range,
+            None => window::range(&reading.division, span)?,
+        };
+        Ok(Self { bags, collected, range })
+    }
+}
+
+fn no_messages(inputs: &[Input]) -> Error {
+    Error::NoMessages {
+        path: inputs.first().map_or_else(PathBuf::new, |i| PathBuf::from(i.name())),
+        hint: "`bagreel info` tells what the file holds".to_owned(),
+    }
+}
+
+/// The time that all bags cover, if every one of them tells without being read.
+fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
+    let mut all: Option<Span> = None;
+    for reader in readers {
+        let Some(span) = reader.span()? else { return Ok(None) };
+        all = Some(all.map_or(span, |a| Span { start: a.start.min(span.start), end: a.end.max(span.end) }));
+    }
+    Ok(all)
+}
+
+fn build(mut mission: Mission, reading: &Reading, watch: &mut dyn Watch) -> Result<Evolution> {
+    watch.stage(Stage::Graphs);
+    let windows = window::divide(&reading.division, mission.range)?;
+    let mut evolution = graphs(&mut mission, &windows, reading)?;
+    if reading.skip_unchanged {
+        let merged = merged(&evolution, &windows);
+        evolution = graphs(&mut mission, &merged, reading)?;
+    }
+    if reading.division.length == Length::Auto {
+        let text = format!("the period is {}; `--period` takes another", windows.period);
+        evolution.notices.add(Notice::new(NoticeKind::Chosen, text));
+    }
+    Ok(evolution)
+}
+
+/// Builds the graph of every window and finds what changed.
+fn graphs(mission: &mut Mission, windows: &Windows, reading: &Reading) -> Result<Evolution> {
+    let built = graph::build(&mut mission.collected, &windows.spans, &reading.graph)?;
+    let mut notices: Notices = mission.collected.notices.clone();
+    notices.extend(built.notices.iter());
+    let parts = windows.spans.iter().zip(built.graphs).zip(built.messages).enumerate();
+    let list: Vec<Window> = parts
+        .map(|(index, ((span, graph), messages))| Window {
+            index,
+            span: *span,
+            partial: windows.partial(index),
+            messages,
+            graph,
+            changes: Vec::new(),
+        })
+        .collect();
+    let mut evolution = Evolution {
+        bags: mission.bags.clone(),
+        span: windows.span,
+        messages: built.total,
+        period: windows.period,
+        step: windows.step,
+        elements: built.elements,
+        windows: list,
+        layout: None,
+        notices,
+    };
+    evolution.find_changes(reading.rate_change, &built.restarts);
+    Ok(evolution)
+}
+
+/// The windows with every run of them that shows no change made one.
+fn merged(evolution: &Evolution, windows: &Windows) -> Windows {
+    let mut spans: Vec<Span> = Vec::new();
+    for window in &evolution.windows {
+        match spans.last_mut() {
+            Some(last) if window.changes.is_empty() => last.end = window.span.end,
+            _ => spans.push(window.span),
+        }
+    }
+    Windows { spans, ..windows.clone() }
+}
+
+/// Notices where the second reader counts otherwise than the first.
+fn compare(first: &mut Evolution, second: &Evolution) {
+    let counts = |e: &Evolution| {
+        let mut all: Vec<(usize, String, u64)> = Vec::new();
+        for window in &e.windows {
+            let topics = window.graph.topics.iter().filter(|t| t.count > 0);
+            all.extend(topics.map(|t| (window.index, e.elements.topics[t.id as usize].name.to_string(), t.count)));
+        }
+        all
+    };
+    let (ours, theirs) = (counts(first), counts(second));
+    let differing = ours.iter().filter(|c| !theirs.contains(c)).count().max(theirs.iter().filter(|c| !ours.contains(c)).count());
+    if first.messages == second.messages && differing == 0 {
+        let text = format!("verified: a second reader counts the same {} messages", first.messages);
+        first.notices.add(Notice::new(NoticeKind::Note, text));
+    } else {
+        let text = format!(
+            "a second reader counts {} messages instead of {}, and other numbers in {differing} windows of topics",
+            second.messages, first.messages
+        );
+        first.notices.add(Notice::new(NoticeKind::Damaged, text));
+    }
+    first.notices.extend(second.notices.iter().filter(|n| n.kind.is_loss()));
+    for bag in &mut first.bags {
+        bag.tier = bag::Tier::Verify;
+    }
+}
+
+/// How many changes a mission shows.
+pub fn count_changes(evolution: &Evolution) -> usize {
+    evolution.windows.iter().map(|w| w.changes.iter().filter(|c| !matches!(c, Change::Rate { .. })).count()).sum()
+}
+
+/// The moment that a time in a file of the user's means.
+pub fn after_start(evolution: &Evolution, nanos: i64) -> Stamp {
+    evolution.span.start.plus(nanos)
+}
