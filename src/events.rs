@@ -32,7 +32,10 @@ pub struct Event {
 /// Every change of the mission, sorted by time, then as the windows list them.
 pub fn events(evolution: &Evolution) -> Vec<Event> {
     let all = evolution.windows.iter().flat_map(|window| {
-        window.changes.iter().map(|change| event(evolution, window.index, window.span.start, change))
+        window
+            .changes
+            .iter()
+            .map(|change| event(evolution, window.index, window.span.start, change))
     });
     let mut events: Vec<Event> = all.collect();
     events.sort_by_key(|e| (e.window, e.time));
@@ -41,15 +44,26 @@ pub fn events(evolution: &Evolution) -> Vec<Event> {
 
 fn event(evolution: &Evolution, window: usize, start: Stamp, change: &Change) -> Event {
     let names = |nodes: &[u32]| {
-        let names: Vec<&str> = nodes.iter().map(|n| evolution.elements.nodes[*n as usize].name.as_str()).collect();
+        let names: Vec<&str> = nodes
+            .iter()
+            .map(|n| evolution.elements.nodes[*n as usize].name.as_str())
+            .collect();
         Some(names.join(" "))
     };
     let (what, time, from, to) = match change {
         Change::Added { what, time } | Change::Removed { what, time } => (*what, *time, None, None),
         Change::Restarted { node, time } => (Element::Node(*node), Some(*time), None, None),
-        Change::Rate { what, from_hz, to_hz } => (*what, None, Some(hz(*from_hz)), Some(hz(*to_hz))),
-        Change::HandedOver { topic, from, to } => (Element::Topic(*topic), None, names(from), names(to)),
-        Change::Value { what, from, to, .. } => (*what, None, Some(from.to_string()), Some(to.to_string())),
+        Change::Rate {
+            what,
+            from_hz,
+            to_hz,
+        } => (*what, None, Some(hz(*from_hz)), Some(hz(*to_hz))),
+        Change::HandedOver { topic, from, to } => {
+            (Element::Topic(*topic), None, names(from), names(to))
+        }
+        Change::Value { what, from, to, .. } => {
+            (*what, None, Some(from.to_string()), Some(to.to_string()))
+        }
     };
     let (name, topic) = named(evolution, what);
     Event {
@@ -87,14 +101,21 @@ pub fn hz(rate: f64) -> String {
         _ => 2,
     };
     let text = format!("{rate:.digits$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
     text.to_owned()
 }
 
 impl Event {
     /// The event as one sentence without a period: `/planner appeared`, `/scan 15 → 7.4 Hz`.
     pub fn sentence(&self) -> String {
-        let (from, to) = (self.from.as_deref().unwrap_or(""), self.to.as_deref().unwrap_or(""));
+        let (from, to) = (
+            self.from.as_deref().unwrap_or(""),
+            self.to.as_deref().unwrap_or(""),
+        );
         let name = match &self.topic {
             Some(topic) if self.what == "publish" => format!("{} → {topic}", self.name),
             Some(topic) => format!("{topic} → {}", self.name),

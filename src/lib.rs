@@ -5,12 +5,13 @@
 //! ```
 
 pub mod bag;
+pub mod cli;
 pub mod collect;
 mod decompress;
 pub mod diff;
 pub mod error;
-pub mod evidence;
 pub mod events;
+pub mod evidence;
 pub mod evolution;
 mod facts;
 pub mod geometry;
@@ -20,6 +21,7 @@ pub mod name;
 pub mod notice;
 pub mod output;
 pub mod palette;
+pub mod pipeline;
 pub mod pixels;
 mod proof;
 pub mod scene;
@@ -28,6 +30,7 @@ pub mod spells;
 pub mod stamps;
 pub mod style;
 pub mod svg;
+pub mod terminal;
 pub mod text;
 pub mod time;
 pub mod view;

@@ -59,8 +59,16 @@ impl Terminal {
             return;
         }
         for notice in notices.iter() {
-            let (colour, label) = if notice.kind.is_loss() { ("33", "warning") } else { ("36", "note") };
-            let times = if notice.count > 1 { format!(" ({} times)", notice.count) } else { String::new() };
+            let (colour, label) = if notice.kind.is_loss() {
+                ("33", "warning")
+            } else {
+                ("36", "note")
+            };
+            let times = if notice.count > 1 {
+                format!(" ({} times)", notice.count)
+            } else {
+                String::new()
+            };
             self.line(colour, label, &format!("{}{times}", notice.text));
         }
     }
@@ -87,7 +95,9 @@ impl Terminal {
     /// Prints how long each stage took.
     pub fn timings(&mut self) {
         self.end_stage();
-        let lines: Vec<String> = self.spent.iter()
+        let lines: Vec<String> = self
+            .spent
+            .iter()
             .map(|(stage, time)| format!("{:>9.3} s  {}", time.as_secs_f64(), stage.word()))
             .collect();
         lines.iter().for_each(|line| self.say(line));
@@ -138,7 +148,8 @@ fn bar(stage: Stage) -> ProgressBar {
         Stage::Read | Stage::Verify => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
         _ => "{msg:>9} [{bar:40}] {pos}/{len}",
     };
-    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     bar.set_style(style.progress_chars("=> "));
     bar.set_message(stage.word());

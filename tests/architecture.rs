@@ -6,9 +6,43 @@ use std::path::{Path, PathBuf};
 
 /// Modules, lowest first: each uses only itself and those before it.
 const LAYERS: &[&str] = &[
-    "time", "name", "geometry", "error", "notice", "wire", "yaml", "decompress", "source", "bag", "stamps", "evidence",
-    "window", "graph", "topology", "diff", "evolution", "events", "view", "text", "layout", "style", "scene", "svg", "pixels",
-    "picture", "palette", "output", "spells", "hash", "encode", "pipeline", "info", "terminal", "cli", "main", "lib",
+    "time",
+    "name",
+    "geometry",
+    "error",
+    "notice",
+    "wire",
+    "yaml",
+    "decompress",
+    "source",
+    "bag",
+    "stamps",
+    "evidence",
+    "window",
+    "graph",
+    "topology",
+    "diff",
+    "evolution",
+    "events",
+    "view",
+    "text",
+    "layout",
+    "style",
+    "scene",
+    "svg",
+    "pixels",
+    "picture",
+    "palette",
+    "output",
+    "spells",
+    "hash",
+    "encode",
+    "pipeline",
+    "info",
+    "terminal",
+    "cli",
+    "main",
+    "lib",
 ];
 
 /// Folders whose files do not know each other.
@@ -18,7 +52,14 @@ const SIBLINGS: &[&str] = &["bag", "evidence", "encode", "layout"];
 const EXCEPTIONS: &[(&str, &[&str])] = &[
     // Its derives stand on the types that they describe.
     ("serde", &["evolution/read.rs", "evolution/write.rs"]),
-    ("serde_json", &["evolution/read.rs", "evolution/write.rs", "evolution/lines.rs"]),
+    (
+        "serde_json",
+        &[
+            "evolution/read.rs",
+            "evolution/write.rs",
+            "evolution/lines.rs",
+        ],
+    ),
     // Plain functions on numbers, as the standard library's would be.
     ("libm", &[]),
 ];
@@ -54,17 +95,38 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
 
 fn file(src: &Path, path: &Path) -> File {
     let text = fs::read_to_string(path).unwrap();
-    let path = path.strip_prefix(src).unwrap().to_str().unwrap().replace('\\', "/");
-    let module = path.split('/').next().unwrap().trim_end_matches(".rs").to_owned();
+    let path = path
+        .strip_prefix(src)
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .replace('\\', "/");
+    let module = path
+        .split('/')
+        .next()
+        .unwrap()
+        .trim_end_matches(".rs")
+        .to_owned();
     let before_tests = text.split("#[cfg(test)]\nmod ").next().unwrap();
-    let lines = before_tests.lines().filter(|line| !line.trim_start().starts_with("//"));
+    let lines = before_tests
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"));
     let first_line = text.lines().next().unwrap_or_default().to_owned();
-    File { path, module, code: lines.collect::<Vec<_>>().join("\n"), first_line }
+    File {
+        path,
+        module,
+        code: lines.collect::<Vec<_>>().join("\n"),
+        first_line,
+    }
 }
 
 /// Every word behind `prefix` in the code.
 fn words_after<'a>(code: &'a str, prefix: &'a str) -> impl Iterator<Item = &'a str> {
-    code.split(prefix).skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap())
+    code.split(prefix).skip(1).map(|rest| {
+        rest.split(|c: char| !c.is_alphanumeric() && c != '_')
+            .next()
+            .unwrap()
+    })
 }
 
 #[test]
@@ -76,7 +138,10 @@ fn modules_use_only_those_below_them() {
             wrong.push(format!("{} is in no layer", file.path));
             continue;
         };
-        for used in words_after(&file.code, "crate::").filter_map(layer).filter(|used| *used > own) {
+        for used in words_after(&file.code, "crate::")
+            .filter_map(layer)
+            .filter(|used| *used > own)
+        {
             wrong.push(format!("{} uses {} above it", file.path, LAYERS[used]));
         }
     }
@@ -88,8 +153,14 @@ fn siblings_do_not_know_each_other() {
     let all = files();
     let mut wrong = Vec::new();
     for folder in SIBLINGS {
-        let own: Vec<&File> = all.iter().filter(|f| f.path.starts_with(&format!("{folder}/"))).collect();
-        let names: BTreeSet<&str> = own.iter().map(|f| f.path.rsplit('/').next().unwrap().trim_end_matches(".rs")).collect();
+        let own: Vec<&File> = all
+            .iter()
+            .filter(|f| f.path.starts_with(&format!("{folder}/")))
+            .collect();
+        let names: BTreeSet<&str> = own
+            .iter()
+            .map(|f| f.path.rsplit('/').next().unwrap().trim_end_matches(".rs"))
+            .collect();
         for file in &own {
             let direct = format!("crate::{folder}::");
             let used = words_after(&file.code, "super::").chain(words_after(&file.code, &direct));
@@ -105,15 +176,33 @@ fn siblings_do_not_know_each_other() {
 
 #[test]
 fn a_dependency_stands_in_one_file() {
-    let manifest = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).unwrap();
-    let section = manifest.split("[dependencies]\n").nth(1).unwrap().split("\n[").next().unwrap();
-    let names = section.lines().filter_map(|l| l.split_once(" = ")).map(|(name, _)| name.trim().replace('-', "_"));
+    let manifest =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).unwrap();
+    let section = manifest
+        .split("[dependencies]\n")
+        .nth(1)
+        .unwrap()
+        .split("\n[")
+        .next()
+        .unwrap();
+    let names = section
+        .lines()
+        .filter_map(|l| l.split_once(" = "))
+        .map(|(name, _)| name.trim().replace('-', "_"));
     let exceptions: BTreeMap<_, _> = EXCEPTIONS.iter().copied().collect();
     let all = files();
     let mut wrong = Vec::new();
     for name in names {
-        let name = if name == "layout_rs" { "layout".to_owned() } else { name };
-        let users: Vec<&str> = all.iter().filter(|f| uses(f, &name)).map(|f| f.path.as_str()).collect();
+        let name = if name == "layout_rs" {
+            "layout".to_owned()
+        } else {
+            name
+        };
+        let users: Vec<&str> = all
+            .iter()
+            .filter(|f| uses(f, &name))
+            .map(|f| f.path.as_str())
+            .collect();
         match exceptions.get(name.as_str()) {
             Some([]) => {}
             Some(allowed) if users.iter().all(|u| allowed.contains(u)) => {}
@@ -136,7 +225,11 @@ fn uses(file: &File, name: &str) -> bool {
 
 #[test]
 fn every_file_says_what_it_is_for() {
-    let silent: Vec<_> = files().into_iter().filter(|f| !f.first_line.starts_with("//! ")).map(|f| f.path).collect();
+    let silent: Vec<_> = files()
+        .into_iter()
+        .filter(|f| !f.first_line.starts_with("//! "))
+        .map(|f| f.path)
+        .collect();
     assert!(silent.is_empty(), "{silent:#?}");
 }
 

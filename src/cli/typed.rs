@@ -10,7 +10,9 @@ use crate::window::{Align, Length};
 /// See how a robot's software reconfigures during a mission, straight from its bag files.
 #[derive(Debug, Parser)]
 #[command(name = "bagreel", version, max_term_width = 100)]
-#[command(after_help = "Exit codes: 0 done, 1 failed, 2 usage, 3 done but data was skipped (damaged bag).")]
+#[command(
+    after_help = "Exit codes: 0 done, 1 failed, 2 usage, 3 done but data was skipped (damaged bag)."
+)]
 pub(super) struct Typed {
     #[command(subcommand)]
     pub(super) command: Command,
@@ -188,11 +190,11 @@ pub(super) struct ViewArgs {
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(super) topic_filter: Option<String>,
     /// Kinds to leave out: debug, dead, leaf, tf, params, unreachable.
-    #[arg(long, value_name = "KIND", value_delimiter = ',')]
-    pub(super) hide: Option<Vec<String>>,
+    #[arg(long, value_name = "KIND,…")]
+    pub(super) hide: Option<String>,
     /// Kinds to draw as one box: actions, tf, images, namespaces=N; `none` for nothing.
-    #[arg(long, value_name = "KIND", value_delimiter = ',')]
-    pub(super) group: Option<Vec<String>>,
+    #[arg(long, value_name = "KIND,…")]
+    pub(super) group: Option<String>,
     /// Namespaces to draw as one box each.
     #[arg(long, value_name = "NAMESPACE", value_delimiter = ',')]
     pub(super) collapse: Vec<String>,
@@ -301,13 +303,18 @@ fn align(text: &str) -> Result<Align, String> {
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    let share = text.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0);
+    let share = text
+        .parse()
+        .ok()
+        .filter(|s: &f64| s.is_finite() && *s >= 0.0);
     share.ok_or_else(|| "write a share such as `0.25`".to_owned())
 }
 
 fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |part: &str| part.parse().ok().filter(|n| (64..=16_384).contains(n));
-    let both = text.split_once('x').and_then(|(w, h)| Some((side(w)?, side(h)?)));
+    let both = text
+        .split_once('x')
+        .and_then(|(w, h)| Some((side(w)?, side(h)?)));
     both.ok_or_else(|| "write a size such as `1280x720`; each side is 64 to 16384".to_owned())
 }
 
@@ -318,7 +325,9 @@ fn width(text: &str) -> Result<f64, String> {
 }
 
 fn bytes(text: &str) -> Result<u64, String> {
-    let at = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let at = text
+        .find(|c: char| c.is_ascii_alphabetic())
+        .unwrap_or(text.len());
     let scale = match text[at..].to_ascii_lowercase().as_str() {
         "" | "b" => 1,
         "k" | "kb" => 1000,
@@ -329,8 +338,11 @@ fn bytes(text: &str) -> Result<u64, String> {
     };
     // The nanoseconds of a plain decimal number are exact enough for its thousandths.
     let number = parse_nanos(&text[..at]).filter(|_| scale > 0 && at > 0);
-    let bytes = number.and_then(|n| u64::try_from(i128::from(n) * i128::from(scale) / 1_000_000_000).ok());
-    bytes.filter(|n| *n > 0).ok_or_else(|| "write a size such as `5MB` or `500kB`".to_owned())
+    let bytes =
+        number.and_then(|n| u64::try_from(i128::from(n) * i128::from(scale) / 1_000_000_000).ok());
+    bytes
+        .filter(|n| *n > 0)
+        .ok_or_else(|| "write a size such as `5MB` or `500kB`".to_owned())
 }
 
 fn outputs_help() -> String {

@@ -1,17 +1,17 @@
 //! From bags to the evolution: read once, divide time, build the graphs, find what changed.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Stage, Watch};
 use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
 use crate::collect::{self, Collected, Collector};
-use crate::diff::Change;
 use crate::error::{Error, Result};
 use crate::evolution::{Evolution, Window, read_json};
 use crate::graph;
 use crate::notice::{Notice, NoticeKind, Notices};
-use crate::time::{Span, Stamp};
+use crate::time::Span;
 use crate::window::{self, Division, Length, Windows};
 
 /// What to read and how.
@@ -92,10 +92,16 @@ impl Mission {
     /// Reads every bag once.
     fn read(reading: &Reading, verify: bool, watch: &mut dyn Watch) -> Result<Self> {
         let options = OpenOptions { verify };
-        let mut readers = reading.inputs.iter().map(|i| bag::open(i, &options)).collect::<Result<Vec<_>>>()?;
+        let mut readers = reading
+            .inputs
+            .iter()
+            .map(|i| bag::open(i, &options))
+            .collect::<Result<Vec<_>>>()?;
         let cut = reading.division.start.is_some() || reading.division.end.is_some();
         let known = if cut { known_span(&mut readers)? } else { None };
-        let range = known.map(|span| window::range(&reading.division, span)).transpose()?;
+        let range = known
+            .map(|span| window::range(&reading.division, span))
+            .transpose()?;
         let mut collector = Collector::new(reading.collect.clone());
         let mut bags = Vec::new();
         for reader in &mut readers {
@@ -110,13 +116,19 @@ impl Mission {
             Some(range) => range,
             None => window::range(&reading.division, span)?,
         };
-        Ok(Self { bags, collected, range })
+        Ok(Self {
+            bags,
+            collected,
+            range,
+        })
     }
 }
 
 fn no_messages(inputs: &[Input]) -> Error {
     Error::NoMessages {
-        path: inputs.first().map_or_else(PathBuf::new, |i| PathBuf::from(i.name())),
+        path: inputs
+            .first()
+            .map_or_else(PathBuf::new, |i| PathBuf::from(i.name())),
         hint: "`bagreel info` tells what the file holds".to_owned(),
     }
 }
@@ -125,8 +137,13 @@ fn no_messages(inputs: &[Input]) -> Error {
 fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
     let mut all: Option<Span> = None;
     for reader in readers {
-        let Some(span) = reader.span()? else { return Ok(None) };
-        all = Some(all.map_or(span, |a| Span { start: a.start.min(span.start), end: a.end.max(span.end) }));
+        let Some(span) = reader.span()? else {
+            return Ok(None);
+        };
+        all = Some(all.map_or(span, |a| Span {
+            start: a.start.min(span.start),
+            end: a.end.max(span.end),
+        }));
     }
     Ok(all)
 }
@@ -149,15 +166,21 @@ fn build(mut mission: Mission, reading: &Reading, watch: &mut dyn Watch) -> Resu
 /// Builds the graph of every window and finds what changed.
 fn graphs(mission: &mut Mission, windows: &Windows, reading: &Reading) -> Result<Evolution> {
     let built = graph::build(&mut mission.collected, &windows.spans, &reading.graph)?;
+    let messages = built.messages.iter().sum();
     let mut notices: Notices = mission.collected.notices.clone();
     notices.extend(built.notices.iter());
-    let parts = windows.spans.iter().zip(built.graphs).zip(built.messages).enumerate();
+    let parts = windows
+        .spans
+        .iter()
+        .zip(built.graphs)
+        .zip(built.messages)
+        .enumerate();
     let list: Vec<Window> = parts
-        .map(|(index, ((span, graph), messages))| Window {
+        .map(|(index, ((span, graph), inside))| Window {
             index,
             span: *span,
             partial: windows.partial(index),
-            messages,
+            messages: inside,
             graph,
             changes: Vec::new(),
         })
@@ -165,7 +188,7 @@ fn graphs(mission: &mut Mission, windows: &Windows, reading: &Reading) -> Result
     let mut evolution = Evolution {
         bags: mission.bags.clone(),
         span: windows.span,
-        messages: built.total,
+        messages,
         period: windows.period,
         step: windows.step,
         elements: built.elements,
@@ -186,43 +209,47 @@ fn merged(evolution: &Evolution, windows: &Windows) -> Windows {
             _ => spans.push(window.span),
         }
     }
-    Windows { spans, ..windows.clone() }
+    Windows {
+        spans,
+        ..windows.clone()
+    }
 }
 
 /// Notices where the second reader counts otherwise than the first.
 fn compare(first: &mut Evolution, second: &Evolution) {
-    let counts = |e: &Evolution| {
-        let mut all: Vec<(usize, String, u64)> = Vec::new();
-        for window in &e.windows {
-            let topics = window.graph.topics.iter().filter(|t| t.count > 0);
-            all.extend(topics.map(|t| (window.index, e.elements.topics[t.id as usize].name.to_string(), t.count)));
-        }
-        all
-    };
     let (ours, theirs) = (counts(first), counts(second));
-    let differing = ours.iter().filter(|c| !theirs.contains(c)).count().max(theirs.iter().filter(|c| !ours.contains(c)).count());
-    if first.messages == second.messages && differing == 0 {
-        let text = format!("verified: a second reader counts the same {} messages", first.messages);
-        first.notices.add(Notice::new(NoticeKind::Note, text));
+    let differing = ours.symmetric_difference(&theirs).count();
+    let (text, kind) = if first.messages == second.messages && differing == 0 {
+        let text = format!(
+            "a second reader counts the same {} messages",
+            first.messages
+        );
+        (text, NoticeKind::Note)
     } else {
         let text = format!(
-            "a second reader counts {} messages instead of {}, and other numbers in {differing} windows of topics",
+            "a second reader counts {} messages instead of {}; {differing} counts of topics in windows differ",
             second.messages, first.messages
         );
-        first.notices.add(Notice::new(NoticeKind::Damaged, text));
-    }
-    first.notices.extend(second.notices.iter().filter(|n| n.kind.is_loss()));
+        (text, NoticeKind::Damaged)
+    };
+    first.notices.add(Notice::new(kind, text));
+    first
+        .notices
+        .extend(second.notices.iter().filter(|n| n.kind.is_loss()));
     for bag in &mut first.bags {
         bag.tier = bag::Tier::Verify;
     }
 }
 
-/// How many changes a mission shows.
-pub fn count_changes(evolution: &Evolution) -> usize {
-    evolution.windows.iter().map(|w| w.changes.iter().filter(|c| !matches!(c, Change::Rate { .. })).count()).sum()
-}
-
-/// The moment that a time in a file of the user's means.
-pub fn after_start(evolution: &Evolution, nanos: i64) -> Stamp {
-    evolution.span.start.plus(nanos)
+/// Every count of a topic in a window.
+fn counts(evolution: &Evolution) -> BTreeSet<(usize, &str, u64)> {
+    let topics = &evolution.elements.topics;
+    let counted = |window: &'_ Window| {
+        let index = window.index;
+        let states = window.graph.topics.iter().filter(|t| t.count > 0);
+        states
+            .map(move |t| (index, topics[t.id as usize].name.as_str(), t.count))
+            .collect::<Vec<_>>()
+    };
+    evolution.windows.iter().flat_map(counted).collect()
 }
