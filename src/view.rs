@@ -3,8 +3,56 @@
 use std::sync::Arc;
 
 use crate::evidence::Degree;
+use crate::evolution::Evolution;
 use crate::graph::{Element, State};
+use crate::notice::Notices;
 use crate::time::Span;
+
+mod caption;
+mod cast;
+mod cluster;
+mod collapse;
+mod filter;
+mod frames;
+mod group;
+mod names;
+mod notes;
+mod options;
+mod select;
+mod tally;
+#[cfg(test)]
+pub(crate) mod testing;
+
+pub use caption::hertz;
+pub use collapse::Candidate;
+pub use filter::NameFilter;
+pub use names::is_recorder;
+pub use options::{Grouping, Hide, Mode, ViewOptions};
+
+/// What the picture shows of a mission, and a notice for everything that it leaves out.
+pub fn view(evolution: &Evolution, options: &ViewOptions) -> (View, Notices) {
+    let cast = cast::Cast::new(&evolution.elements, options);
+    let notices = notes::notes(&evolution.elements, &cast, options);
+    let frames = frames::frames(evolution, options, &cast);
+    (stage(cast, options, frames), notices)
+}
+
+/// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
+pub fn outline(evolution: &Evolution, options: &ViewOptions) -> View {
+    let cast = cast::Cast::new(&evolution.elements, options);
+    stage(cast, options, Vec::new())
+}
+
+fn stage(cast: cast::Cast, options: &ViewOptions, frames: Vec<Frame>) -> View {
+    let mut items = cast.items;
+    let namespaces = cluster::clusters(&mut items, options.group.namespaces);
+    View {
+        items,
+        arrows: cast.arrows,
+        namespaces,
+        frames,
+    }
+}
 
 /// What a box of the picture stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -38,6 +86,17 @@ pub struct Item {
     pub name: Arc<str>,
     /// The nodes and topics it stands for, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
+    /// The innermost namespace whose box it stands in: a place in [`View::namespaces`].
+    pub cluster: Option<usize>,
+}
+
+/// A namespace drawn as a box around its members.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Namespace {
+    /// The full path: `/robot1/nav`.
+    pub name: Arc<str>,
+    /// The namespace around it: a place in [`View::namespaces`], smaller than its own.
+    pub parent: Option<usize>,
 }
 
 /// What an arrow of the picture stands for.
@@ -170,13 +229,16 @@ pub struct Frame {
     pub caption: Vec<String>,
 }
 
-/// The whole sequence as the picture shows it. Items are sorted by (kind, name), arrows by (from, to, kind).
+/// The whole sequence as the picture shows it. Items are sorted by (kind, name), arrows by (from, to, kind),
+/// namespaces by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct View {
     /// Every box ever shown.
     pub items: Vec<Item>,
     /// Every arrow ever shown.
     pub arrows: Vec<Arrow>,
+    /// Every namespace with a box around its members; parents before children.
+    pub namespaces: Vec<Namespace>,
     /// The windows.
     pub frames: Vec<Frame>,
 }

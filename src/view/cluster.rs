@@ -1,0 +1,145 @@
+//! The namespaces that stand as boxes around their members.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::{Item, Namespace};
+
+/// Deeper nesting is not drawn; a name of nothing but slashes must not make thousands of boxes in each other.
+const DEEPEST: usize = 16;
+
+/// The namespaces of these items, sorted by name, parents before children, and each item's innermost one set.
+///
+/// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item stands in the box of its first N parts, or of
+/// its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are drawn, but a
+/// namespace that holds nothing but one other is folded into it.
+pub(super) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespace> {
+    let levels = depth.unwrap_or(DEEPEST).min(DEEPEST);
+    let homes: Vec<String> = items.iter().map(|item| home(&item.name, levels)).collect();
+    let mut spaces: BTreeSet<&str> = BTreeSet::new();
+    for mut space in homes.iter().map(String::as_str) {
+        while !space.is_empty() && spaces.insert(space) {
+            space = parent(space);
+        }
+    }
+    if depth.is_none() {
+        fold(&mut spaces, &homes);
+    }
+    let places: BTreeMap<&str, usize> = spaces.iter().copied().zip(0..).collect();
+    for (item, home) in items.iter_mut().zip(&homes) {
+        item.cluster = places.get(home.as_str()).copied();
+    }
+    let around = |space: &str| {
+        let mut up = parent(space);
+        while !up.is_empty() && !places.contains_key(up) {
+            up = parent(up);
+        }
+        places.get(up).copied()
+    };
+    spaces
+        .iter()
+        .map(|space| Namespace {
+            name: Arc::from(*space),
+            parent: around(space),
+        })
+        .collect()
+}
+
+/// The first parts of a name, at most `levels`, without its last; empty at the root.
+fn home(name: &str, levels: usize) -> String {
+    let Some(rest) = name.strip_prefix('/') else {
+        return String::new();
+    };
+    let mut parts: Vec<&str> = rest.split('/').collect();
+    parts.pop();
+    parts.truncate(levels);
+    let empty = parts.iter().position(|part| part.is_empty());
+    parts.truncate(empty.unwrap_or(parts.len()));
+    parts.iter().flat_map(|part| ["/", part]).collect()
+}
+
+fn parent(space: &str) -> &str {
+    space
+        .rfind('/')
+        .and_then(|at| space.get(..at))
+        .unwrap_or_default()
+}
+
+/// Drops namespaces whose only content is one other namespace.
+fn fold(spaces: &mut BTreeSet<&str>, homes: &[String]) {
+    let mut children: BTreeMap<&str, usize> = BTreeMap::new();
+    for space in spaces.iter().copied() {
+        *children.entry(parent(space)).or_default() += 1;
+    }
+    let lived_in: BTreeSet<&str> = homes.iter().map(String::as_str).collect();
+    spaces.retain(|space| lived_in.contains(space) || children.get(space) != Some(&1));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::ItemKind;
+
+    /// The boxes around these names: each item with the path of its innermost one, and each box with its parent.
+    fn boxes(names: &[&str], depth: Option<usize>) -> Vec<String> {
+        let item = |name: &&str| Item {
+            kind: ItemKind::Node,
+            name: Arc::from(*name),
+            members: Vec::new(),
+            cluster: None,
+        };
+        let mut items: Vec<Item> = names.iter().map(item).collect();
+        let spaces = clusters(&mut items, depth);
+        let at = |place: Option<usize>| place.map_or("-", |at| spaces[at].name.as_ref());
+        let homes = items
+            .iter()
+            .map(|item| format!("{} in {}", item.name, at(item.cluster)));
+        let parents = spaces
+            .iter()
+            .map(|s| format!("{} < {}", s.name, at(s.parent)));
+        homes.chain(parents).collect()
+    }
+
+    #[test]
+    fn a_depth_follows_rqt_graph() {
+        let names = ["/x", "/a/x", "/a/b/c/x"];
+        assert_eq!(
+            boxes(&names, Some(0)),
+            ["/x in -", "/a/x in -", "/a/b/c/x in -"]
+        );
+        assert_eq!(
+            boxes(&names, Some(1)),
+            ["/x in -", "/a/x in /a", "/a/b/c/x in /a", "/a < -"]
+        );
+        assert_eq!(
+            boxes(&names, Some(2)),
+            [
+                "/x in -",
+                "/a/x in /a",
+                "/a/b/c/x in /a/b",
+                "/a < -",
+                "/a/b < /a"
+            ]
+        );
+    }
+
+    #[test]
+    fn all_levels_are_drawn_but_empty_ones_are_folded() {
+        let want = [
+            "/a/b/x in /a/b",
+            "/a/b/c/d/x in /a/b/c/d",
+            "/a/b < -",
+            "/a/b/c/d < /a/b",
+        ];
+        assert_eq!(boxes(&["/a/b/x", "/a/b/c/d/x"], None), want);
+    }
+
+    #[test]
+    fn odd_names_make_no_odd_boxes() {
+        let slashes = "/".repeat(10_000);
+        assert_eq!(boxes(&[&slashes, "", "a/b/c", "/"], None).len(), 4);
+        let deep = "/a".repeat(10_000);
+        assert_eq!(boxes(&[&deep, "/b/x"], None).len(), 4);
+        assert!(boxes(&[&deep], Some(usize::MAX)).len() <= DEEPEST + 1);
+    }
+}

@@ -1,0 +1,107 @@
+//! Namespaces drawn as one box: what goes inside, and which ones to collapse first when the page is too small.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::{ItemKind, View, ViewOptions};
+use crate::name::namespace;
+
+/// The namespaces to collapse and those to keep open.
+pub(super) struct Collapse<'a> {
+    collapse: BTreeSet<&'a str>,
+    expand: BTreeSet<&'a str>,
+}
+
+impl<'a> Collapse<'a> {
+    pub(super) fn new(options: &'a ViewOptions) -> Self {
+        let set = |names: &'a [Arc<str>]| names.iter().map(|n| n.trim_end_matches('/')).collect();
+        Self {
+            collapse: set(&options.collapse),
+            expand: set(&options.expand),
+        }
+    }
+
+    /// The collapsed namespace that swallows an element of this name: the outermost one that holds no namespace to
+    /// keep open on the way to the name. A node that is called like the namespace itself goes inside too.
+    pub(super) fn of(&self, name: &str) -> Option<&'a str> {
+        let mut found = None;
+        let ends = name.match_indices('/').map(|(at, _)| at).skip(1);
+        for space in ends.chain([name.len()]).filter_map(|end| name.get(..end)) {
+            if self.expand.contains(space) {
+                found = None;
+            } else if found.is_none() {
+                found = self.collapse.get(space).copied();
+            }
+        }
+        found
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.collapse.is_empty()
+    }
+}
+
+/// The collapsed namespace that swallows a topic (or group): the one of all its `publishers` and `subscribers`, if it
+/// is the topic's `own` too or both kinds are there; with no connection at all, its `own`. What crosses the border of a namespace stays
+/// outside as the namespace's interface.
+pub(super) fn swallows<'a>(
+    own: Option<&'a str>,
+    publishers: &[Option<&'a str>],
+    subscribers: &[Option<&'a str>],
+) -> Option<&'a str> {
+    let mut ends = publishers.iter().chain(subscribers);
+    let Some(first) = ends.next() else {
+        return own;
+    };
+    let same = ends.all(|end| end == first);
+    let both = !publishers.is_empty() && !subscribers.is_empty();
+    (*first).filter(|_| same && (both || own == *first))
+}
+
+/// A namespace that could be collapsed to one box.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Candidate {
+    /// The namespace: `/robot1/nav`.
+    pub name: Arc<str>,
+    /// How many boxes it holds now.
+    pub items: usize,
+}
+
+impl View {
+    /// The namespaces that could be collapsed, the one to collapse first at the front: innermost ones before those
+    /// around them, the largest first, then by name. Those that hold fewer than two boxes, or that `options` keeps
+    /// open, are left out.
+    pub fn collapsible(&self, options: &ViewOptions) -> Vec<Candidate> {
+        let open = Collapse::new(options).expand;
+        let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
+        for item in &self.items {
+            let mut space = match item.kind {
+                // A node that is called like a namespace would go inside.
+                ItemKind::Node => item.name.as_ref(),
+                _ => namespace(&item.name),
+            };
+            while space.len() > 1 {
+                *sizes.entry(space).or_default() += 1;
+                space = namespace(space);
+            }
+        }
+        sizes.retain(|space, size| *size > 1 && !open.contains(space));
+        let inner = |space: &str| {
+            let below = format!("{space}/");
+            let mut after = sizes.range(below.as_str()..);
+            !after.next().is_some_and(|(s, _)| s.starts_with(&below))
+        };
+        let mut all: Vec<(bool, Candidate)> = sizes
+            .iter()
+            .map(|(space, size)| {
+                let name = Arc::from(*space);
+                (!inner(space), Candidate { name, items: *size })
+            })
+            .collect();
+        all.sort_by(|a, b| {
+            let key = |c: &(bool, Candidate)| (c.0, usize::MAX - c.1.items);
+            key(a).cmp(&key(b)).then_with(|| a.1.name.cmp(&b.1.name))
+        });
+        all.into_iter().map(|(_, candidate)| candidate).collect()
+    }
+}

@@ -1,0 +1,137 @@
+//! The name filters of `rqt_graph`'s window: what is typed into its two boxes, with exactly its rules.
+
+use regex::Regex;
+
+use crate::error::{Error, Result};
+
+/// A list of names and patterns, some of them exclusions. The default lets every name pass.
+///
+/// The rules are those of `matches_any` and `_split_filter_string` in `rqt_graph/dotcode.py`: tokens are split at
+/// commas and stripped; one that begins with `-` excludes; a lone `/` or nothing includes everything. A token matches
+/// a name that it equals, and, if it holds a character outside `[A-Za-z0-9_/]`, as a pattern at the name's beginning.
+#[derive(Clone, Debug, Default)]
+pub struct NameFilter {
+    includes: Vec<Token>,
+    excludes: Vec<Token>,
+}
+
+#[derive(Clone, Debug)]
+struct Token {
+    text: String,
+    pattern: Option<Regex>,
+}
+
+impl NameFilter {
+    /// The filter that is written so.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a pattern that is no regular expression, or one that needs what only Python has.
+    pub fn parse(text: &str) -> Result<Self> {
+        let tokens: Vec<&str> = text.split(',').map(str::trim).collect();
+        let excludes = tokens.iter().filter_map(|t| t.strip_prefix('-'));
+        let excludes = excludes.map(Token::new).collect::<Result<_>>()?;
+        let mut includes: Vec<&str> = tokens;
+        includes.retain(|t| !t.starts_with('-'));
+        if matches!(includes[..], ["/" | ""]) {
+            includes.clear();
+        }
+        let includes = includes.into_iter().map(Token::new);
+        let includes = includes.collect::<Result<_>>()?;
+        Ok(Self { includes, excludes })
+    }
+
+    /// Whether a name passes: any inclusion (or none is given) and no exclusion matches it.
+    pub fn passes(&self, name: &str) -> bool {
+        let name = name.trim();
+        let included = self.includes.is_empty() || self.includes.iter().any(|t| t.matches(name));
+        included && !self.excludes.iter().any(|t| t.matches(name))
+    }
+
+    /// Whether every name passes.
+    pub fn passes_all(&self) -> bool {
+        self.includes.is_empty() && self.excludes.is_empty()
+    }
+}
+
+impl Token {
+    fn new(text: &str) -> Result<Self> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
+        let is_pattern = text.is_empty() || !text.chars().all(plain);
+        Ok(Self {
+            text: text.to_owned(),
+            pattern: is_pattern.then(|| anchored(text)).transpose()?,
+        })
+    }
+
+    fn matches(&self, name: &str) -> bool {
+        self.text == name || self.pattern.as_ref().is_some_and(|p| p.is_match(name))
+    }
+}
+
+/// Python's `re.match` begins at the start of the text and may end anywhere.
+fn anchored(pattern: &str) -> Result<Regex> {
+    // On its own first, so that a stray `)` cannot close our group.
+    let compiled = Regex::new(pattern).and_then(|_| Regex::new(&format!(r"\A(?:{pattern})")));
+    compiled.map_err(|error| {
+        let text = error.to_string();
+        let reason = text.lines().last().unwrap_or_default();
+        let reason = reason.trim().trim_start_matches("error: ");
+        Error::usage(
+            format!("`{pattern}` is no pattern for names: {reason}"),
+            "patterns are regular expressions: `/robot1/.*`, `-/rqt.*`",
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Which of the names pass, as one text.
+    fn passing(filter: &str, names: &[&str]) -> String {
+        let filter = NameFilter::parse(filter).unwrap();
+        let kept: Vec<&str> = names.iter().copied().filter(|n| filter.passes(n)).collect();
+        kept.join(" ")
+    }
+
+    const NAMES: &[&str] = &["/tf", "/tf_static", "/rqt_gui", "/r1/tf"];
+
+    #[test]
+    fn plain_names_match_only_themselves() {
+        assert_eq!(passing("/tf", NAMES), "/tf");
+        assert_eq!(passing(" /tf , /r1/tf", NAMES), "/tf /r1/tf");
+    }
+
+    #[test]
+    fn patterns_are_anchored_at_the_start_only() {
+        assert_eq!(passing("/tf.*", NAMES), "/tf /tf_static");
+        assert_eq!(passing("/t.", NAMES), "/tf /tf_static");
+        assert_eq!(passing("tf.*", NAMES), "");
+        assert_eq!(passing("/x|/r1", NAMES), "/r1/tf");
+    }
+
+    #[test]
+    fn a_dash_excludes_and_alone_includes_the_rest() {
+        assert_eq!(passing("-/rqt.*", NAMES), "/tf /tf_static /r1/tf");
+        assert_eq!(passing("/.*,-/tf", NAMES), "/tf_static /rqt_gui /r1/tf");
+        assert_eq!(passing("/,-/tf", NAMES), "/tf_static /rqt_gui /r1/tf");
+    }
+
+    #[test]
+    fn nothing_and_a_lone_slash_let_all_pass_but_a_slash_in_a_list_does_not() {
+        for all in ["", "/", "  "] {
+            assert_eq!(passing(all, NAMES), NAMES.join(" "));
+        }
+        assert_eq!(passing("/,/tf", NAMES), "/tf");
+        // An empty token is an empty pattern, which matches everything, as in Python.
+        assert_eq!(passing("/tf,", NAMES), NAMES.join(" "));
+        assert_eq!(passing("-", NAMES), "");
+    }
+
+    #[test]
+    fn what_is_no_pattern_is_a_usage_error() {
+        for bad in ["/a(", "-[", "a)(b", "(?=/tf)"] {
+            assert!(NameFilter::parse(bad).unwrap_err().is_usage(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Which names are housekeeping: by our own short list, and by the lists of `rqt_graph`.
+
+use crate::name::last_part;
+
+/// Whether our default leaves out this node or topic: log, clock, parameters, statistics, recorder events.
+pub(super) fn is_quiet(name: &str) -> bool {
+    const EXACT: [&str; 5] = [
+        "/rosout",
+        "/rosout_agg",
+        "/parameter_events",
+        "/clock",
+        "/statistics",
+    ];
+    EXACT.contains(&name)
+        || name.ends_with("/parameter_updates")
+        || name.ends_with("/parameter_descriptions")
+        || name.starts_with("/events/")
+}
+
+/// Whether a node of this name is a recorder or a player of bags, or a command of `ros2 topic`, not of the robot.
+pub fn is_recorder(name: &str) -> bool {
+    let last = last_part(name);
+    let numbered = |prefix| {
+        last.strip_prefix(prefix)
+            .is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit()))
+    };
+    numbered("record_")
+        || numbered("play_")
+        || last.starts_with("_ros2cli_")
+        || matches!(last, "rosbag2_recorder" | "rosbag2_player")
+}
+
+/// Whether `rqt_graph`'s "Debug" leaves out this node or topic (`_quiet_filter` of its `dotcode.py`).
+pub(super) fn is_debug(name: &str) -> bool {
+    const PARTS: [&str; 12] = [
+        "/diag_agg",
+        "/runtime_logger",
+        "/pr2_dashboard",
+        "/rviz",
+        "/rosout",
+        "/cpu_monitor",
+        "/monitor",
+        "/hd_monitor",
+        "/rxloggerlevel",
+        "/clock",
+        "/rqt",
+        "/statistics",
+    ];
+    let last = name.rsplit('/').next().unwrap_or(name);
+    PARTS.iter().any(|part| name.contains(part)) || last.starts_with('_')
+}
+
+/// Whether `rqt_graph`'s "Debug" leaves out an arrow from node to node over this topic.
+pub(super) fn is_debug_label(topic: &str) -> bool {
+    matches!(topic, "/time" | "/clock" | "/rosout" | "/statistics")
+}
+
+/// Whether it is a topic of the transform tree at the root, which `rqt_graph` hides or groups.
+pub(super) fn is_tf(topic: &str) -> bool {
+    matches!(topic, "/tf" | "/tf_static")
+}
+
+/// Whether `rqt_graph`'s "Params" leaves out this topic. Its rule for `parameter_updates` compares the wrong part of
+/// the name and so hides nothing; as in its first version, we hide them where `parameter_descriptions` stands beside.
+pub(super) fn is_params(topic: &str, exists: impl Fn(&str) -> bool) -> bool {
+    let beside = |this: &str, other: &str| {
+        topic
+            .strip_suffix(this)
+            .is_some_and(|prefix| exists(&format!("{prefix}{other}")))
+    };
+    topic.ends_with("/parameter_events")
+        || beside("/parameter_updates", "/parameter_descriptions")
+        || beside("/parameter_descriptions", "/parameter_updates")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quiet_is_short_and_exact() {
+        for name in ["/clock", "/a/parameter_updates", "/events/write_split"] {
+            assert!(is_quiet(name), "{name}");
+        }
+        for name in [
+            "/a/clock",
+            "/clock2",
+            "/rviz",
+            "/a/parameter_events",
+            "/events",
+        ] {
+            assert!(!is_quiet(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn recorders_are_known_by_their_numbers() {
+        for name in [
+            "/record_1605879",
+            "/play_17",
+            "/rosbag2_recorder",
+            "/_ros2cli_daemon_0",
+        ] {
+            assert!(is_recorder(name), "{name}");
+        }
+        for name in [
+            "/record_",
+            "/record_image",
+            "/play_sound",
+            "/recorder",
+            "/playground_1",
+        ] {
+            assert!(!is_recorder(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn debug_looks_inside_names() {
+        for name in [
+            "/robot/rviz2",
+            "/monitoring",
+            "/a/_hidden",
+            "/rosout_agg",
+            "/x/clock",
+        ] {
+            assert!(is_debug(name), "{name}");
+        }
+        for name in ["/talker", "/diagnostics", "/_ns/b"] {
+            assert!(!is_debug(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn parameter_updates_need_their_descriptions() {
+        let both =
+            |name: &str| name == "/a/parameter_updates" || name == "/a/parameter_descriptions";
+        assert!(is_params("/a/parameter_updates", both));
+        assert!(is_params("/a/parameter_descriptions", both));
+        assert!(!is_params("/b/parameter_updates", both));
+        assert!(is_params("/b/parameter_events", both));
+    }
+}

@@ -1,0 +1,109 @@
+//! One notice for everything that the picture leaves out, and how to see it.
+
+use std::collections::BTreeMap;
+
+use super::cast::Cast;
+use super::select::Reason;
+use super::{ItemKind, ViewOptions};
+use crate::graph::Elements;
+use crate::notice::{Notice, NoticeKind, Notices};
+
+/// So many names are given as examples.
+const EXAMPLES: usize = 3;
+
+/// What was hidden for each reason, counted; topics and groups that went into collapsed namespaces too.
+pub(super) fn notes(elements: &Elements, cast: &Cast, options: &ViewOptions) -> Notices {
+    let nodes = elements.nodes.iter().map(|n| n.name.as_str());
+    let topics = elements.topics.iter().map(|t| t.name.as_str());
+    let reasons = cast.selection.nodes.iter().chain(&cast.selection.topics);
+    let mut hidden: BTreeMap<Reason, Vec<&str>> = BTreeMap::new();
+    for (name, reason) in nodes.chain(topics).zip(reasons) {
+        if let Some(reason) = reason {
+            hidden.entry(*reason).or_default().push(name);
+        }
+    }
+    let mut notices = Notices::new();
+    for (reason, mut names) in hidden {
+        names.sort_unstable();
+        names.dedup();
+        let (what, how) = words(reason);
+        let text = format!("{what} left out ({}): {how}", examples(&names));
+        add(&mut notices, names.len(), text);
+    }
+    for item in cast.items.iter().filter(|i| i.kind == ItemKind::Namespace) {
+        let name = shortened(&item.name);
+        let text = format!("namespace `{name}` collapsed to one box: `--expand {name}` opens it");
+        add(&mut notices, item.members.len(), text);
+    }
+    if options.hide.unreachable {
+        let text = "nodes are left out of windows in which they are silent: `--hide` without `unreachable` shows them";
+        add(&mut notices, 1, text.to_owned());
+    }
+    if cast.dropped > 0 {
+        let text =
+            "arrows from node to node left out, too many to read: `--mode all` shows the topics";
+        add(&mut notices, cast.dropped, text.to_owned());
+    }
+    notices
+}
+
+fn add(notices: &mut Notices, count: usize, text: String) {
+    notices.add(Notice {
+        kind: NoticeKind::Hidden,
+        count: count as u64,
+        text,
+    });
+}
+
+/// What was left out, and how to see it.
+fn words(reason: Reason) -> (&'static str, &'static str) {
+    match reason {
+        Reason::NsFilter => (
+            "nodes outside `--ns-filter`",
+            "widen the filter to see them",
+        ),
+        Reason::TopicFilter => (
+            "topics outside `--topic-filter`",
+            "widen the filter to see them",
+        ),
+        Reason::Orphan => (
+            "topics whose nodes `--ns-filter` left out",
+            "widen the filter to see them",
+        ),
+        Reason::Leaf => (
+            "topics with a single connection",
+            "`--hide` without `leaf` shows them",
+        ),
+        Reason::Dead => (
+            "topics without a subscriber",
+            "`--hide` without `dead` shows them",
+        ),
+        Reason::Tf => ("transforms", "`--hide` without `tf` shows them"),
+        Reason::Params => (
+            "topics of parameters",
+            "`--hide` without `params` shows them",
+        ),
+        Reason::Debug => (
+            "what is there for debugging",
+            "`--hide` without `debug` shows it",
+        ),
+        Reason::Quiet => ("housekeeping", "`--hide none` shows it"),
+        Reason::Recorder => ("recorder and player", "`--show-recorder` shows them"),
+    }
+}
+
+fn examples(names: &[&str]) -> String {
+    let mut list: Vec<String> = names.iter().take(EXAMPLES).map(|n| shortened(n)).collect();
+    if names.len() > EXAMPLES {
+        list.push("…".to_owned());
+    }
+    list.join(", ")
+}
+
+/// Names come from the bag: they may be of any length.
+fn shortened(name: &str) -> String {
+    match name.char_indices().nth(60) {
+        None => name.to_owned(),
+        Some((end, _)) => format!("{}…", name.get(..end).unwrap_or_default()),
+    }
+}

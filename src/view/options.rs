@@ -1,0 +1,258 @@
+//! What the user wants to see, in `rqt_graph`'s words.
+
+use std::sync::Arc;
+
+use super::filter::NameFilter;
+use crate::error::{Error, Result};
+
+/// Which boxes and arrows there are, as in the first box of `rqt_graph`'s window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
+    Nodes,
+    /// Nodes and topics, in each window only what carries messages in it.
+    Active,
+    /// Nodes and topics, all that is known.
+    #[default]
+    All,
+}
+
+impl Mode {
+    /// The modes by the words of the command line.
+    pub const ALL: [(&'static str, Self); 3] = [
+        ("nodes", Self::Nodes),
+        ("active", Self::Active),
+        ("all", Self::All),
+    ];
+
+    /// The mode of this word.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another word.
+    pub fn parse(word: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|(name, _)| *name == word);
+        found
+            .map(|(_, mode)| *mode)
+            .ok_or_else(|| unknown("mode", word, "nodes, active, all"))
+    }
+}
+
+/// What to leave out. The default is `quiet` alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "one check box each, as in rqt_graph's window"
+)]
+pub struct Hide {
+    /// Housekeeping topics, the recorder and the player: our default.
+    pub quiet: bool,
+    /// What `rqt_graph` calls debug: viewers, monitors, `/rosout`, `/clock`, `/statistics`, names that begin with `_`.
+    pub debug: bool,
+    /// Topics without a subscriber.
+    pub dead: bool,
+    /// Topics with fewer than two connections.
+    pub leaf: bool,
+    /// `/tf` and `/tf_static`.
+    pub tf: bool,
+    /// Topics of parameters.
+    pub params: bool,
+    /// Nodes without a sign of life in the window.
+    pub unreachable: bool,
+}
+
+impl Hide {
+    /// Nothing is left out.
+    pub const NONE: Self = Self {
+        quiet: false,
+        debug: false,
+        dead: false,
+        leaf: false,
+        tf: false,
+        params: false,
+        unreachable: false,
+    };
+
+    /// What a list like `debug,dead` names, in the place of the default; `none` and the empty list hide nothing.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown word.
+    pub fn parse(list: &str) -> Result<Self> {
+        let mut hide = Self::NONE;
+        for word in words(list) {
+            match word {
+                "none" => hide = Self::NONE,
+                "quiet" => hide.quiet = true,
+                "debug" => hide.debug = true,
+                "dead" => hide.dead = true,
+                "leaf" => hide.leaf = true,
+                "tf" => hide.tf = true,
+                "params" => hide.params = true,
+                "unreachable" => hide.unreachable = true,
+                _ => {
+                    let all = "quiet, debug, dead, leaf, tf, params, unreachable, none";
+                    return Err(unknown("thing to hide", word, all));
+                }
+            }
+        }
+        Ok(hide)
+    }
+}
+
+impl Default for Hide {
+    fn default() -> Self {
+        Self {
+            quiet: true,
+            ..Self::NONE
+        }
+    }
+}
+
+/// What to draw as one box. The default is everything, with a box around every namespace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grouping {
+    /// The topics of an action, and the event topics of services, as one box each.
+    pub actions: bool,
+    /// `/tf` and `/tf_static` as one box.
+    pub tf: bool,
+    /// An image with its compressed transports as one box.
+    pub images: bool,
+    /// How many levels of namespaces get a box around their members; `None` for all of them, 0 for none.
+    pub namespaces: Option<usize>,
+}
+
+impl Grouping {
+    /// Every node and topic on its own.
+    pub const NONE: Self = Self {
+        actions: false,
+        tf: false,
+        images: false,
+        namespaces: Some(0),
+    };
+
+    /// What a list like `actions,tf,namespaces=2` names, in the place of the default. A list that does not speak of
+    /// namespaces leaves them boxed on all levels, unless it is `none`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown word or a depth that is no number.
+    pub fn parse(list: &str) -> Result<Self> {
+        let mut group = Self {
+            namespaces: None,
+            ..Self::NONE
+        };
+        for word in words(list) {
+            match word.split_once('=').unwrap_or((word, "")) {
+                ("none", "") => group = Self::NONE,
+                ("actions", "") => group.actions = true,
+                ("tf", "") => group.tf = true,
+                ("images", "") => group.images = true,
+                ("namespaces", "") => group.namespaces = None,
+                ("namespaces", depth) => {
+                    group.namespaces = Some(depth.parse().map_err(|_| {
+                        Error::usage(
+                            format!("`{depth}` is no depth of namespaces"),
+                            "write a whole number: `namespaces=2`",
+                        )
+                    })?);
+                }
+                _ => {
+                    let all = "actions, tf, images, namespaces, namespaces=N, none";
+                    return Err(unknown("thing to group", word, all));
+                }
+            }
+        }
+        Ok(group)
+    }
+}
+
+impl Default for Grouping {
+    fn default() -> Self {
+        Self {
+            actions: true,
+            tf: true,
+            images: true,
+            namespaces: None,
+        }
+    }
+}
+
+/// What the picture shows of the graph.
+#[derive(Clone, Debug, Default)]
+pub struct ViewOptions {
+    /// Boxes and arrows.
+    pub mode: Mode,
+    /// Which nodes.
+    pub ns_filter: NameFilter,
+    /// Which topics.
+    pub topic_filter: NameFilter,
+    /// What is left out.
+    pub hide: Hide,
+    /// What is drawn as one box.
+    pub group: Grouping,
+    /// Namespaces to draw as one box each: `/robot1/nav`.
+    pub collapse: Vec<Arc<str>>,
+    /// Namespaces to keep open, even inside a collapsed one.
+    pub expand: Vec<Arc<str>>,
+    /// Whether to show the recorder and the player.
+    pub show_recorder: bool,
+}
+
+impl ViewOptions {
+    /// What `rqt_graph`'s window is set to when it opens. Its "Unreachable" is left out: a bag cannot tell which node
+    /// would not have answered.
+    pub fn rqt_defaults() -> Self {
+        Self {
+            mode: Mode::Nodes,
+            hide: Hide {
+                debug: true,
+                dead: true,
+                leaf: true,
+                params: true,
+                ..Hide::NONE
+            },
+            group: Grouping {
+                namespaces: Some(2),
+                ..Grouping::default()
+            },
+            ..Self::default()
+        }
+    }
+}
+
+fn words(list: &str) -> impl Iterator<Item = &str> {
+    list.split(',')
+        .map(str::trim)
+        .filter(|word| !word.is_empty())
+}
+
+fn unknown(what: &str, word: &str, all: &str) -> Error {
+    Error::usage(format!("`{word}` is no {what}"), format!("one of: {all}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_takes_the_place_of_the_default() {
+        let hide = Hide::parse("dead, leaf").unwrap();
+        assert!(hide.dead && hide.leaf && !hide.quiet && !hide.debug);
+        assert_eq!(Hide::parse("none").unwrap(), Hide::NONE);
+        let group = Grouping::parse("tf,namespaces=3").unwrap();
+        assert_eq!((group.tf, group.actions), (true, false));
+        assert_eq!(group.namespaces, Some(3));
+        assert_eq!(Grouping::parse("tf").unwrap().namespaces, None);
+        assert_eq!(Grouping::parse("none").unwrap(), Grouping::NONE);
+    }
+
+    #[test]
+    fn unknown_words_are_named() {
+        for error in [
+            Hide::parse("dead,dad").unwrap_err(),
+            Grouping::parse("action").unwrap_err(),
+            Grouping::parse("namespaces=two").unwrap_err(),
+            Mode::parse("some").unwrap_err(),
+        ] {
+            assert!(error.is_usage() && !error.hint().is_empty());
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Which nodes and topics of the mission are seen at all, in the order of `rqt_graph`'s own steps.
+
+use std::collections::BTreeSet;
+
+use super::names::{is_debug, is_params, is_quiet, is_recorder, is_tf};
+use super::options::{Mode, ViewOptions};
+use crate::graph::Elements;
+
+/// Why something is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Reason {
+    NsFilter,
+    TopicFilter,
+    /// A topic all of whose nodes are filtered out.
+    Orphan,
+    Leaf,
+    Dead,
+    Tf,
+    Params,
+    Debug,
+    Quiet,
+    Recorder,
+}
+
+/// Per node and topic of the mission, why it is left out; `None` for what is seen.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Selection {
+    pub(super) nodes: Vec<Option<Reason>>,
+    pub(super) topics: Vec<Option<Reason>>,
+}
+
+/// How many connections a topic has.
+#[derive(Clone, Copy, Default)]
+struct Ends {
+    publishers: usize,
+    subscribers: usize,
+    /// How many of both pass the filter of namespaces.
+    kept: usize,
+}
+
+/// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters, topics without a node left.
+pub(super) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
+    let hide_recorder = options.hide.quiet && !options.show_recorder;
+    let recorders: Vec<bool> = elements
+        .nodes
+        .iter()
+        .map(|n| hide_recorder && is_recorder(n.name.as_str()))
+        .collect();
+    let nodes: Vec<Option<Reason>> = elements
+        .nodes
+        .iter()
+        .map(|n| (!options.ns_filter.passes(n.name.as_str())).then_some(Reason::NsFilter))
+        .collect();
+    let ends = ends(elements, &nodes, &recorders);
+    let names: BTreeSet<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
+    let topics = elements.topics.iter().zip(&ends);
+    let topics = topics.map(|(t, ends)| topic_reason(t.name.as_str(), *ends, &names, options));
+    let topics = topics.collect();
+    let mut selection = Selection { nodes, topics };
+    for (reason, is_recorder) in selection.nodes.iter_mut().zip(recorders) {
+        if is_recorder {
+            reason.get_or_insert(Reason::Recorder);
+        }
+    }
+    selection
+}
+
+fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Vec<Ends> {
+    let mut all = vec![Ends::default(); elements.topics.len()];
+    let publishes = elements.publishes.iter().map(|e| (e, true));
+    let subscribes = elements.subscribes.iter().map(|e| (e, false));
+    for (edge, publishes) in publishes.chain(subscribes) {
+        let node = edge.node as usize;
+        let (Some(ends), Some(false)) = (all.get_mut(edge.topic as usize), recorders.get(node))
+        else {
+            continue;
+        };
+        ends.publishers += usize::from(publishes);
+        ends.subscribers += usize::from(!publishes);
+        ends.kept += usize::from(nodes.get(node) == Some(&None));
+    }
+    all
+}
+
+fn topic_reason(
+    name: &str,
+    ends: Ends,
+    names: &BTreeSet<&str>,
+    options: &ViewOptions,
+) -> Option<Reason> {
+    let hide = options.hide;
+    let all = ends.publishers + ends.subscribers;
+    let exists = |other: &str| names.contains(other) && options.topic_filter.passes(other);
+    if !options.topic_filter.passes(name) {
+        Some(Reason::TopicFilter)
+    } else if hide.dead && ends.subscribers == 0 {
+        Some(Reason::Dead)
+    } else if hide.leaf && all < 2 {
+        Some(Reason::Leaf)
+    } else if hide.tf && is_tf(name) {
+        Some(Reason::Tf)
+    } else if hide.params && is_params(name, exists) {
+        Some(Reason::Params)
+    } else if hide.quiet && is_quiet(name) {
+        Some(Reason::Quiet)
+    } else {
+        None
+    }
+}
+
+/// The last steps, after the grouping: topics of their own whose nodes are all filtered out, then "Debug". `grouped`
+/// tells of each topic whether it stands in a group, which these steps leave alone.
+pub(super) fn finish(
+    selection: &mut Selection,
+    elements: &Elements,
+    options: &ViewOptions,
+    grouped: &[bool],
+) {
+    let nobody = vec![false; elements.nodes.len()];
+    let ends = ends(elements, &selection.nodes_by_filter(), &nobody);
+    for (at, reason) in selection.topics.iter_mut().enumerate() {
+        let Some(topic) = elements.topics.get(at).filter(|_| reason.is_none()) else {
+            continue;
+        };
+        let ends = ends.get(at).copied().unwrap_or_default();
+        let grouped = grouped.get(at).copied().unwrap_or_default();
+        if !grouped && ends.kept == 0 && ends.publishers + ends.subscribers > 0 {
+            *reason = Some(Reason::Orphan);
+        } else if !grouped
+            && options.hide.debug
+            && options.mode != Mode::Nodes
+            && is_debug(topic.name.as_str())
+        {
+            *reason = Some(Reason::Debug);
+        }
+    }
+    for (node, reason) in elements.nodes.iter().zip(&mut selection.nodes) {
+        let name = node.name.as_str();
+        if options.hide.debug && is_debug(name) {
+            reason.get_or_insert(Reason::Debug);
+        } else if options.hide.quiet && is_quiet(name) {
+            reason.get_or_insert(Reason::Quiet);
+        }
+    }
+}
+
+impl Selection {
+    /// Nodes as the filter of namespaces alone sees them: what is hidden for another reason still holds its topics.
+    fn nodes_by_filter(&self) -> Vec<Option<Reason>> {
+        let by_filter = |reason: &Option<Reason>| reason.filter(|r| *r == Reason::NsFilter);
+        self.nodes.iter().map(by_filter).collect()
+    }
+}

@@ -1,0 +1,266 @@
+//! Small evolutions for tests, written as text.
+
+use std::collections::BTreeSet;
+
+use crate::diff::Change;
+use crate::evidence::{Degree, Evidence};
+use crate::evolution::{Evolution, Window};
+use crate::graph::{
+    Edge, EdgeState, Element, Elements, Graph, Node, NodeState, State, Topic, TopicState,
+};
+use crate::notice::Notices;
+use crate::time::{Period, Span, Stamp};
+
+const SECOND: i64 = 1_000_000_000;
+
+/// A mission with a window per text. `/a>/t` is a publication and `/b</t` a subscription, `/a` alone a node, `=/t`
+/// a topic; `@15` after one of them is its rate (of the topic too, for a publication), `~` makes it silent. Windows last a second.
+pub(crate) fn evolution(windows: &[&str]) -> Evolution {
+    let parsed: Vec<Vec<Word>> = windows
+        .iter()
+        .map(|w| w.split_whitespace().map(Word::new).collect())
+        .collect();
+    let elements = elements(&parsed);
+    let mut all: Vec<Window> = Vec::new();
+    for (index, words) in parsed.iter().enumerate() {
+        let graph = graph(words, &elements);
+        let start = i64::try_from(index).unwrap() * SECOND;
+        all.push(Window {
+            index,
+            span: span(start, start + SECOND),
+            partial: false,
+            messages: 0,
+            changes: all
+                .last()
+                .map(|w| changes(&w.graph, &graph))
+                .unwrap_or_default(),
+            graph,
+        });
+    }
+    let period = Period::from_nanos(SECOND).unwrap();
+    Evolution {
+        bags: Vec::new(),
+        span: span(0, i64::try_from(windows.len()).unwrap() * SECOND),
+        messages: 0,
+        period,
+        step: period,
+        elements,
+        windows: all,
+        notices: Notices::new(),
+    }
+}
+
+fn span(start: i64, end: i64) -> Span {
+    Span {
+        start: Stamp(start),
+        end: Stamp(end),
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Publish,
+    Subscribe,
+    Node,
+    Topic,
+}
+
+struct Word<'a> {
+    kind: Kind,
+    node: &'a str,
+    topic: &'a str,
+    hz: Option<f64>,
+    state: State,
+}
+
+impl<'a> Word<'a> {
+    fn new(text: &'a str) -> Self {
+        let (text, hz) = text
+            .split_once('@')
+            .map_or((text, None), |(t, hz)| (t, Some(hz.parse().unwrap())));
+        let (text, state) = text
+            .strip_suffix('~')
+            .map_or((text, State::Active), |t| (t, State::Silent));
+        let (kind, node, topic) = match (text.split_once('>'), text.split_once('<')) {
+            (Some((node, topic)), _) => (Kind::Publish, node, topic),
+            (_, Some((node, topic))) => (Kind::Subscribe, node, topic),
+            _ => match text.strip_prefix('=') {
+                Some(topic) => (Kind::Topic, "", topic),
+                None => (Kind::Node, text, ""),
+            },
+        };
+        Self {
+            kind,
+            node,
+            topic,
+            hz,
+            state,
+        }
+    }
+}
+
+fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
+    let words = || windows.iter().flatten();
+    let nodes: BTreeSet<&str> = words().map(|w| w.node).filter(|n| !n.is_empty()).collect();
+    let topics: BTreeSet<&str> = words().map(|w| w.topic).filter(|t| !t.is_empty()).collect();
+    let place = |set: &BTreeSet<&str>, name: &str| {
+        u32::try_from(set.iter().position(|n| *n == name).unwrap()).unwrap()
+    };
+    let edges = |kind: Kind| {
+        let of_kind = words().filter(|w| w.kind == kind);
+        let mut all: Vec<(u32, u32)> = of_kind
+            .map(|w| (place(&nodes, w.node), place(&topics, w.topic)))
+            .collect();
+        all.sort_unstable_by_key(|(node, topic)| {
+            if kind == Kind::Publish {
+                (*node, *topic)
+            } else {
+                (*topic, *node)
+            }
+        });
+        all.dedup();
+        all.into_iter()
+            .map(|(node, topic)| Edge {
+                node,
+                topic,
+                evidence: Evidence::NONE,
+                first: None,
+                last: None,
+            })
+            .collect()
+    };
+    Elements {
+        publishes: edges(Kind::Publish),
+        subscribes: edges(Kind::Subscribe),
+        nodes: nodes
+            .iter()
+            .map(|n| Node {
+                name: (*n).into(),
+                role: (*n).into(),
+                evidence: Evidence::NONE,
+                first: None,
+                last: None,
+            })
+            .collect(),
+        topics: topics
+            .iter()
+            .map(|t| Topic {
+                name: (*t).into(),
+                types: Vec::new(),
+                evidence: Evidence::NONE,
+                first: None,
+                last: None,
+                qos: None,
+            })
+            .collect(),
+    }
+}
+
+fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
+    let mut graph = Graph::default();
+    for (node, id) in elements.nodes.iter().zip(0..) {
+        let own = |w: &&Word<'_>| w.node == node.name.as_str();
+        if let Some(state) = words.iter().filter(own).map(|w| w.state).min() {
+            let hz = words
+                .iter()
+                .filter(own)
+                .filter_map(|w| w.hz)
+                .reduce(|a, b| a + b);
+            graph.nodes.push(NodeState {
+                id,
+                state,
+                degree: Degree::Measured,
+                hz,
+                lifecycle: None,
+            });
+        }
+    }
+    for (topic, id) in elements.topics.iter().zip(0..) {
+        let own = |w: &&Word<'_>| w.topic == topic.name.as_str();
+        if let Some(state) = words.iter().filter(own).map(|w| w.state).min() {
+            let hz = words
+                .iter()
+                .filter(own)
+                .filter_map(|w| w.hz)
+                .reduce(|a, b| a + b);
+            graph.topics.push(TopicState {
+                id,
+                state,
+                degree: Degree::Measured,
+                count: 0,
+                bytes: None,
+                hz,
+                median_period_s: None,
+                max_gap_s: None,
+            });
+        }
+    }
+    let edges = |edges: &[Edge], kind: Kind| -> Vec<EdgeState> {
+        let word = |edge: &Edge| {
+            let (node, topic) = (
+                elements.nodes[edge.node as usize].name.as_str(),
+                elements.topics[edge.topic as usize].name.as_str(),
+            );
+            words
+                .iter()
+                .find(|w| w.kind == kind && w.node == node && w.topic == topic)
+        };
+        edges
+            .iter()
+            .zip(0..)
+            .filter_map(|(edge, id)| {
+                word(edge).map(|w| EdgeState {
+                    id,
+                    state: w.state,
+                    degree: Degree::Measured,
+                    count: None,
+                    hz: w.hz,
+                })
+            })
+            .collect()
+    };
+    graph.publishes = edges(&elements.publishes, Kind::Publish);
+    graph.subscribes = edges(&elements.subscribes, Kind::Subscribe);
+    graph
+}
+
+/// Everything that came and went, and every rate that changed at all.
+fn changes(before: &Graph, now: &Graph) -> Vec<Change> {
+    let all = |g: &Graph| -> BTreeSet<Element> {
+        let nodes = g.nodes.iter().map(|n| Element::Node(n.id));
+        let topics = g.topics.iter().map(|t| Element::Topic(t.id));
+        let publishes = g.publishes.iter().map(|e| Element::Publish(e.id));
+        let subscribes = g.subscribes.iter().map(|e| Element::Subscribe(e.id));
+        nodes
+            .chain(topics)
+            .chain(publishes)
+            .chain(subscribes)
+            .collect()
+    };
+    let (old, new) = (all(before), all(now));
+    let added = new.difference(&old).map(|e| Change::Added {
+        what: *e,
+        time: None,
+    });
+    let removed = old.difference(&new).map(|e| Change::Removed {
+        what: *e,
+        time: None,
+    });
+    let rates = |g: &Graph| -> Vec<(Element, Option<f64>)> {
+        let topics = g.topics.iter().map(|t| (Element::Topic(t.id), t.hz));
+        topics
+            .chain(g.publishes.iter().map(|e| (Element::Publish(e.id), e.hz)))
+            .collect()
+    };
+    let rates_before = rates(before);
+    let changed = rates(now).into_iter().filter_map(move |(what, to)| {
+        let (_, from) = rates_before.iter().find(|(w, _)| *w == what)?;
+        let (from_hz, to_hz) = ((*from)?, to?);
+        (from_hz.to_bits() != to_hz.to_bits()).then_some(Change::Rate {
+            what,
+            from_hz,
+            to_hz,
+        })
+    });
+    added.chain(removed).chain(changed).collect()
+}
