@@ -39,8 +39,8 @@ pub(super) struct Cast {
     pub(super) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
     /// The topic of each subscription.
     pub(super) subscribed: Vec<TopicId>,
-    /// In mode *nodes*, the arrows whose rate a publication tells, or a topic with a single one.
-    pub(super) direct: BTreeMap<Element, Vec<u32>>,
+    /// Per publication, and per topic with publications, the arrows that carry it from its node.
+    pub(super) carriers: BTreeMap<Element, Vec<u32>>,
     /// Arrows from node to node that were too many.
     pub(super) dropped: usize,
 }
@@ -79,6 +79,7 @@ impl Cast {
         } else {
             cast.set_arrows(elements);
         }
+        cast.set_carriers(elements);
         cast
     }
 
@@ -225,29 +226,19 @@ impl Cast {
             self.arrows.push(arrow(ends, members.into_iter().collect()));
             self.pairs.push(pairs);
         }
-        self.set_tellers(elements);
     }
 
-    /// Notes whose change of rate each arrow from node to node shows.
-    fn set_tellers(&mut self, elements: &Elements) {
-        let mut publishers: Vec<usize> = vec![0; elements.topics.len()];
-        for edge in &elements.publishes {
-            if let Some(count) = publishers.get_mut(edge.topic as usize) {
-                *count += 1;
-            }
-        }
+    /// Notes which arrows each topic's publications are part of.
+    fn set_carriers(&mut self, elements: &Elements) {
         for (arrow, id) in self.arrows.iter().zip(0..) {
             for member in &arrow.members {
                 let Element::Publish(publish) = member else {
                     continue;
                 };
-                self.direct.entry(*member).or_default().push(id);
-                let topic = elements.publishes.get(*publish as usize).map(|e| e.topic);
-                if let Some(topic) = topic.filter(|t| publishers.get(*t as usize) == Some(&1)) {
-                    self.direct
-                        .entry(Element::Topic(topic))
-                        .or_default()
-                        .push(id);
+                if let Some(edge) = elements.publishes.get(*publish as usize) {
+                    let topic = self.carriers.entry(Element::Topic(edge.topic)).or_default();
+                    topic.push(id);
+                    self.carriers.entry(*member).or_default().push(id);
                 }
             }
         }

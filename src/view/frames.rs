@@ -1,6 +1,6 @@
 //! What each window shows: states and rates gathered from the graph's elements, and what is new since the window before.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::caption::Speaker;
@@ -10,7 +10,7 @@ use super::{Frame, Item, ItemKind, Mark, Mode, Shown, ViewOptions};
 use crate::diff::Change;
 use crate::evidence::Degree;
 use crate::evolution::Evolution;
-use crate::graph::{Element, Graph, State};
+use crate::graph::{Element, Elements, Graph, State, TopicId};
 
 /// Items or arrows of one window by id; ghosts are not among them.
 type Present = Vec<Option<Shown>>;
@@ -22,7 +22,8 @@ pub(super) fn frames(evolution: &Evolution, options: &ViewOptions, cast: &Cast) 
     let mut frames = Vec::with_capacity(evolution.windows.len());
     for window in &evolution.windows {
         let now = present(&window.graph, options, cast);
-        let news = News::new(&window.changes, cast);
+        let alone = alone(&window.graph, &evolution.elements);
+        let news = News::new(&window.changes, cast, &alone);
         let (items, arrows) = match &before {
             None => (
                 now.0.iter().flatten().cloned().collect(),
@@ -217,7 +218,8 @@ struct News {
 }
 
 impl News {
-    fn new(changes: &[Change], cast: &Cast) -> Self {
+    /// `alone` holds the topics with one publisher, whose own rate the diff does not tell apart from the topic's.
+    fn new(changes: &[Change], cast: &Cast, alone: &BTreeSet<TopicId>) -> Self {
         let mut news = Self {
             items: BTreeMap::new(),
             arrows: BTreeMap::new(),
@@ -234,6 +236,13 @@ impl News {
                     let faster = to_hz > from_hz;
                     let mark = if faster { Mark::Faster } else { Mark::Slower };
                     news.add(cast, *what, mark, Some(*from_hz));
+                    let carried = match what {
+                        Element::Topic(topic) => alone.contains(topic),
+                        _ => !cast.pairs.is_empty(),
+                    };
+                    if carried {
+                        news.add_carriers(cast, *what, mark, *from_hz);
+                    }
                 }
                 Change::HandedOver { topic, .. } => {
                     news.add(cast, Element::Topic(*topic), Mark::HandedOver, None);
@@ -256,9 +265,6 @@ impl News {
             Element::Subscribe(id) => {
                 self.add_edge(cast, place(&cast.subscribe, id), mark, from_hz);
             }
-        }
-        if !cast.pairs.is_empty() {
-            self.add_direct(cast, what, mark, from_hz);
         }
     }
 
@@ -287,16 +293,31 @@ impl News {
         }
     }
 
-    /// A change of rate of a publication shows on the arrows from node to node that it is part of.
-    fn add_direct(&mut self, cast: &Cast, what: Element, mark: Mark, from_hz: Option<f64>) {
-        if !matches!(mark, Mark::Faster | Mark::Slower) {
-            return;
-        }
-        for id in cast.direct.get(&what).into_iter().flatten() {
-            let single = cast.pairs.get(*id as usize).is_some_and(|p| p.len() == 1);
-            keep(&mut self.arrows, *id, single, mark, from_hz);
+    /// A change of rate shows on the arrows from the publisher too.
+    fn add_carriers(&mut self, cast: &Cast, what: Element, mark: Mark, from_hz: f64) {
+        for id in cast.carriers.get(&what).into_iter().flatten() {
+            let arrow = cast.arrows.get(*id as usize);
+            let single = match cast.pairs.get(*id as usize) {
+                Some(pairs) => pairs.len() == 1,
+                None => arrow.is_some_and(|a| a.members.len() == 1),
+            };
+            keep(&mut self.arrows, *id, single, mark, Some(from_hz));
         }
     }
+}
+
+/// The topics that have exactly one publisher in a window.
+fn alone(graph: &Graph, elements: &Elements) -> BTreeSet<TopicId> {
+    let (mut once, mut more) = (BTreeSet::new(), BTreeSet::new());
+    for state in &graph.publishes {
+        if let Some(edge) = elements.publishes.get(state.id as usize)
+            && !once.insert(edge.topic)
+        {
+            more.insert(edge.topic);
+        }
+    }
+    once.retain(|topic| !more.contains(topic));
+    once
 }
 
 /// Notes a change; of several on the same thing the more telling one stays. What stands for several elements is marked

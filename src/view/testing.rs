@@ -2,12 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::diff::Change;
 use crate::evidence::{Degree, Evidence};
 use crate::evolution::{Evolution, Window};
-use crate::graph::{
-    Edge, EdgeState, Element, Elements, Graph, Node, NodeState, State, Topic, TopicState,
-};
+use crate::graph::{Edge, EdgeState, Elements, Graph, Node, NodeState, State, Topic, TopicState};
 use crate::notice::Notices;
 use crate::time::{Period, Span, Stamp};
 
@@ -21,39 +18,39 @@ pub(crate) fn evolution(windows: &[&str]) -> Evolution {
         .map(|w| w.split_whitespace().map(Word::new).collect())
         .collect();
     let elements = elements(&parsed);
-    let mut all: Vec<Window> = Vec::new();
-    for (index, words) in parsed.iter().enumerate() {
-        let graph = graph(words, &elements);
-        let start = i64::try_from(index).unwrap() * SECOND;
-        all.push(Window {
-            index,
-            span: span(start, start + SECOND),
-            partial: false,
-            messages: 0,
-            changes: all
-                .last()
-                .map(|w| changes(&w.graph, &graph))
-                .unwrap_or_default(),
-            graph,
-        });
-    }
+    let windows = parsed.iter().zip(0..).map(|(words, index)| Window {
+        index,
+        span: span(index),
+        partial: false,
+        messages: 0,
+        graph: graph(words, &elements),
+        changes: Vec::new(),
+    });
+    let windows: Vec<Window> = windows.collect();
     let period = Period::from_nanos(SECOND).unwrap();
-    Evolution {
+    let mut evolution = Evolution {
         bags: Vec::new(),
-        span: span(0, i64::try_from(windows.len()).unwrap() * SECOND),
+        span: Span {
+            start: span(0).start,
+            end: span(windows.len()).start,
+        },
         messages: 0,
         period,
         step: period,
         elements,
-        windows: all,
+        windows,
+        layout: None,
         notices: Notices::new(),
-    }
+    };
+    evolution.find_changes(0.25, &[]);
+    evolution
 }
 
-fn span(start: i64, end: i64) -> Span {
+fn span(index: usize) -> Span {
+    let start = i64::try_from(index).unwrap() * SECOND;
     Span {
         start: Stamp(start),
-        end: Stamp(end),
+        end: Stamp(start + SECOND),
     }
 }
 
@@ -187,7 +184,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
                 id,
                 state,
                 degree: Degree::Measured,
-                count: 0,
+                count: count(hz).unwrap_or(0),
                 bytes: None,
                 hz,
                 median_period_s: None,
@@ -213,7 +210,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
                     id,
                     state: w.state,
                     degree: Degree::Measured,
-                    count: None,
+                    count: count(w.hz),
                     hz: w.hz,
                 })
             })
@@ -224,43 +221,12 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
     graph
 }
 
-/// Everything that came and went, and every rate that changed at all.
-fn changes(before: &Graph, now: &Graph) -> Vec<Change> {
-    let all = |g: &Graph| -> BTreeSet<Element> {
-        let nodes = g.nodes.iter().map(|n| Element::Node(n.id));
-        let topics = g.topics.iter().map(|t| Element::Topic(t.id));
-        let publishes = g.publishes.iter().map(|e| Element::Publish(e.id));
-        let subscribes = g.subscribes.iter().map(|e| Element::Subscribe(e.id));
-        nodes
-            .chain(topics)
-            .chain(publishes)
-            .chain(subscribes)
-            .collect()
-    };
-    let (old, new) = (all(before), all(now));
-    let added = new.difference(&old).map(|e| Change::Added {
-        what: *e,
-        time: None,
-    });
-    let removed = old.difference(&new).map(|e| Change::Removed {
-        what: *e,
-        time: None,
-    });
-    let rates = |g: &Graph| -> Vec<(Element, Option<f64>)> {
-        let topics = g.topics.iter().map(|t| (Element::Topic(t.id), t.hz));
-        topics
-            .chain(g.publishes.iter().map(|e| (Element::Publish(e.id), e.hz)))
-            .collect()
-    };
-    let rates_before = rates(before);
-    let changed = rates(now).into_iter().filter_map(move |(what, to)| {
-        let (_, from) = rates_before.iter().find(|(w, _)| *w == what)?;
-        let (from_hz, to_hz) = ((*from)?, to?);
-        (from_hz.to_bits() != to_hz.to_bits()).then_some(Change::Rate {
-            what,
-            from_hz,
-            to_hz,
-        })
-    });
-    added.chain(removed).chain(changed).collect()
+/// Messages in a window of one second.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small rates of tests"
+)]
+fn count(hz: Option<f64>) -> Option<u64> {
+    hz.map(|hz| hz.round() as u64)
 }
