@@ -1,7 +1,8 @@
-#![expect(clippy::print_stdout, reason = "an example prints what it finds")]
 //! Counts the messages of a bag per window of ten seconds, topic and publisher, and prints them as JSON.
 //!
 //! `cargo run --release --example counts -- run.bag`
+
+#![expect(clippy::print_stdout, reason = "an example prints what it finds")]
 
 use std::collections::BTreeMap;
 

@@ -18,6 +18,7 @@ use relay::{Clip, Gather, in_order};
 
 mod relay;
 mod rosbag1;
+mod sqlite3;
 mod unknown;
 
 /// How a payload is written.
@@ -208,7 +209,7 @@ pub struct FormatRow {
 }
 
 /// Every format that can be read.
-pub const FORMATS: &[FormatRow] = &[rosbag1::FORMAT];
+pub const FORMATS: &[FormatRow] = &[rosbag1::FORMAT, sqlite3::FORMAT];
 
 /// Where a bag lies.
 pub(crate) enum Place {

@@ -86,6 +86,26 @@ fn read_once(mut file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     file.read(into)
 }
 
+/// A folder of ours that is gone when this is dropped.
+pub(crate) struct Temporary(tempfile::TempDir);
+
+impl Temporary {
+    /// Makes one where the system keeps such folders.
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub(crate) fn new() -> Result<Self> {
+        let dir = tempfile::tempdir();
+        dir.map(Self)
+            .map_err(Error::io("make a folder in", &std::env::temp_dir()))
+    }
+
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
 enum From<'a> {
     /// Part of a file, up to byte `end`.
     File { source: &'a Source, end: u64 },

@@ -66,6 +66,8 @@ impl Sink for Clip<'_> {
 /// Stamps and sizes of single messages, gathered per connection so that a sink gets them in long runs.
 #[derive(Default)]
 pub(super) struct Gather {
+    /// Whether the sizes are not known.
+    pub(super) sizeless: bool,
     runs: Vec<(Vec<Stamp>, Vec<u32>)>,
     touched: Vec<ConnectionId>,
     held: usize,
@@ -98,7 +100,7 @@ impl Gather {
         self.touched.sort_unstable();
         for id in self.touched.drain(..) {
             let (stamps, sizes) = &mut self.runs[id.0 as usize];
-            sink.stamps(id, stamps, Some(sizes));
+            sink.stamps(id, stamps, (!self.sizeless).then_some(sizes));
             stamps.clear();
             sizes.clear();
         }

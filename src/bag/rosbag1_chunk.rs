@@ -252,7 +252,7 @@ impl Chunks<'_> {
                 Ok((Record::Message { id, time }, len)) => {
                     let Some(id) = self.table.get(id) else {
                         unknown(sink, 1);
-                        drop(stream.skip(u64::from(len))?);
+                        let _ = stream.skip(u64::from(len))?;
                         continue;
                     };
                     gather.add(id, time, len, sink);
