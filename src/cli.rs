@@ -12,10 +12,13 @@ use crate::collect;
 use crate::error::Error;
 use crate::evolution::Evolution;
 use crate::graph;
-use crate::pipeline::{Reading, read};
+use crate::info::{SurveyRow, json, survey_csv, survey_text};
+use crate::pipeline::{Reading, is_survey, read, survey};
 use crate::terminal::Terminal;
 use crate::window::{Division, Length};
-use typed::{Command, EventsArgs, GraphArgs, Inputs, RenderArgs, TimeArgs, Typed};
+use typed::{
+    Command, EventsArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs, TimeArgs, Typed,
+};
 
 const DONE: u8 = 0;
 const FAILED: u8 = 1;
@@ -37,7 +40,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let mut terminal = Terminal::new(typed.quiet, no_colour);
     let outcome = match typed.command {
         Command::Render(args) => render(&args, &mut terminal),
-        Command::Info(_) => Ok(DONE),
+        Command::Info(args) => info(&args, &mut terminal),
         Command::Events(args) => events(&args, &mut terminal),
         Command::Styles { .. } => Ok(DONE),
         Command::Completions { shell } => {
@@ -121,6 +124,41 @@ fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
             event.sentence()
         ));
     }
+    terminal.notices(&evolution.notices);
+    Ok(code(&evolution))
+}
+
+fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+    let reading = reading(&args.inputs, &TimeArgs::default(), &args.graph);
+    if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
+        && is_survey(input)
+    {
+        let rows = survey(folder, &reading, terminal)?;
+        terminal.results(&match args.format {
+            InfoFormat::Text => survey_text(&rows),
+            InfoFormat::Csv => survey_csv(&rows),
+            InfoFormat::Json => json(&rows),
+        });
+        return Ok(DONE);
+    }
+    let evolution = read(&reading, terminal)?;
+    let info = crate::info::info(&evolution);
+    terminal.results(&match args.format {
+        InfoFormat::Text => crate::info::text(&info),
+        InfoFormat::Json => json(&info),
+        InfoFormat::Csv => {
+            let path = evolution
+                .bags
+                .first()
+                .map(|b| b.name.clone())
+                .unwrap_or_default();
+            survey_csv(&[SurveyRow {
+                path,
+                error: None,
+                info: Some(info),
+            }])
+        }
+    });
     terminal.notices(&evolution.notices);
     Ok(code(&evolution))
 }

@@ -56,6 +56,11 @@ impl Evidence {
         self.0 == 0
     }
 
+    /// The words of all kinds, in the order of [`SOURCES`].
+    pub fn all_words() -> impl Iterator<Item = &'static str> {
+        SOURCES.iter().map(|source| source.word)
+    }
+
     /// The words in it, in the order of [`SOURCES`].
     pub fn words(self) -> impl Iterator<Item = &'static str> {
         SOURCES

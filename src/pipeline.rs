@@ -1,8 +1,10 @@
 //! The whole program in the order it happens: read, divide, build, compare, draw, write.
 
 mod read;
+mod survey;
 
 pub use read::{Reading, read};
+pub use survey::{is_survey, survey};
 
 /// A part of the work, as progress and timings tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

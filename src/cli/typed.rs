@@ -130,7 +130,7 @@ pub(super) struct Inputs {
     pub(super) verify: bool,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Time")]
 pub(super) struct TimeArgs {
     /// The length of a window: `60`, `30s`, `1m`, `500ms`, or `all` for one window. [default: 60 s; less for a short bag,

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Change, Delta, Diff, ValueKind, diff};
-use crate::graph::{EdgeState, Element, Elements, Graph, NodeId, TopicId, TopicState};
+use crate::graph::{EdgeState, Element, Elements, Graph, NodeId, State, TopicId, TopicState};
 use crate::time::{Span, Stamp};
 
 /// A rate counts as changed from this share on, unless the user says otherwise.
@@ -92,14 +92,17 @@ impl<'a> Changes<'a> {
     }
 
     fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
-        let secs = (spans.0.nanos() as f64 / 1e9, spans.1.nanos() as f64 / 1e9);
-        let differs = |from: f64, to: f64| rate_differs(from, to, secs, self.threshold);
+        let secs = spans.0.nanos().min(spans.1.nanos()) as f64 / 1e9;
+        let mut steady = BTreeSet::new();
         for (old, new) in &diff.topics.changed {
-            if let (Some(from_hz), Some(to_hz)) = (old.hz, new.hz)
-                && differs(from_hz, to_hz)
-            {
+            if !(is_steady(old) && is_steady(new)) {
+                continue;
+            }
+            steady.insert(new.id);
+            if let Some((from_hz, to_hz)) = self.rate(old.hz, new.hz, secs) {
+                let what = Element::Topic(new.id);
                 changes.push(Change::Rate {
-                    what: Element::Topic(new.id),
+                    what,
                     from_hz,
                     to_hz,
                 });
@@ -107,18 +110,26 @@ impl<'a> Changes<'a> {
         }
         let crowded = self.crowded(graph);
         for (old, new) in &diff.publishes.changed {
+            let topic = self.elements.publishes[new.id as usize].topic;
             // With one publisher the topic's own change says it all.
-            let alone = !crowded.contains(&self.elements.publishes[new.id as usize].topic);
-            if let (Some(from_hz), Some(to_hz), false) = (old.hz, new.hz, alone)
-                && differs(from_hz, to_hz)
-            {
+            if !crowded.contains(&topic) || !steady.contains(&topic) {
+                continue;
+            }
+            if let Some((from_hz, to_hz)) = self.rate(old.hz, new.hz, secs) {
+                let what = Element::Publish(new.id);
                 changes.push(Change::Rate {
-                    what: Element::Publish(new.id),
+                    what,
                     from_hz,
                     to_hz,
                 });
             }
         }
+    }
+
+    /// Both rates, if they are known and differ.
+    fn rate(&self, from: Option<f64>, to: Option<f64>, secs: f64) -> Option<(f64, f64)> {
+        let both = from.zip(to);
+        both.filter(|(from, to)| rate_differs(*from, *to, secs, self.threshold))
     }
 
     /// Topics with more than one publisher in this graph.
@@ -178,12 +189,26 @@ fn ids<'s, T>(
     list.iter().map(element)
 }
 
-/// Whether a rate changed: by more than the share `threshold` of what it was, and by more than the one message that
-/// two windows of the same steady topic may differ by, so that a topic slower than the period does not flicker.
-fn rate_differs(from: f64, to: f64, secs: (f64, f64), threshold: f64) -> bool {
+/// Messages in the busier of two windows from which on a rate means something.
+const FEW: f64 = 3.5;
+
+/// A gap this many times the median period long makes a topic one that speaks when it has something to say.
+const UNSTEADY: f64 = 4.0;
+
+/// Whether a rate changed: by more than the share `threshold` of what it was, by more than the one message that two
+/// windows of the same steady topic may differ by, and not on a topic too slow for windows of `secs` seconds.
+fn rate_differs(from: f64, to: f64, secs: f64, threshold: f64) -> bool {
     let by = (to - from).abs();
-    let messages = by * secs.0.min(secs.1);
-    by > threshold * from && messages > 1.5
+    by > threshold * from && by * secs > 1.5 && from.max(to) * secs > FEW
+}
+
+/// Whether a topic sends at a rate at all: not latched, and in even steps as far as is known.
+fn is_steady(topic: &TopicState) -> bool {
+    let even = match (topic.median_period_s, topic.max_gap_s) {
+        (Some(median), Some(gap)) => gap <= UNSTEADY * median,
+        _ => true,
+    };
+    even && topic.state != State::Latched
 }
 
 fn lifecycles(diff: &Diff, changes: &mut Vec<Change>) {
@@ -208,17 +233,20 @@ mod tests {
 
     #[test]
     fn a_rate_must_change_by_the_share_and_by_more_than_one_message() {
-        let ten = (10.0, 10.0);
-        assert!(rate_differs(15.0, 7.4, ten, 0.25));
-        assert!(!rate_differs(15.0, 12.0, ten, 0.25));
+        assert!(rate_differs(15.0, 7.4, 10.0, 0.25));
+        assert!(!rate_differs(15.0, 12.0, 10.0, 0.25));
         assert!(
-            !rate_differs(0.1, 0.0, ten, 0.25),
+            !rate_differs(0.1, 0.0, 10.0, 0.25),
             "one message of a slow topic"
         );
         assert!(
-            !rate_differs(1.0, 2.0, (10.0, 1.0), 0.25),
+            !rate_differs(0.3, 0.1, 10.0, 0.25),
+            "a topic too slow for the window"
+        );
+        assert!(
+            !rate_differs(1.0, 2.0, 1.0, 0.25),
             "one message more in a short last window"
         );
-        assert!(rate_differs(0.0, 1.0, ten, 0.25));
+        assert!(rate_differs(0.0, 1.0, 10.0, 0.25));
     }
 }
