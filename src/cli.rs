@@ -25,6 +25,9 @@ const FAILED: u8 = 1;
 const USAGE: u8 = 2;
 const SKIPPED: u8 = 3;
 
+/// How many parts of a mission `info` shows the activity of.
+const PARTS: u32 = 32;
+
 /// Runs the command line `args`, the program's name first, and answers its exit code: 0 done, 1 failed, 2 usage,
 /// 3 done but data was skipped.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
@@ -129,7 +132,11 @@ fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
 }
 
 fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let reading = reading(&args.inputs, &TimeArgs::default(), &args.graph);
+    let time = TimeArgs {
+        period: Some(Length::Parts(PARTS)),
+        ..TimeArgs::default()
+    };
+    let reading = reading(&args.inputs, &time, &args.graph);
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
         && is_survey(input)
     {
