@@ -13,11 +13,14 @@ mod cast;
 mod cluster;
 mod collapse;
 mod filter;
+mod filtered;
 mod frames;
 mod group;
 mod names;
+mod news;
 mod notes;
 mod options;
+mod present;
 mod select;
 mod tally;
 #[cfg(test)]
@@ -26,6 +29,7 @@ pub(crate) mod testing;
 pub use caption::hertz;
 pub use collapse::Candidate;
 pub use filter::NameFilter;
+pub use filtered::filtered;
 pub use names::is_recorder;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 

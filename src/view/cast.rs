@@ -37,8 +37,10 @@ pub(super) struct Cast {
     pub(super) subscribe: Vec<Place>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
     pub(super) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
-    /// The topic of each subscription.
-    pub(super) subscribed: Vec<TopicId>,
+    /// Node and topic of each publication.
+    pub(super) published: Vec<(NodeId, TopicId)>,
+    /// Node and topic of each subscription.
+    pub(super) subscribed: Vec<(NodeId, TopicId)>,
     /// Per publication, and per topic with publications, the arrows that carry it from its node.
     pub(super) carriers: BTreeMap<Element, Vec<u32>>,
     /// Arrows from node to node that were too many.
@@ -68,9 +70,11 @@ impl Cast {
             }
         }
         finish(&mut selection, elements, options, &grouped);
+        let pair = |edge: &Edge| (edge.node, edge.topic);
         let mut cast = Self {
             selection,
-            subscribed: elements.subscribes.iter().map(|e| e.topic).collect(),
+            published: elements.publishes.iter().map(pair).collect(),
+            subscribed: elements.subscribes.iter().map(pair).collect(),
             ..Self::default()
         };
         cast.set_items(elements, options, &groups);

@@ -105,3 +105,54 @@ impl View {
         all.into_iter().map(|(_, candidate)| candidate).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::outline;
+    use crate::view::testing::evolution;
+
+    fn options(collapse: &[&str], expand: &[&str]) -> ViewOptions {
+        let names = |names: &[&str]| names.iter().map(|n| Arc::from(*n)).collect();
+        ViewOptions {
+            collapse: names(collapse),
+            expand: names(expand),
+            ..ViewOptions::default()
+        }
+    }
+
+    #[test]
+    fn the_outermost_collapsed_namespace_wins_below_the_innermost_open_one() {
+        let options = options(&["/a", "/a/b/c"], &["/a/b"]);
+        let collapse = Collapse::new(&options);
+        assert_eq!(collapse.of("/a/x"), Some("/a"));
+        assert_eq!(collapse.of("/a"), Some("/a"));
+        assert_eq!(collapse.of("/a/b/x"), None);
+        assert_eq!(collapse.of("/a/b/c/x/y"), Some("/a/b/c"));
+        assert_eq!(collapse.of("/ab"), None);
+    }
+
+    #[test]
+    fn topics_without_known_nodes_go_inside_by_their_name() {
+        let evolution = evolution(&["=/n/t =/t /m>/n/u /n/a>/w"]);
+        let view = outline(&evolution, &options(&["/n"], &[]));
+        let names: Vec<&str> = view.items.iter().map(|i| i.name.as_ref()).collect();
+        assert_eq!(names, ["/m", "/n/u", "/t", "/w", "/n"]);
+    }
+
+    #[test]
+    fn innermost_namespaces_are_collapsed_first_and_the_largest_of_them() {
+        let evolution = evolution(&["/a/b/x>/a/b/t /a/y /a/c/x>/a/c/t /a/c/u>/t /d/x /e>/e/t"]);
+        let candidates = |options: &ViewOptions| -> Vec<String> {
+            let all = outline(&evolution, options).collapsible(options);
+            all.iter()
+                .map(|c| format!("{} {}", c.name, c.items))
+                .collect()
+        };
+        assert_eq!(
+            candidates(&options(&[], &[])),
+            ["/a/c 3", "/a/b 2", "/e 2", "/a 6"]
+        );
+        assert_eq!(candidates(&options(&["/a/c"], &["/e"])), ["/a/b 2", "/a 4"]);
+    }
+}

@@ -67,7 +67,7 @@ fn words(reason: Reason) -> (&'static str, &'static str) {
             "widen the filter to see them",
         ),
         Reason::Orphan => (
-            "topics whose nodes `--ns-filter` left out",
+            "topics without a node inside `--ns-filter`",
             "widen the filter to see them",
         ),
         Reason::Leaf => (
@@ -105,5 +105,51 @@ fn shortened(name: &str) -> String {
     match name.char_indices().nth(60) {
         None => name.to_owned(),
         Some((end, _)) => format!("{}…", name.get(..end).unwrap_or_default()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::view::testing::evolution;
+    use crate::view::{Hide, NameFilter, ViewOptions, view};
+
+    /// What is told, as `count text`.
+    fn told(window: &str, options: &ViewOptions) -> Vec<String> {
+        let (_, notices) = view(&evolution(&[window]), options);
+        notices
+            .iter()
+            .map(|n| format!("{} {}", n.count, n.text))
+            .collect()
+    }
+
+    #[test]
+    fn nothing_is_hidden_without_a_word() {
+        let window = "/a>/clock /a>/rosout /record_7</t /a>/t /b/x</t";
+        assert_eq!(
+            told(window, &ViewOptions::default()),
+            [
+                "2 housekeeping left out (/clock, /rosout): `--hide none` shows it",
+                "1 recorder and player left out (/record_7): `--show-recorder` shows them",
+            ]
+        );
+        let all = ViewOptions {
+            hide: Hide::NONE,
+            ..ViewOptions::default()
+        };
+        assert!(told(window, &all).is_empty());
+        let narrow = ViewOptions {
+            hide: Hide::NONE,
+            ns_filter: NameFilter::parse("/b/.*").unwrap(),
+            collapse: vec!["/b".into()],
+            ..ViewOptions::default()
+        };
+        assert_eq!(
+            told(window, &narrow),
+            [
+                "1 namespace `/b` collapsed to one box: `--expand /b` opens it",
+                "2 nodes outside `--ns-filter` left out (/a, /record_7): widen the filter to see them",
+                "2 topics without a node inside `--ns-filter` left out (/clock, /rosout): widen the filter to see them",
+            ]
+        );
     }
 }

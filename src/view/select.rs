@@ -151,3 +151,66 @@ impl Selection {
         self.nodes.iter().map(by_filter).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::testing::evolution;
+    use crate::view::{Hide, NameFilter, outline};
+
+    /// The names of the boxes that are left.
+    fn left(window: &str, options: &ViewOptions) -> String {
+        let view = outline(&evolution(&[window]), options);
+        let names: Vec<&str> = view.items.iter().map(|i| i.name.as_ref()).collect();
+        names.join(" ")
+    }
+
+    fn hiding(list: &str) -> ViewOptions {
+        ViewOptions {
+            hide: Hide::parse(list).unwrap(),
+            ..ViewOptions::default()
+        }
+    }
+
+    const GRAPH: &str = "/a>/dead /c>/dead /a>/leaf /b</alone /a>/t /b</t =/unknown";
+
+    #[test]
+    fn dead_topics_have_no_subscriber_and_leaves_less_than_two_ends() {
+        assert_eq!(
+            left(GRAPH, &hiding("none")),
+            "/a /b /c /alone /dead /leaf /t /unknown"
+        );
+        assert_eq!(left(GRAPH, &hiding("dead")), "/a /b /c /alone /t");
+        assert_eq!(left(GRAPH, &hiding("leaf")), "/a /b /c /dead /t");
+        assert_eq!(left(GRAPH, &hiding("dead,leaf")), "/a /b /c /t");
+    }
+
+    #[test]
+    fn topics_go_with_the_last_of_their_nodes_unless_they_never_had_one() {
+        let ns_filter = NameFilter::parse("/b").unwrap();
+        let options = ViewOptions {
+            ns_filter,
+            ..hiding("none")
+        };
+        assert_eq!(left(GRAPH, &options), "/b /alone /t /unknown");
+    }
+
+    #[test]
+    fn debug_spares_groups_and_the_topics_between_nodes() {
+        let graph = "/a>/tf /b</tf /rviz</tf /a>/rviz/x /b</rviz/x /rqt>/y /b</y";
+        assert_eq!(left(graph, &hiding("debug")), "/a /b /y /tf");
+        let nodes = ViewOptions {
+            mode: Mode::Nodes,
+            ..hiding("debug")
+        };
+        let view = outline(&evolution(&[graph]), &nodes);
+        assert_eq!((view.items.len(), view.arrows.len()), (2, 2));
+    }
+
+    #[test]
+    fn a_hidden_recorder_does_not_keep_dead_topics_alive() {
+        let graph = "/a>/t /record_1</t";
+        assert_eq!(left(graph, &hiding("quiet,dead")), "/a");
+        assert_eq!(left(graph, &hiding("dead")), "/a /record_1 /t");
+    }
+}

@@ -230,3 +230,34 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
 fn count(hz: Option<f64>) -> Option<u64> {
     hz.map(|hz| hz.round() as u64)
 }
+
+/// Each window of a mission as the text that [`evolution`] reads, without rates.
+pub(crate) fn text(evolution: &Evolution) -> Vec<String> {
+    let all = &evolution.elements;
+    let ends = |edge: &Edge| {
+        let node = all.nodes[edge.node as usize].name.to_string();
+        (node, all.topics[edge.topic as usize].name.to_string())
+    };
+    let windows = evolution.windows.iter().map(|window| {
+        let graph = &window.graph;
+        let nodes = graph
+            .nodes
+            .iter()
+            .map(|n| all.nodes[n.id as usize].name.to_string());
+        let topics = graph
+            .topics
+            .iter()
+            .map(|t| format!("={}", all.topics[t.id as usize].name));
+        let publishes = graph.publishes.iter().map(|e| {
+            let (node, topic) = ends(&all.publishes[e.id as usize]);
+            format!("{node}>{topic}")
+        });
+        let subscribes = graph.subscribes.iter().map(|e| {
+            let (node, topic) = ends(&all.subscribes[e.id as usize]);
+            format!("{node}<{topic}")
+        });
+        let words = nodes.chain(topics).chain(publishes).chain(subscribes);
+        words.collect::<Vec<_>>().join(" ")
+    });
+    windows.collect()
+}

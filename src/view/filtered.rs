@@ -1,0 +1,221 @@
+//! The viewed part of a mission as a mission of its own, for `--filtered`.
+
+use super::cast::Cast;
+use super::present::{shows_node, shows_topic};
+use super::{Mode, ViewOptions};
+use crate::diff::Change;
+use crate::evolution::{Evolution, Window};
+use crate::graph::{Edge, EdgeState, Element, Elements, Graph};
+
+/// The evolution without what the view leaves out. Topics in groups and what is inside collapsed namespaces are seen,
+/// so they stay, under their own names; so do changes, as they were found in the whole graph.
+pub fn filtered(evolution: &Evolution, options: &ViewOptions) -> Evolution {
+    let cast = Cast::new(&evolution.elements, options);
+    let keep = Keep::new(&evolution.elements, options, &cast);
+    let windows = evolution.windows.iter();
+    Evolution {
+        elements: keep.elements(&evolution.elements),
+        windows: windows.map(|w| keep.window(w, options, &cast)).collect(),
+        ..evolution.clone()
+    }
+}
+
+/// Per element its new id, if it stays.
+struct Keep {
+    nodes: Vec<Option<u32>>,
+    topics: Vec<Option<u32>>,
+    publishes: Vec<Option<u32>>,
+    subscribes: Vec<Option<u32>>,
+}
+
+impl Keep {
+    fn new(elements: &Elements, options: &ViewOptions, cast: &Cast) -> Self {
+        let nodes = numbered(cast.node.iter().map(Option::is_some));
+        let topics = (0..).zip(&cast.topic).map(|(id, item)| match options.mode {
+            Mode::Nodes => cast.carriers.contains_key(&Element::Topic(id)),
+            _ => item.is_some(),
+        });
+        let topics = numbered(topics);
+        let stays =
+            |e: &Edge| new_id(&nodes, e.node).is_some() && new_id(&topics, e.topic).is_some();
+        Self {
+            publishes: numbered(elements.publishes.iter().map(stays)),
+            subscribes: numbered(elements.subscribes.iter().map(stays)),
+            nodes,
+            topics,
+        }
+    }
+
+    fn elements(&self, all: &Elements) -> Elements {
+        let edge = |edge: &Edge| {
+            let node = new_id(&self.nodes, edge.node)?;
+            let topic = new_id(&self.topics, edge.topic)?;
+            Some(Edge {
+                node,
+                topic,
+                ..edge.clone()
+            })
+        };
+        Elements {
+            nodes: kept(&all.nodes, &self.nodes),
+            topics: kept(&all.topics, &self.topics),
+            publishes: all.publishes.iter().filter_map(edge).collect(),
+            subscribes: all.subscribes.iter().filter_map(edge).collect(),
+        }
+    }
+
+    fn window(&self, window: &Window, options: &ViewOptions, cast: &Cast) -> Window {
+        Window {
+            graph: self.graph(&window.graph, options, cast),
+            changes: window
+                .changes
+                .iter()
+                .filter_map(|c| self.change(c))
+                .collect(),
+            ..window.clone()
+        }
+    }
+
+    fn graph(&self, graph: &Graph, options: &ViewOptions, cast: &Cast) -> Graph {
+        let nodes = graph.nodes.iter().filter(|n| shows_node(n.state, options));
+        let topics = graph
+            .topics
+            .iter()
+            .filter(|t| shows_topic(t.state, options));
+        let mut nodes: Vec<_> = nodes.cloned().collect();
+        let mut topics: Vec<_> = topics.cloned().collect();
+        nodes.retain_mut(|n| moved(&mut n.id, &self.nodes));
+        topics.retain_mut(|t| moved(&mut t.id, &self.topics));
+        let there = |node: Option<u32>, topic: Option<u32>| {
+            node.is_some_and(|id| nodes.binary_search_by_key(&id, |n| n.id).is_ok())
+                && topic.is_some_and(|id| topics.binary_search_by_key(&id, |t| t.id).is_ok())
+        };
+        let edges = |states: &[EdgeState], ids: &[Option<u32>], ends: &[(u32, u32)]| {
+            let mut states: Vec<EdgeState> = states.to_vec();
+            states.retain_mut(|s| {
+                let (node, topic) = ends
+                    .get(s.id as usize)
+                    .copied()
+                    .unwrap_or((u32::MAX, u32::MAX));
+                let ends = (new_id(&self.nodes, node), new_id(&self.topics, topic));
+                there(ends.0, ends.1) && moved(&mut s.id, ids)
+            });
+            states
+        };
+        let mut publishes = edges(&graph.publishes, &self.publishes, &cast.published);
+        publishes.retain(|p| shows_topic(p.state, options));
+        let subscribes = edges(&graph.subscribes, &self.subscribes, &cast.subscribed);
+        Graph {
+            publishes,
+            subscribes,
+            nodes,
+            topics,
+        }
+    }
+
+    fn change(&self, change: &Change) -> Option<Change> {
+        let mut change = change.clone();
+        let all = |ids: &[u32]| {
+            ids.iter()
+                .filter_map(|id| new_id(&self.nodes, *id))
+                .collect()
+        };
+        match &mut change {
+            Change::Added { what, .. }
+            | Change::Removed { what, .. }
+            | Change::Rate { what, .. }
+            | Change::Value { what, .. } => *what = self.element(*what)?,
+            Change::HandedOver { topic, from, to } => {
+                *topic = new_id(&self.topics, *topic)?;
+                (*from, *to) = (all(from), all(to));
+            }
+            Change::Restarted { node, .. } => *node = new_id(&self.nodes, *node)?,
+        }
+        Some(change)
+    }
+
+    fn element(&self, element: Element) -> Option<Element> {
+        Some(match element {
+            Element::Node(id) => Element::Node(new_id(&self.nodes, id)?),
+            Element::Topic(id) => Element::Topic(new_id(&self.topics, id)?),
+            Element::Publish(id) => Element::Publish(new_id(&self.publishes, id)?),
+            Element::Subscribe(id) => Element::Subscribe(new_id(&self.subscribes, id)?),
+        })
+    }
+}
+
+/// New ids, in the old order, for what stays.
+fn numbered(stays: impl Iterator<Item = bool>) -> Vec<Option<u32>> {
+    let mut next = 0;
+    let number = |stays: bool| {
+        stays.then(|| {
+            next += 1;
+            next - 1
+        })
+    };
+    stays.map(number).collect()
+}
+
+fn new_id(ids: &[Option<u32>], id: u32) -> Option<u32> {
+    ids.get(id as usize).copied().flatten()
+}
+
+/// Gives a state its new id; false if its element does not stay.
+fn moved(id: &mut u32, ids: &[Option<u32>]) -> bool {
+    let new = new_id(ids, *id);
+    *id = new.unwrap_or(*id);
+    new.is_some()
+}
+
+fn kept<T: Clone>(all: &[T], ids: &[Option<u32>]) -> Vec<T> {
+    let kept = all.iter().zip(ids).filter(|(_, id)| id.is_some());
+    kept.map(|(one, _)| one.clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::testing::{evolution, text};
+    use crate::view::{Hide, NameFilter};
+
+    #[test]
+    fn what_is_left_out_is_gone_with_its_edges_and_changes() {
+        let all = evolution(&["/a>/t@1 /b</t", "/a>/t@1 /a>/clock@9 /c</t /b</t"]);
+        let view = filtered(&all, &ViewOptions::default());
+        assert_eq!(
+            text(&view),
+            ["/a /b =/t /a>/t /b</t", "/a /b /c =/t /a>/t /b</t /c</t"]
+        );
+        assert_eq!(view.windows[1].changes.len(), 2);
+        let ns_filter = NameFilter::parse("-/b").unwrap();
+        let view = filtered(
+            &all,
+            &ViewOptions {
+                ns_filter,
+                hide: Hide::NONE,
+                ..ViewOptions::default()
+            },
+        );
+        assert_eq!(text(&view)[1], "/a /c =/clock =/t /a>/clock /a>/t /c</t");
+    }
+
+    #[test]
+    fn active_leaves_out_what_carries_no_message() {
+        let all = evolution(&["/a>/t~ /b</t~ /c>/u"]);
+        let options = ViewOptions {
+            mode: Mode::Active,
+            ..ViewOptions::default()
+        };
+        assert_eq!(text(&filtered(&all, &options)), ["/a /b /c =/u /c>/u"]);
+    }
+
+    #[test]
+    fn nodes_only_keeps_the_topics_between_nodes() {
+        let all = evolution(&["/a>/t /b</t /a>/lonely"]);
+        let options = ViewOptions {
+            mode: Mode::Nodes,
+            ..ViewOptions::default()
+        };
+        assert_eq!(text(&filtered(&all, &options)), ["/a /b =/t /a>/t /b</t"]);
+    }
+}
