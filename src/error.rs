@@ -71,6 +71,8 @@ pub enum Error {
         /// What to do.
         hint: String,
     },
+    /// The user broke off. Exit code 130.
+    Interrupted,
     /// Something could not be drawn or written.
     Output {
         /// The file that was to be written, or what was to be made.
@@ -108,6 +110,7 @@ impl Error {
     pub fn hint(&self) -> String {
         match self {
             Self::Io { source, .. } => io_hint(source).to_owned(),
+            Self::Interrupted => String::new(),
             Self::UnknownBag { hint, .. }
             | Self::Malformed { hint, .. }
             | Self::Unsupported { hint, .. }
@@ -165,6 +168,7 @@ impl fmt::Display for Error {
                 _ => write!(f, "`{}` line {line}: {reason}", path.display()),
             },
             Self::Usage { what, .. } => f.write_str(what),
+            Self::Interrupted => f.write_str("interrupted; unfinished outputs were removed"),
             Self::Output { path, reason, .. } => {
                 write!(f, "cannot write `{}`: {reason}", path.display())
             }

@@ -1,6 +1,7 @@
 //! One palette for a whole sequence: few enough colours for GIF, so well chosen that no frame shows it.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// A colour: red, green, blue.
 pub type Rgb = [u8; 3];
@@ -22,6 +23,15 @@ impl Census {
         for (colour, length) in runs(rgba) {
             *self.0.entry(colour).or_default() += length;
         }
+    }
+
+    /// Both counts together.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
+        for (colour, count) in other.0.into_iter().collect::<Vec<_>>() {
+            *self.0.entry(colour).or_default() += count;
+        }
+        self
     }
 
     /// At most `most` (2..=256) colours: exactly those counted if they are so few, otherwise the most frequent ones
@@ -90,8 +100,9 @@ fn runs(rgba: &[u8]) -> impl Iterator<Item = (Rgb, u64)> + '_ {
 #[derive(Clone, Debug)]
 pub struct Palette {
     colours: Vec<Rgb>,
-    /// For every cell of the colour cube, the places of all colours that can be nearest to something in it.
-    cells: Vec<Vec<u8>>,
+    /// For every cell of the colour cube, once it is asked for, the places of all colours that can be nearest to
+    /// something in it.
+    cells: Vec<OnceLock<Vec<u8>>>,
 }
 
 impl Palette {
@@ -101,11 +112,8 @@ impl Palette {
         if colours.is_empty() {
             colours.push([0; 3]);
         }
-        let cells = (0..1_u32 << (3 * BITS)).map(|cell| candidates(&colours, cell));
-        Self {
-            cells: cells.collect(),
-            colours,
-        }
+        let cells = vec![OnceLock::new(); 1 << (3 * BITS)];
+        Self { colours, cells }
     }
 
     /// The colours by their place.
@@ -132,18 +140,23 @@ impl Palette {
 
     fn nearest(&self, colour: Rgb) -> u8 {
         let [r, g, b] = colour.map(|c| usize::from(c >> (8 - BITS)));
-        let cell = &self.cells[(r << (2 * BITS)) | (g << BITS) | b];
+        let cell = (r << (2 * BITS)) | (g << BITS) | b;
+        let near = self.cells[cell].get_or_init(|| candidates(&self.colours, cell));
         let by_distance = |i: &&u8| distance(self.colours[usize::from(**i)], colour);
-        cell.iter().min_by_key(by_distance).copied().unwrap_or(0)
+        near.iter().min_by_key(by_distance).copied().unwrap_or(0)
     }
 }
 
 /// The places of the colours that can be nearest to a point of the cell: those that begin closer than the colour
 /// that is surely closest ends.
-fn candidates(colours: &[Rgb], cell: u32) -> Vec<u8> {
+fn candidates(colours: &[Rgb], cell: usize) -> Vec<u8> {
     let side = 1_i32 << (8 - BITS);
-    #[expect(clippy::cast_possible_wrap, reason = "BITS bits of a cell number")]
-    let low = |channel: u32| ((cell >> (BITS * (2 - channel))) & ((1 << BITS) - 1)) as i32 * side;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "BITS bits of a cell number"
+    )]
+    let low = |channel: u32| (cell >> (BITS * (2 - channel))) as i32 % (1 << BITS) * side;
     let lows = [low(0), low(1), low(2)];
     // Squared distances from the colour to the cell's closest and farthest point.
     let reach = |colour: &Rgb| {

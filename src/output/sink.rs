@@ -12,7 +12,10 @@ use crate::error::{Error, Result};
 /// A file (or standard output) being written. Dropped without [`Sink::commit`], a file leaves no trace.
 #[derive(Debug)]
 pub struct Sink {
+    /// As it was asked for.
     path: PathBuf,
+    /// What is replaced: for a symbolic link, what it points to.
+    place: PathBuf,
     to: BufWriter<Way>,
     written: u64,
     limit: u64,
@@ -48,20 +51,20 @@ impl Sink {
             }
             Target::Path(path) => hidden(folder_of(path)),
         };
-        let path = match target {
-            // What a symbolic link points to is replaced, not the link.
+        let place = match target {
             Target::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
             Target::Stdout => "-".into(),
         };
         Ok(Self {
-            to: BufWriter::with_capacity(1 << 16, way.map_err(Error::io("write", &path))?),
-            path,
+            to: BufWriter::with_capacity(1 << 16, way.map_err(Error::io("write", target.path()))?),
+            path: target.path().to_owned(),
+            place,
             written: 0,
             limit: limit.unwrap_or(u64::MAX),
         })
     }
 
-    /// The final path, for messages; `-` for standard output.
+    /// The path as it was asked for, for messages; `-` for standard output.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -93,12 +96,16 @@ impl Sink {
     pub fn commit(mut self) -> Result<u64> {
         self.to.flush().map_err(self.error())?;
         let Self {
-            path, to, written, ..
+            path,
+            place,
+            to,
+            written,
+            ..
         } = self;
         let (way, _) = to.into_parts();
         // A child process may have written more than went through our hands.
         let size = way.size().unwrap_or(written);
-        publish(way, &path).map_err(Error::io("write", &path))?;
+        publish(way, &place).map_err(Error::io("write", &path))?;
         Ok(size)
     }
 }

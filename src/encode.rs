@@ -1,0 +1,220 @@
+//! Every output format behind one trait. Adding a format is one file below `encode/` and one row in [`FORMATS`].
+
+mod apng;
+mod csv;
+mod gif;
+mod json;
+mod png;
+mod svg;
+
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::film::{Film, Shot};
+use crate::output::Target;
+use crate::palette::Palette;
+use crate::pixels::Pixels;
+use crate::scene::Scene;
+
+/// What an encoder wants of every frame; each includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Needs {
+    /// No frames at all: it writes from the film when that is over.
+    Nothing,
+    /// The drawing.
+    Scene,
+    /// The drawing as pixels.
+    Pixels,
+    /// The pixels as places in the film's one palette.
+    Indices,
+}
+
+/// One frame as all encoders of its size share it.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    /// The index of its window.
+    pub index: usize,
+    /// What it shows and for how long.
+    pub shot: Shot,
+    /// The drawing.
+    pub scene: &'a Scene,
+    /// The drawing as pixels; empty unless somebody needs them.
+    pub pixels: &'a Pixels,
+    /// The palette of the whole film, 255 colours at most; one black unless somebody needs indices.
+    pub palette: &'a Palette,
+    /// The place in the palette of every pixel; empty unless somebody needs them.
+    pub indices: &'a [u8],
+}
+
+/// What was written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// The file as it was asked for; `-` for standard output, `{n}` for a file per window.
+    pub path: PathBuf,
+    /// How many files.
+    pub files: usize,
+    /// Their bytes in all.
+    pub bytes: u64,
+    /// What the user should know, such as what was given up to stay small; lower case, no period.
+    pub remarks: Vec<String>,
+}
+
+impl Written {
+    /// Nothing yet.
+    fn to(target: &Target) -> Self {
+        Self {
+            path: target.path().to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// One more file.
+    fn add(&mut self, bytes: u64) {
+        self.files += 1;
+        self.bytes += bytes;
+    }
+}
+
+/// A format at work on one output. What it has not finished leaves no trace when it is dropped.
+pub trait Encoder: Send {
+    /// What it wants of every frame.
+    fn needs(&self) -> Needs;
+
+    /// Whether it plays: then it is given the staged frames too, not only the windows.
+    fn plays(&self) -> bool {
+        false
+    }
+
+    /// Takes the next frame. All frames have one size.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the output's path where it cannot be written.
+    fn frame(&mut self, frame: &Frame<'_>) -> Result<()>;
+
+    /// Ends the output and gives it its final name.
+    ///
+    /// # Errors
+    /// As [`Encoder::frame`].
+    fn finish(self: Box<Self>) -> Result<Written>;
+}
+
+/// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
+pub type Start = for<'a> fn(&'a Film<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
+
+/// An output format.
+#[derive(Debug)]
+pub struct Format {
+    /// Its extension and its word for `--format`.
+    pub word: &'static str,
+    /// What it is, for `--help` and the README.
+    pub what: &'static str,
+    /// Whether `--max-bytes` binds it.
+    pub is_limited: bool,
+    /// How an output begins.
+    pub start: Start,
+}
+
+/// All formats.
+pub const FORMATS: &[Format] = &[
+    Format {
+        word: "gif",
+        what: "the animation",
+        is_limited: true,
+        start: gif::start,
+    },
+    Format {
+        word: "apng",
+        what: "the animation, lossless for all but antialiasing",
+        is_limited: true,
+        start: apng::start,
+    },
+    Format {
+        word: "svg",
+        what: "a drawing per window with `{n}`",
+        is_limited: false,
+        start: svg::start,
+    },
+    Format {
+        word: "png",
+        what: "an image per window with `{n}`",
+        is_limited: false,
+        start: png::start_png,
+    },
+    Format {
+        word: "webp",
+        what: "an image per window with `{n}`",
+        is_limited: false,
+        start: png::start_webp,
+    },
+    Format {
+        word: "json",
+        what: "the evolution as data, which can be read again",
+        is_limited: false,
+        start: json::start,
+    },
+    Format {
+        word: "csv",
+        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
+        is_limited: false,
+        start: csv::start,
+    },
+];
+
+/// One output: what and where.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// What.
+    pub format: &'static Format,
+    /// Where.
+    pub target: Target,
+}
+
+impl Output {
+    /// Reads an output as the user writes it: `a.gif`, `f/{n}.svg`, `-`. The format is `word` if given, else the
+    /// name's extension.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a format that does not exist, and for standard output without a format.
+    pub fn parse(text: &str, word: Option<&str>) -> Result<Self> {
+        let target = Target::parse(text);
+        let word = word.map(str::to_lowercase).or_else(|| target.extension());
+        let all: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
+        let all = all.join(", ");
+        let Some(word) = word else {
+            let what = format!("`{text}` does not say its format");
+            return Err(Error::usage(what, format!("say it with `--format`: {all}")));
+        };
+        match FORMATS.iter().find(|f| f.word == word) {
+            Some(format) => Ok(Self { format, target }),
+            None => Err(Error::usage(
+                format!("unknown format `{word}`"),
+                format!("formats: {all}"),
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn word_of(text: &str, word: Option<&str>) -> Option<&'static str> {
+        Output::parse(text, word).ok().map(|o| o.format.word)
+    }
+
+    #[test]
+    fn the_name_or_the_user_says_the_format() {
+        assert_eq!(word_of("out/a.gif", None), Some("gif"));
+        assert_eq!(word_of("A.GIF", None), Some("gif"));
+        assert_eq!(word_of("-", Some("json")), Some("json"));
+        assert_eq!(word_of("a.dat", Some("svg")), Some("svg"));
+        assert_eq!(word_of("-", None), None);
+    }
+
+    #[test]
+    fn an_unknown_format_is_told_with_the_known_ones() {
+        let error = Output::parse("a.gfi", None).unwrap_err();
+        assert_eq!(error.to_string(), "unknown format `gfi`");
+        assert!(error.hint().contains("gif, apng, svg, png"));
+    }
+}

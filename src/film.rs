@@ -1,0 +1,216 @@
+//! The sequence as it is shown: which window when and for how long, and what draws it.
+
+use crate::evolution::Evolution;
+use crate::pixels::Painter;
+use crate::scene::Scene;
+use crate::view::View;
+
+/// How the sequence runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// How long a window is shown, in milliseconds, 20...
+    pub frame_ms: u32,
+    /// How many staged frames lead into a window in which something changed, 0...
+    pub tween: u32,
+    /// How many times longer such a window is shown, 1...
+    pub hold_changes: u32,
+    /// Every how many windows one is shown, 1..; windows with a change in any case.
+    pub every: usize,
+    /// Whether windows without a change are left out altogether.
+    pub changes_only: bool,
+    /// Pixels of an image per pixel of the picture, above 0.
+    pub scale: f64,
+    /// The most bytes that an animation may have.
+    pub max_bytes: Option<u64>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            frame_ms: 1000,
+            tween: 0,
+            hold_changes: 1,
+            every: 1,
+            changes_only: false,
+            scale: 1.0,
+            max_bytes: None,
+        }
+    }
+}
+
+/// What draws windows.
+pub trait Stage: Sync {
+    /// The drawing of a window, a place in [`View::frames`]; all drawings have one size. `phase` is how far the change
+    /// into it has come: 1 is the window itself.
+    fn scene(&self, window: usize, phase: f64) -> Scene;
+}
+
+/// A mission ready to be shown.
+#[derive(Clone)]
+pub struct Film<'a> {
+    /// The whole sequence.
+    pub evolution: &'a Evolution,
+    /// What the picture shows of it.
+    pub view: &'a View,
+    /// What draws a window.
+    pub picture: &'a dyn Stage,
+    /// What turns a drawing into pixels.
+    pub painter: &'a Painter,
+    /// How it runs.
+    pub options: Options,
+}
+
+/// One frame of the sequence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shot {
+    /// The window: a place in [`View::frames`].
+    pub window: usize,
+    /// How far the change into this window has come, above 0 up to 1; 1 is the window itself.
+    pub phase: f64,
+    /// How long it is shown, in milliseconds.
+    pub ms: u32,
+}
+
+impl Shot {
+    /// Whether it shows the window itself and not the way there.
+    pub fn is_settled(&self) -> bool {
+        self.phase >= 1.0
+    }
+}
+
+/// The longest and shortest time of a staged frame in milliseconds.
+const STAGED_MS: (u32, u32) = (20, 100);
+
+impl Film<'_> {
+    /// The frames in order. Time is kept: staged frames take theirs from their window, and a window that is left
+    /// out gives its time to the one before.
+    pub fn shots(&self) -> Vec<Shot> {
+        let changed: Vec<bool> = (0..self.view.frames.len())
+            .map(|k| is_changed(self.view, k))
+            .collect();
+        shots(&changed, &self.options)
+    }
+}
+
+/// Whether window `k` shows a change.
+pub fn is_changed(view: &View, k: usize) -> bool {
+    view.frames.get(k).is_some_and(|frame| {
+        let mut shown = frame.items.iter().chain(&frame.arrows);
+        shown.any(|s| s.mark.is_some()) || !frame.caption.is_empty()
+    })
+}
+
+fn shots(changed: &[bool], options: &Options) -> Vec<Shot> {
+    let (shortest, longest) = STAGED_MS;
+    let mut shots: Vec<Shot> = Vec::with_capacity(changed.len());
+    for (window, &changed) in changed.iter().enumerate() {
+        let hold = if changed { options.hold_changes } else { 1 };
+        let mut ms = options.frame_ms.saturating_mul(hold.max(1));
+        let stays = if options.changes_only {
+            window == 0
+        } else {
+            window % options.every.max(1) == 0
+        };
+        if let (false, false, Some(before)) = (stays, changed, shots.last_mut()) {
+            before.ms = before.ms.saturating_add(ms);
+            continue;
+        }
+        if changed && options.tween > 0 {
+            let each = (ms / 2 / options.tween).clamp(shortest, longest);
+            for step in 1..=options.tween {
+                let phase = f64::from(step) / f64::from(options.tween + 1);
+                shots.push(Shot {
+                    window,
+                    phase,
+                    ms: each,
+                });
+            }
+            ms = ms.saturating_sub(each * options.tween).max(shortest);
+        }
+        shots.push(Shot {
+            window,
+            phase: 1.0,
+            ms,
+        });
+    }
+    shots
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const QUIET_LOUD_QUIET: [bool; 3] = [false, true, false];
+
+    /// Window, phase and milliseconds of every frame.
+    fn plan(changed: &[bool], options: &Options) -> Vec<(usize, f64, u32)> {
+        let told = |s: Shot| (s.window, s.phase, s.ms);
+        shots(changed, options).into_iter().map(told).collect()
+    }
+
+    #[test]
+    fn every_window_is_shown_once() {
+        let expected = [(0, 1.0, 1000), (1, 1.0, 1000), (2, 1.0, 1000)];
+        assert_eq!(plan(&QUIET_LOUD_QUIET, &Options::default()), expected);
+    }
+
+    #[test]
+    fn staged_frames_stand_only_before_changes_and_take_no_extra_time() {
+        let options = Options {
+            tween: 3,
+            ..Options::default()
+        };
+        let expected = [
+            (0, 1.0, 1000),
+            (1, 0.25, 100),
+            (1, 0.5, 100),
+            (1, 0.75, 100),
+            (1, 1.0, 700),
+            (2, 1.0, 1000),
+        ];
+        assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
+    }
+
+    #[test]
+    fn a_change_may_be_held_longer() {
+        let options = Options {
+            hold_changes: 2,
+            ..Options::default()
+        };
+        let expected = [(0, 1.0, 1000), (1, 1.0, 2000), (2, 1.0, 1000)];
+        assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
+    }
+
+    #[test]
+    fn windows_that_are_left_out_give_their_time_away_but_changes_stay() {
+        let options = Options {
+            every: 3,
+            ..Options::default()
+        };
+        let changed = [false, false, true, false, false, false, false];
+        let expected = [
+            (0, 1.0, 2000),
+            (2, 1.0, 1000),
+            (3, 1.0, 3000),
+            (6, 1.0, 1000),
+        ];
+        assert_eq!(plan(&changed, &options), expected);
+        let options = Options {
+            changes_only: true,
+            ..Options::default()
+        };
+        assert_eq!(plan(&changed, &options), [(0, 1.0, 2000), (2, 1.0, 5000)]);
+    }
+
+    #[test]
+    fn a_hurried_film_still_shows_every_frame() {
+        let options = Options {
+            frame_ms: 20,
+            tween: 8,
+            ..Options::default()
+        };
+        let plan = plan(&[false, true], &options);
+        assert!(plan.iter().all(|shot| shot.2 >= 20));
+        assert_eq!(plan.len(), 10);
+    }
+}

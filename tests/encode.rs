@@ -1,0 +1,320 @@
+//! All formats of one run against each other: decoded by libraries of their own, every frame, every pixel.
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use bagreel::encode::{Output, Written};
+use bagreel::error::{Error, Result};
+use bagreel::evolution::Evolution;
+use bagreel::film::{Film, Options, Stage};
+use bagreel::geometry::{Rect, Size};
+use bagreel::pixels::Painter;
+use bagreel::scene::{Form, Group, Scene, Shape};
+use bagreel::style::Style;
+use bagreel::text::Fonts;
+use bagreel::time::{Period, Span, Stamp};
+use bagreel::view::{Frame, Tally, View};
+use bagreel::{graph, notice, reel};
+
+/// A disc that moves through every window, over discs in all colours.
+struct Discs;
+
+impl Stage for Discs {
+    fn scene(&self, window: usize, phase: f64) -> Scene {
+        let style = Style::builtin("light").unwrap();
+        let mut group = Group::named("discs");
+        for (i, color) in style.palette().iter().enumerate() {
+            let place = Rect::new(12.0 * i as f64, 30.0, 40.0, 30.5);
+            group.shape(Shape::filled(Form::Ellipse(place), *color));
+        }
+        let x = 20.0 * (window as f64 + phase);
+        let color = style.palette()[window % style.palette().len()];
+        group.shape(Shape::filled(
+            Form::Ellipse(Rect::new(x, 5.0, 22.0, 17.0)),
+            color,
+        ));
+        Scene {
+            size: Size::new(240.0, 100.0),
+            width_mm: None,
+            background: style.background(),
+            title: String::new(),
+            groups: vec![group],
+        }
+    }
+}
+
+/// Windows of which the odd ones show a change.
+fn mission(windows: usize) -> (Evolution, View) {
+    let second = |i: usize| Stamp(i64::try_from(i).unwrap() * 1_000_000_000);
+    let period = Period::parse("1s").unwrap();
+    let evolution = Evolution {
+        bags: Vec::new(),
+        span: Span {
+            start: second(0),
+            end: second(windows),
+        },
+        messages: 0,
+        period,
+        step: period,
+        elements: graph::Elements::default(),
+        windows: Vec::new(),
+        layout: None,
+        notices: notice::Notices::new(),
+    };
+    let frame = |index: usize| Frame {
+        index,
+        span: Span {
+            start: second(index),
+            end: second(index + 1),
+        },
+        partial: false,
+        messages: 0,
+        items: Vec::new(),
+        arrows: Vec::new(),
+        tally: Tally::default(),
+        caption: (index % 2 == 1)
+            .then(|| "it moved".to_owned())
+            .into_iter()
+            .collect(),
+    };
+    let frames = (0..windows).map(frame).collect();
+    (
+        evolution,
+        View {
+            frames,
+            ..View::default()
+        },
+    )
+}
+
+/// Shows a mission of eight windows to these outputs, all in `folder`.
+fn show(folder: &Path, names: &[&str], options: Options) -> Result<Vec<Written>> {
+    let (evolution, view) = mission(8);
+    let painter = Painter::new(&Fonts::bundled());
+    let film = Film {
+        evolution: &evolution,
+        view: &view,
+        picture: &Discs,
+        painter: &painter,
+        options,
+    };
+    let output = |name: &&str| Output::parse(&folder.join(name).to_string_lossy(), None);
+    let outputs: Vec<Output> = names.iter().map(output).collect::<Result<_>>()?;
+    reel::run(&film, &outputs, &mut |_, _| ControlFlow::Continue(()))
+}
+
+fn png(path: &Path) -> image::RgbImage {
+    image::open(path).unwrap().to_rgb8()
+}
+
+/// The frames of a GIF as a viewer composes them, with their delays in milliseconds.
+fn gif_frames(path: &Path) -> Vec<(u32, image::RgbImage)> {
+    let mut decoder = gif::DecodeOptions::new();
+    decoder.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = decoder.read_info(fs::File::open(path).unwrap()).unwrap();
+    let (width, height) = (u32::from(decoder.width()), u32::from(decoder.height()));
+    let mut canvas = image::RgbImage::new(width, height);
+    let mut frames = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().unwrap() {
+        let (left, top) = (u32::from(frame.left), u32::from(frame.top));
+        for (i, pixel) in (0_u32..).zip(frame.buffer.chunks_exact(4)) {
+            if pixel[3] > 0 {
+                let (x, y) = (i % u32::from(frame.width), i / u32::from(frame.width));
+                canvas.put_pixel(
+                    left + x,
+                    top + y,
+                    image::Rgb([pixel[0], pixel[1], pixel[2]]),
+                );
+            }
+        }
+        frames.push((u32::from(frame.delay) * 10, canvas.clone()));
+    }
+    frames
+}
+
+/// The frames of an APNG as a viewer composes them.
+fn apng_frames(path: &Path) -> Vec<(u32, image::RgbImage)> {
+    let mut decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().unwrap();
+    let (width, height) = reader.info().size();
+    let count = reader.info().animation_control().unwrap().num_frames;
+    let mut canvas = image::RgbImage::new(width, height);
+    let mut frames = Vec::new();
+    for _ in 0..count {
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        let control = *reader.info().frame_control().unwrap();
+        let size = (control.width * control.height) as usize;
+        for (i, pixel) in (0_u32..).zip(pixels.chunks_exact(4).take(size)) {
+            if pixel[3] > 0 {
+                let (x, y) = (i % control.width, i / control.width);
+                let color = image::Rgb([pixel[0], pixel[1], pixel[2]]);
+                canvas.put_pixel(control.x_offset + x, control.y_offset + y, color);
+            }
+        }
+        let ms = u32::from(control.delay_num) * 1000 / u32::from(control.delay_den);
+        frames.push((ms, canvas.clone()));
+    }
+    frames
+}
+
+/// Peak signal to noise ratio in dB, over all channels.
+fn psnr(a: &image::RgbImage, b: &image::RgbImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
+    let sum: f64 = a.as_raw().iter().zip(b.as_raw()).map(square).sum();
+    10.0 * (255.0_f64.powi(2) * a.as_raw().len() as f64 / sum).log10()
+}
+
+/// The names in a folder, sorted.
+fn names(folder: &Path) -> Vec<String> {
+    let name = |e: std::io::Result<fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(name).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn every_animation_shows_what_the_images_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let outputs = ["a.gif", "b.apng", "p{n}.png", "w{n}.webp", "s/{n}.svg"];
+    let written = show(folder.path(), &outputs, Options::default()).unwrap();
+    assert_eq!(
+        written.iter().map(|w| w.files).collect::<Vec<_>>(),
+        [1, 1, 8, 8, 8]
+    );
+    let gif = gif_frames(&folder.path().join("a.gif"));
+    let apng = apng_frames(&folder.path().join("b.apng"));
+    assert_eq!((gif.len(), apng.len()), (8, 8));
+    for k in 0..8 {
+        let still = png(&folder.path().join(format!("p{k}.png")));
+        assert_eq!(still, png(&folder.path().join(format!("w{k}.webp"))));
+        assert!(psnr(&still, &gif[k].1) > 50.0);
+        assert_eq!(gif[k], apng[k]);
+        assert_eq!(gif[k].0, 1000);
+    }
+    let drawings = names(&folder.path().join("s"));
+    assert_eq!(
+        drawings,
+        (0..8).map(|k| format!("{k}.svg")).collect::<Vec<_>>()
+    );
+}
+
+#[test]
+fn two_runs_write_the_same_bytes() {
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let outputs = [
+        "a.gif",
+        "b.apng",
+        "p{n}.png",
+        "w{n}.webp",
+        "s{n}.svg",
+        "d.json",
+        "t.csv",
+    ];
+    for folder in &folders {
+        show(folder.path(), &outputs, Options::default()).unwrap();
+    }
+    let files = names(folders[0].path());
+    assert_eq!(files.len(), 2 + 3 * 8 + 1 + 5);
+    assert_eq!(files, names(folders[1].path()));
+    for file in files {
+        let [a, b] = folders
+            .each_ref()
+            .map(|f| fs::read(f.path().join(&file)).unwrap());
+        assert!(a == b, "{file} differs");
+    }
+}
+
+#[test]
+fn staged_frames_are_played_and_not_kept_as_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = Options {
+        tween: 3,
+        ..Options::default()
+    };
+    let written = show(folder.path(), &["a.gif", "p{n}.png"], options).unwrap();
+    assert_eq!(written[1].files, 8);
+    let gif = gif_frames(&folder.path().join("a.gif"));
+    assert_eq!(gif.len(), 8 + 4 * 3);
+    assert_eq!(gif.iter().map(|f| f.0).sum::<u32>(), 8000);
+}
+
+#[test]
+fn a_limit_in_bytes_is_kept_and_what_was_given_up_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = Options {
+        tween: 3,
+        ..Options::default()
+    };
+    let bytes = show(folder.path(), &["a.gif"], whole.clone()).unwrap()[0].bytes;
+    for part in [10, 9, 4] {
+        let most = bytes * part / 10;
+        let options = Options {
+            max_bytes: Some(most),
+            ..whole.clone()
+        };
+        let written = show(folder.path(), &["a.gif", "d.json"], options).unwrap();
+        assert!(written[0].bytes <= most);
+        assert_eq!(
+            fs::metadata(&written[0].path).unwrap().len(),
+            written[0].bytes
+        );
+        assert_eq!(written[0].remarks.is_empty(), part == 10);
+    }
+    let options = Options {
+        max_bytes: Some(100),
+        ..whole
+    };
+    let error = show(folder.path(), &["c.gif"], options).unwrap_err();
+    assert!(error.to_string().contains("c.gif"), "{error}");
+    assert!(!folder.path().join("c.gif").exists());
+}
+
+#[test]
+fn an_interrupted_run_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let (evolution, view) = mission(100);
+    let painter = Painter::new(&Fonts::bundled());
+    let options = Options::default();
+    let film = Film {
+        evolution: &evolution,
+        view: &view,
+        picture: &Discs,
+        painter: &painter,
+        options,
+    };
+    let output =
+        |name: &str| Output::parse(&folder.path().join(name).to_string_lossy(), None).unwrap();
+    let outputs = [output("a.gif"), output("b.apng"), output("d.json")];
+    let after_some = &mut |done, _| match done {
+        0..10 => ControlFlow::Continue(()),
+        _ => ControlFlow::Break(()),
+    };
+    let result = reel::run(&film, &outputs, after_some);
+    assert!(matches!(result, Err(Error::Interrupted)));
+    assert_eq!(names(folder.path()), Vec::<String>::new());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_ends_the_run_and_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let link: PathBuf = folder.path().join("full.gif");
+    std::os::unix::fs::symlink("/dev/full", &link).unwrap();
+    let error = show(folder.path(), &["a.apng", "full.gif"], Options::default()).unwrap_err();
+    assert!(error.to_string().contains("full.gif"), "{error}");
+    // The other one was whole before.
+    assert_eq!(names(folder.path()), ["a.apng", "full.gif"]);
+}
+
+#[test]
+fn formats_that_hold_all_windows_refuse_a_number() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["{n}.gif", "{n}.apng", "{n}.json", "{n}.csv"] {
+        let result = show(folder.path(), &[name], Options::default());
+        assert!(result.is_err_and(|e| e.is_usage()), "{name}");
+    }
+}
