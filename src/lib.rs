@@ -24,6 +24,7 @@ pub mod name;
 pub mod notice;
 pub mod output;
 pub mod palette;
+pub mod picture;
 pub mod pipeline;
 pub mod pixels;
 mod proof;

@@ -1,0 +1,231 @@
+//! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
+
+use super::draft::{LINE, Label, Space, second_line};
+use super::look::{self, BoxLook};
+use super::page::Fit;
+use super::{badge, words};
+use crate::geometry::{Point, Rect};
+use crate::graph::State;
+use crate::scene::{Anchor, Form, Group, Shape, Stroke, Text};
+use crate::style::{Body, Style};
+use crate::text::Weight;
+use crate::view::{Item, ItemKind, Mark, Shown};
+
+/// What boxes are drawn with.
+pub(super) struct Boxes<'a> {
+    pub(super) style: &'a Style,
+    pub(super) fit: Fit,
+}
+
+impl Boxes<'_> {
+    /// The box around a namespace.
+    pub(super) fn space(&self, space: &Space, place: Rect, id: &str) -> Group {
+        let style = &self.style.cluster;
+        let scale = self.fit.scale;
+        let place = self.fit.rect(place);
+        let mut group = Group {
+            id: format!("s{id}"),
+            class: "namespace".to_owned(),
+            data: vec![("name", space.name.clone())],
+            title: space.name.clone(),
+            ..Group::default()
+        };
+        let stroke = Stroke {
+            color: style.stroke,
+            width: style.width,
+            dash: style.dash.clone(),
+        };
+        group.shape(Shape {
+            form: Form::Rect(place, style.radius * scale),
+            fill: style.fill,
+            stroke: stroke.scaled(scale),
+        });
+        group.text(Text {
+            at: Point::new(
+                place.x + 8.0 * scale,
+                place.y + (4.0 + style.size * 0.9) * scale,
+            ),
+            anchor: Anchor::Start,
+            size: style.size * scale,
+            weight: Weight::SemiBold,
+            color: style.text,
+            halo: None,
+            text: space.title.clone(),
+        });
+        group
+    }
+
+    /// One item in one window.
+    pub(super) fn item(
+        &self,
+        item: &Item,
+        label: &Label,
+        place: Rect,
+        shown: &Shown,
+        rates: bool,
+        id: String,
+    ) -> Group {
+        let style = self.style;
+        let body = match item.kind {
+            ItemKind::Node | ItemKind::Namespace => &style.node,
+            ItemKind::Topic | ItemKind::Group => &style.topic,
+        };
+        let look = look::of_box(style, body, shown);
+        let place = self.fit.rect(place);
+        let mut group = Group {
+            id,
+            class: class(item.kind.word(), shown),
+            data: vec![("name", item.name.to_string())],
+            title: title(item, shown),
+            ..Group::default()
+        };
+        let inner = self.outline(&mut group, item.kind, body, place, &look);
+        if shown.state == State::Latched
+            && item.kind != ItemKind::Node
+            && shown.mark != Some(Mark::Removed)
+        {
+            self.latch(&mut group, inner, body);
+        }
+        let second = if label.fixed.is_empty() {
+            second_line(shown, rates).unwrap_or_default()
+        } else {
+            label.fixed.clone()
+        };
+        self.lines(&mut group, label, &second, inner, body, &look, shown);
+        if let Some(mark) = shown.mark {
+            badge::badge(
+                &mut group,
+                style,
+                mark,
+                corner(item.kind, place, self.fit.scale),
+                self.fit.scale,
+            );
+        }
+        group
+    }
+
+    /// The outline, and the part inside it that the label stands in.
+    fn outline(
+        &self,
+        group: &mut Group,
+        kind: ItemKind,
+        body: &Body,
+        place: Rect,
+        look: &BoxLook,
+    ) -> Rect {
+        let scale = self.fit.scale;
+        let stroke = look.stroke.scaled(scale);
+        let radius = body.radius * scale;
+        let form = match kind {
+            ItemKind::Node => Form::Ellipse(place),
+            _ => Form::Rect(place, radius),
+        };
+        group.shape(Shape {
+            form,
+            fill: look.fill,
+            stroke: stroke.clone(),
+        });
+        if matches!(kind, ItemKind::Node | ItemKind::Topic) {
+            return place;
+        }
+        // Several in one: a second card in front of the first.
+        let depth = self.style.stack.depth * scale;
+        let front = Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth);
+        group.shape(Shape {
+            form: Form::Rect(front, radius),
+            fill: look.fill,
+            stroke,
+        });
+        front
+    }
+
+    fn latch(&self, group: &mut Group, place: Rect, body: &Body) {
+        let width = self.style.latched.bar * self.fit.scale;
+        let inset = body.width * self.fit.scale / 2.0;
+        let bar = Rect::new(
+            place.x + inset,
+            place.y + inset,
+            width,
+            place.h - 2.0 * inset,
+        );
+        group.shape(Shape::filled(
+            Form::Rect(bar, 0.0),
+            self.style.latched.stroke,
+        ));
+    }
+
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "all that the words of one box depend on"
+    )]
+    fn lines(
+        &self,
+        group: &mut Group,
+        label: &Label,
+        second: &str,
+        place: Rect,
+        body: &Body,
+        look: &BoxLook,
+        shown: &Shown,
+    ) {
+        let scale = self.fit.scale;
+        let middle = place.centre();
+        let small = if label.second { body.small * LINE } else { 0.0 };
+        // A line that is missing in this window leaves its room, so that the name stays where it is.
+        let top = middle.y - (body.size * LINE + small) * scale / 2.0;
+        let line = |y: f64, size: f64, weight, color, text: &str| Text {
+            at: Point::new(middle.x, y),
+            anchor: Anchor::Middle,
+            size: size * scale,
+            weight,
+            color,
+            halo: None,
+            text: text.to_owned(),
+        };
+        let y = top + body.size * (LINE / 2.0 + 0.35) * scale;
+        group.text(line(y, body.size, body.weight(), look.text, &label.name));
+        let y = top + (body.size * LINE + body.small * (LINE / 2.0 + 0.28)) * scale;
+        let (weight, color) = match shown.mark {
+            Some(mark) => (Weight::SemiBold, look::change(self.style, mark).color),
+            None if look.text == body.text => (Weight::Regular, self.style.page.quiet),
+            None => (Weight::Regular, look.text),
+        };
+        group.text(line(y, body.small, weight, color, second));
+    }
+}
+
+/// Where the badge of a box stands: at its top right, on its outline.
+fn corner(kind: ItemKind, place: Rect, scale: f64) -> Point {
+    match kind {
+        ItemKind::Node => {
+            let middle = place.centre();
+            Point::new(middle.x + place.w * 0.36, middle.y - place.h * 0.36)
+        }
+        _ => Point::new(place.right() - 2.0 * scale, place.y + scale),
+    }
+}
+
+/// `node added active measured`: what it is, what happened to it, how alive, how well known.
+pub(super) fn class(what: &str, shown: &Shown) -> String {
+    let mut words = vec![what];
+    words.extend(shown.mark.map(Mark::class));
+    words.extend([shown.state.word(), shown.degree.word()]);
+    if matches!(shown.mark, Some(Mark::HandedOver)) {
+        words.push("handed-over");
+    }
+    if matches!(shown.mark, Some(Mark::Restarted)) {
+        words.push("restarted");
+    }
+    words.dedup();
+    words.join(" ")
+}
+
+fn title(item: &Item, shown: &Shown) -> String {
+    let what = match item.kind {
+        ItemKind::Node => "node",
+        ItemKind::Topic => "topic",
+        ItemKind::Group => "topics",
+        ItemKind::Namespace => "namespace",
+    };
+    format!("{}\n{what}: {}", item.name, words::facts(shown))
+}

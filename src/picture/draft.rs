@@ -1,0 +1,441 @@
+//! What to lay out: every label at its widest, every namespace that gets a box.
+
+use std::collections::BTreeMap;
+use std::ops::Bound::Excluded;
+
+use super::Wish;
+use super::words;
+use crate::geometry::Size;
+use crate::graph::{Element, State};
+use crate::layout::{self, Link, Outline, Plan, Vertex};
+use crate::name::namespace;
+use crate::style::{Body, Style};
+use crate::text::{Fonts, Weight};
+use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
+
+/// The widest that a name is drawn; longer ones are shortened in their middle.
+const WIDEST: f64 = 230.0;
+/// The height of a line of text over its font size.
+pub(super) const LINE: f64 = 1.22;
+/// The height of a pill, and its width beyond its text, over the font size.
+pub(super) const PILL_HEIGHT: f64 = 1.5;
+pub(super) const PILL_PAD: f64 = 1.2;
+/// How much a subscription's rate must differ from its topic's to be written beside it.
+const OWN_RATE: f64 = 0.15;
+
+/// How a box is labelled.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Label {
+    /// The name as it is drawn.
+    pub(super) name: String,
+    /// Whether a smaller line stands below it in some window.
+    pub(super) second: bool,
+    /// The smaller line where it is the same in all windows.
+    pub(super) fixed: String,
+}
+
+/// A namespace with a box around its members.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Space {
+    /// Its full name.
+    pub(super) name: String,
+    /// Its title: the part inside the namespace around it.
+    pub(super) title: String,
+}
+
+/// The labels of a view, and the plan that follows from them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Draft {
+    pub(super) plan: Plan,
+    pub(super) labels: Vec<Label>,
+    pub(super) spaces: Vec<Space>,
+    /// Whether each arrow carries its rate.
+    pub(super) rated: Vec<bool>,
+}
+
+impl Draft {
+    pub(super) fn new(view: &View, style: &Style, fonts: &Fonts, wish: &Wish) -> Self {
+        let (spaces, parents, homes) = spaces(view, wish.namespaces);
+        let drafter = Drafter { view, style, fonts };
+        let seconds = drafter.second_lines();
+        let mut labels = Vec::new();
+        let mut vertices = Vec::new();
+        for (at, item) in view.items.iter().enumerate() {
+            let inside = homes[at].map_or("", |home| spaces[home].name.as_str());
+            let label = drafter.label(item, inside, seconds[at].is_some());
+            vertices.push(Vertex {
+                size: drafter.size(item, &label, seconds[at].unwrap_or(0.0)),
+                outline: match item.kind {
+                    ItemKind::Node => Outline::Ellipse,
+                    _ => Outline::Box,
+                },
+                cluster: homes[at],
+            });
+            labels.push(label);
+        }
+        let rooms = drafter.rooms();
+        let links = view.arrows.iter().zip(&rooms).map(|(arrow, room)| Link {
+            from: arrow.from as usize,
+            to: arrow.to as usize,
+            label: *room,
+        });
+        let clusters = parents
+            .iter()
+            .zip(&spaces)
+            .map(|(parent, space)| layout::Cluster {
+                parent: *parent,
+                title: drafter.title(space),
+            });
+        let plan = Plan {
+            vertices,
+            links: links.collect(),
+            clusters: clusters.collect(),
+        };
+        let rated = rooms.iter().map(Option::is_some).collect();
+        Self {
+            plan,
+            labels,
+            spaces,
+            rated,
+        }
+    }
+}
+
+struct Drafter<'a> {
+    view: &'a View,
+    style: &'a Style,
+    fonts: &'a Fonts,
+}
+
+impl Drafter<'_> {
+    fn body(&self, item: &Item) -> &Body {
+        match item.kind {
+            ItemKind::Node | ItemKind::Namespace => &self.style.node,
+            ItemKind::Topic | ItemKind::Group => &self.style.topic,
+        }
+    }
+
+    fn title(&self, space: &Space) -> Size {
+        let size = self.style.cluster.size;
+        Size::new(
+            self.fonts.width(&space.title, size, Weight::SemiBold),
+            size * LINE,
+        )
+    }
+
+    fn label(&self, item: &Item, inside: &str, second: bool) -> Label {
+        let body = self.body(item);
+        let mut name = self
+            .fonts
+            .shown(short_name(&item.name, inside))
+            .into_owned();
+        let mut fixed = String::new();
+        if item.kind == ItemKind::Namespace {
+            name.push_str("/…");
+            fixed = members(item);
+        }
+        Label {
+            name: self
+                .fonts
+                .fit(&name, body.size, body.weight(), WIDEST)
+                .into_owned(),
+            second: second || !fixed.is_empty(),
+            fixed,
+        }
+    }
+
+    /// The size of a box with this label, whose changing smaller lines are at most `second` wide.
+    fn size(&self, item: &Item, label: &Label, second: f64) -> Size {
+        let body = self.body(item);
+        let width = self.fonts.width(&label.name, body.size, body.weight());
+        let fixed = self.fonts.width(&label.fixed, body.small, Weight::Regular);
+        let width = width.max(second).max(fixed);
+        let small = if label.second { body.small * LINE } else { 0.0 };
+        let height = body.size * LINE + small;
+        let depth = match item.kind {
+            ItemKind::Node => return ellipse(width, height, body),
+            ItemKind::Topic => 0.0,
+            ItemKind::Group | ItemKind::Namespace => self.style.stack.depth,
+        };
+        Size::new(
+            width + 2.0 * body.pad_x + depth,
+            height + 2.0 * body.pad_y + depth,
+        )
+    }
+
+    /// The width of the widest smaller line that each box shows in some window: lifecycle states, and the rates of a
+    /// topic that nobody is known to publish.
+    fn second_lines(&self) -> Vec<Option<f64>> {
+        let unpublished = unpublished(self.view);
+        let mut widest = vec![None; self.view.items.len()];
+        for shown in self.view.frames.iter().flat_map(|f| &f.items) {
+            let at = shown.id as usize;
+            let Some(item) = self.view.items.get(at) else {
+                continue;
+            };
+            if let Some(line) = second_line(shown, unpublished[at]) {
+                let width = self
+                    .fonts
+                    .width(&line, self.body(item).small, Weight::SemiBold);
+                widen(&mut widest[at], width);
+            }
+        }
+        widest
+    }
+
+    /// The room for the widest label that each arrow shows in some window.
+    fn rooms(&self) -> Vec<Option<Size>> {
+        let style = &self.style.edge;
+        let mut widest = vec![None; self.view.arrows.len()];
+        for frame in &self.view.frames {
+            for shown in &frame.arrows {
+                let at = shown.id as usize;
+                let Some(arrow) = self.view.arrows.get(at) else {
+                    continue;
+                };
+                let topic = find(&frame.items, arrow.from as usize);
+                let Some((text, is_pill)) = arrow_label(arrow, shown, topic) else {
+                    continue;
+                };
+                let (weight, pad) = match is_pill {
+                    true => (Weight::SemiBold, style.size * PILL_PAD),
+                    false => (Weight::Regular, style.halo_width),
+                };
+                widen(
+                    &mut widest[at],
+                    self.fonts.width(&text, style.size, weight) + pad,
+                );
+            }
+        }
+        let room = |width: Option<f64>| Some(Size::new(width?, style.size * PILL_HEIGHT));
+        widest.into_iter().map(room).collect()
+    }
+}
+
+fn widen(most: &mut Option<f64>, width: f64) {
+    *most = Some(most.map_or(width, |m: f64| m.max(width)));
+}
+
+/// For each item, whether it is a topic that nobody is ever known to publish.
+pub(super) fn unpublished(view: &View) -> Vec<bool> {
+    let is_topic = |item: &Item| matches!(item.kind, ItemKind::Topic | ItemKind::Group);
+    let mut alone: Vec<bool> = view.items.iter().map(is_topic).collect();
+    for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
+        if let Some(flag) = alone.get_mut(arrow.to as usize) {
+            *flag = false;
+        }
+    }
+    alone
+}
+
+/// What an arrow says in a window, and whether on a pill because it changed.
+pub(super) fn arrow_label(
+    arrow: &Arrow,
+    shown: &Shown,
+    from: Option<&Shown>,
+) -> Option<(String, bool)> {
+    if shown.mark == Some(Mark::Removed) {
+        return None;
+    }
+    let topic = match &arrow.kind {
+        ArrowKind::Direct(topic) => format!("{topic} "),
+        _ => String::new(),
+    };
+    if let (Some(Mark::Faster | Mark::Slower), Some(before), Some(now)) =
+        (shown.mark, shown.from_hz, shown.hz)
+    {
+        return Some((topic + &words::hz_change(before, now), true));
+    }
+    let rate = shown
+        .hz
+        .filter(|hz| *hz > 0.0 && shown.state == State::Active);
+    let told = match arrow.kind {
+        ArrowKind::Publish => rate,
+        ArrowKind::Subscribe => {
+            let of_topic = from.and_then(|s| s.hz).unwrap_or(0.0);
+            rate.filter(|hz| (hz - of_topic).abs() > OWN_RATE * of_topic.max(*hz))
+        }
+        ArrowKind::Direct(_) => {
+            let rate = rate.map(words::hz).unwrap_or_default();
+            return Some(((topic + &rate).trim_end().to_owned(), false));
+        }
+    };
+    told.map(|hz| (words::hz(hz), false))
+}
+
+/// The smaller line of a box in a window.
+pub(super) fn second_line(shown: &Shown, rates: bool) -> Option<String> {
+    if shown.mark == Some(Mark::Removed) {
+        return None;
+    }
+    if let Some(state) = &shown.lifecycle {
+        return Some(state.to_string());
+    }
+    match (shown.from_hz, shown.hz) {
+        (Some(before), Some(now)) if rates => Some(words::hz_change(before, now)),
+        (_, Some(now)) if rates && now > 0.0 => Some(words::hz(now)),
+        _ => None,
+    }
+}
+
+/// The element with this id among those of a window, which are sorted.
+pub(super) fn find(shown: &[Shown], id: usize) -> Option<&Shown> {
+    let at = shown.binary_search_by_key(&id, |s| s.id as usize).ok()?;
+    Some(&shown[at])
+}
+
+/// The size of an ellipse around a text of this size.
+fn ellipse(width: f64, height: f64, body: &Body) -> Size {
+    let full = height + 2.0 * body.pad_y;
+    // Letters fill about three quarters of their lines; the ellipse passes their corners.
+    let part = 0.75 * height / full;
+    let stretch = 1.0 / libm::sqrt(1.0 - part * part);
+    Size::new(width * stretch + 2.0 * body.pad_x, full)
+}
+
+/// The part of a name inside the namespace whose box it stands in.
+fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
+    let rest = name
+        .strip_prefix(inside)
+        .and_then(|rest| rest.strip_prefix('/'));
+    match rest {
+        Some(rest) if !inside.is_empty() && !rest.is_empty() => rest,
+        _ => name,
+    }
+}
+
+/// `5 nodes, 12 topics`.
+fn members(item: &Item) -> String {
+    let count = |is: fn(&Element) -> bool| item.members.iter().filter(|m| is(m)).count();
+    let nodes = count(|m| matches!(m, Element::Node(_)));
+    let topics = count(|m| matches!(m, Element::Topic(_)));
+    let parts = [(nodes, "node"), (topics, "topic")];
+    let parts = parts
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, word)| words::count(*n, word));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// The namespaces that get a box, parents first; the parent of each; and for each item the innermost that holds it.
+fn spaces(view: &View, levels: usize) -> (Vec<Space>, Vec<Option<usize>>, Vec<Option<usize>>) {
+    let paths: Vec<Vec<&str>> = view
+        .items
+        .iter()
+        .map(|item| ancestors(&item.name, levels))
+        .collect();
+    let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+    for path in paths.iter().flatten() {
+        *count.entry(path).or_default() += 1;
+    }
+    // A box around one thing tells nothing, nor does one around just another box.
+    let child_count = |name: &str, n: usize| {
+        // `0` follows `/`: the range holds exactly the names that begin with `name/`.
+        let inner = count.range::<str, _>((
+            Excluded(&*format!("{name}/")),
+            Excluded(&*format!("{name}0")),
+        ));
+        inner.map(|(_, m)| *m).max() == Some(n)
+    };
+    let kept: Vec<&str> = count
+        .iter()
+        .filter(|(name, n)| **n > 1 && !child_count(name, **n))
+        .map(|(name, _)| *name)
+        .collect();
+    let innermost = |path: &[&str]| {
+        path.iter()
+            .rev()
+            .find_map(|name| kept.binary_search(name).ok())
+    };
+    let mut spaces = Vec::new();
+    let mut parents = Vec::new();
+    for name in &kept {
+        let parent = innermost(&ancestors(name, levels));
+        let inside = parent.map_or("", |p| kept[p]);
+        let title = name.strip_prefix(inside).unwrap_or(name).to_owned();
+        spaces.push(Space {
+            name: (*name).to_owned(),
+            title,
+        });
+        parents.push(parent);
+    }
+    let homes = paths.iter().map(|path| innermost(path)).collect();
+    (spaces, parents, homes)
+}
+
+/// The namespaces around a name, outermost first, at most `levels`.
+fn ancestors(name: &str, levels: usize) -> Vec<&str> {
+    let space = namespace(name);
+    let ends = space
+        .char_indices()
+        .skip(1)
+        .filter(|(_, c)| *c == '/')
+        .map(|(at, _)| at);
+    let ends = ends.chain((space != "/").then_some(space.len()));
+    ends.take(levels).map(|end| &space[..end]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    fn view(names: &[&str]) -> View {
+        let item = |name: &&str| Item {
+            kind: ItemKind::Topic,
+            name: Arc::from(*name),
+            members: Vec::new(),
+        };
+        View {
+            items: names.iter().map(item).collect(),
+            ..View::default()
+        }
+    }
+
+    fn boxes(names: &[&str], levels: usize) -> Vec<(String, String, Option<usize>)> {
+        let (spaces, parents, _) = spaces(&view(names), levels);
+        spaces
+            .into_iter()
+            .zip(parents)
+            .map(|(s, p)| (s.name, s.title, p))
+            .collect()
+    }
+
+    fn row(name: &str, title: &str, parent: Option<usize>) -> (String, String, Option<usize>) {
+        (name.to_owned(), title.to_owned(), parent)
+    }
+
+    #[test]
+    fn namespaces_nest() {
+        let names = ["/a/b/x", "/a/b/y", "/a/z", "/q/one", "/root"];
+        assert_eq!(
+            boxes(&names, 9),
+            [row("/a", "/a", None), row("/a/b", "/b", Some(0))]
+        );
+        assert_eq!(boxes(&names, 1), [row("/a", "/a", None)]);
+        assert_eq!(boxes(&names, 0), []);
+    }
+
+    #[test]
+    fn a_namespace_that_holds_only_another_is_no_box() {
+        assert_eq!(boxes(&["/a/b/x", "/a/b/y"], 9), [row("/a/b", "/a/b", None)]);
+        let names = ["/a/b/x", "/a/b/y", "/a-b/x", "/a-b/z"];
+        assert_eq!(
+            boxes(&names, 9),
+            [row("/a-b", "/a-b", None), row("/a/b", "/a/b", None)]
+        );
+    }
+
+    #[test]
+    fn names_lose_the_namespace_they_stand_in() {
+        assert_eq!(short_name("/a/b/c", "/a"), "b/c");
+        assert_eq!(short_name("/a", ""), "/a");
+        assert_eq!(short_name("/a/", "/a"), "/a/");
+        assert_eq!(ancestors("/a/b/c", 9), ["/a", "/a/b"]);
+        assert_eq!(ancestors("c", 9), Vec::<&str>::new());
+        assert_eq!(
+            ancestors("//c", 9),
+            ["/"].into_iter().filter(|_| false).collect::<Vec<_>>()
+        );
+    }
+}

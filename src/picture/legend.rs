@@ -1,0 +1,296 @@
+//! What the signs mean: one row, or more on a narrow page, with only the signs that occur.
+
+use super::arrows::arrow_head;
+use super::badge::badge;
+use super::look;
+use super::page::Page;
+use super::words;
+use crate::evidence::Degree;
+use crate::geometry::{Point, Rect};
+use crate::graph::State;
+use crate::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
+use crate::style::{Color, Style};
+use crate::text::{Fonts, Weight};
+use crate::view::{ArrowKind, ItemKind, Mark, Shown, View};
+
+/// A sign with its meaning.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Sign {
+    Node,
+    Topic,
+    Group,
+    Namespace,
+    Change(Mark),
+    Box(State),
+    Line(Degree),
+    Width,
+}
+
+/// The signs that occur in the view, with their words.
+pub(super) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
+    let kind = |kind| view.items.iter().any(|i| i.kind == kind);
+    let any = |is: &dyn Fn(&Shown) -> bool| {
+        view.frames
+            .iter()
+            .any(|f| f.items.iter().chain(&f.arrows).any(is))
+    };
+    let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
+    let state = |state| any(&|s| s.state == state && s.mark.is_none());
+    let degree = |degree| {
+        view.frames
+            .iter()
+            .any(|f| f.arrows.iter().any(|s| s.degree == degree))
+    };
+    let percent = words::percent(rate_change);
+    let all = [
+        (kind(ItemKind::Node), Sign::Node, "node"),
+        (kind(ItemKind::Topic), Sign::Topic, "topic"),
+        (kind(ItemKind::Group), Sign::Group, "topics grouped"),
+        (
+            kind(ItemKind::Namespace),
+            Sign::Namespace,
+            "namespace collapsed",
+        ),
+        (mark(&[Mark::Added]), Sign::Change(Mark::Added), "added"),
+        (
+            mark(&[Mark::Removed]),
+            Sign::Change(Mark::Removed),
+            "removed",
+        ),
+        (
+            mark(&[Mark::Faster, Mark::Slower]),
+            Sign::Change(Mark::Slower),
+            &*format!("rate changed (≥ {percent} %)"),
+        ),
+        (
+            mark(&[Mark::HandedOver]),
+            Sign::Change(Mark::HandedOver),
+            "handed over",
+        ),
+        (
+            mark(&[Mark::Restarted]),
+            Sign::Change(Mark::Restarted),
+            "restarted",
+        ),
+        (
+            mark(&[Mark::Changed]),
+            Sign::Change(Mark::Changed),
+            "changed",
+        ),
+        (
+            mark(&[Mark::Inside]),
+            Sign::Change(Mark::Inside),
+            "changed inside",
+        ),
+        (state(State::Silent), Sign::Box(State::Silent), "silent"),
+        (state(State::Latched), Sign::Box(State::Latched), "latched"),
+        (
+            state(State::Declared),
+            Sign::Box(State::Declared),
+            "declared only",
+        ),
+        (degree(Degree::Stated), Sign::Line(Degree::Stated), "stated"),
+        (
+            degree(Degree::Inferred),
+            Sign::Line(Degree::Inferred),
+            "inferred",
+        ),
+        (
+            any(&|s| s.hz.is_some()),
+            Sign::Width,
+            "thicker = higher rate",
+        ),
+    ];
+    let present = all.into_iter().filter(|(occurs, _, _)| *occurs);
+    present
+        .map(|(_, sign, words)| (sign, words.to_owned()))
+        .collect()
+}
+
+/// How wide a sign is, before its words.
+const SIGN: f64 = 26.0;
+const GAP: f64 = 6.0;
+const AFTER: f64 = 18.0;
+
+/// The signs in rows that fit the page's width.
+pub(super) fn rows(
+    signs: &[(Sign, String)],
+    style: &Style,
+    fonts: &Fonts,
+    unit: f64,
+    width: f64,
+) -> Vec<Vec<(Sign, String, f64)>> {
+    let mut rows = vec![Vec::new()];
+    let start = style.page.margin * unit;
+    let mut x = start;
+    for (sign, words) in signs {
+        let wide = (SIGN + GAP + AFTER) * unit
+            + fonts.width(words, style.legend.size * unit, Weight::Regular);
+        if x + wide - AFTER * unit > width - start && x > start {
+            rows.push(Vec::new());
+            x = start;
+        }
+        if let Some(row) = rows.last_mut() {
+            row.push((sign.clone(), words.clone(), x));
+        }
+        x += wide;
+    }
+    rows
+}
+
+/// The legend, the same in every frame.
+pub(super) fn legend(rows: &[Vec<(Sign, String, f64)>], style: &Style, page: &Page) -> Group {
+    let mut group = Group::named("legend");
+    let place = page.legend;
+    let unit = page.unit;
+    group.shape(Shape::filled(Form::Rect(place, 0.0), style.legend.fill));
+    let edge = line(
+        Point::new(place.x, place.y),
+        Point::new(place.right(), place.y),
+    );
+    group.shape(Shape::line(edge, Stroke::solid(style.legend.line, unit)));
+    let size = style.legend.size * unit;
+    let height = (place.h - 8.0 * unit) / rows.len().max(1) as f64;
+    for (at, row) in rows.iter().enumerate() {
+        let y = place.y + 7.0 * unit + (at as f64 + 0.5) * height;
+        for (sign, words, x) in row {
+            draw(
+                &mut group,
+                sign,
+                style,
+                Rect::new(*x, y - 6.0 * unit, SIGN * unit, 12.0 * unit),
+                unit,
+            );
+            group.text(Text {
+                at: Point::new(x + (SIGN + GAP) * unit, y + size * 0.36),
+                anchor: Anchor::Start,
+                size,
+                weight: Weight::Regular,
+                color: style.legend.text,
+                halo: None,
+                text: words.clone(),
+            });
+        }
+    }
+    group
+}
+
+fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
+    let middle = place.centre();
+    let shown = |state, degree, mark| Shown {
+        id: 0,
+        state,
+        degree,
+        mark,
+        hz: None,
+        from_hz: None,
+        count: None,
+        lifecycle: None,
+    };
+    let active = shown(State::Active, Degree::Measured, None);
+    let card = |group: &mut Group, place: Rect, round: bool, shown: &Shown| {
+        let body = if round { &style.node } else { &style.topic };
+        let look = look::of_box(style, body, shown);
+        let form = if round {
+            Form::Ellipse(place)
+        } else {
+            Form::Rect(place, body.radius * unit)
+        };
+        group.shape(Shape {
+            form,
+            fill: look.fill,
+            stroke: look.stroke.scaled(unit),
+        });
+    };
+    let depth = style.stack.depth * 0.7 * unit;
+    let front = Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth);
+    match sign {
+        Sign::Node => card(group, place, true, &active),
+        Sign::Topic => card(group, place, false, &active),
+        Sign::Group => {
+            card(group, place, false, &active);
+            card(group, front, false, &active);
+        }
+        Sign::Namespace => {
+            for place in [place, front] {
+                let stroke = Stroke::solid(style.node.stroke, style.node.width * unit);
+                group.shape(Shape {
+                    form: Form::Rect(place, 4.0 * unit),
+                    fill: style.node.fill,
+                    stroke,
+                });
+            }
+        }
+        Sign::Change(mark) => {
+            let look = look::of_arrow(
+                style,
+                &ArrowKind::Publish,
+                &shown(State::Active, Degree::Measured, Some(*mark)),
+            );
+            group.shape(Shape::line(across(place), look.stroke.scaled(unit)));
+            badge(group, style, *mark, middle, unit * 0.9);
+        }
+        Sign::Box(state) => {
+            let degree = if *state == State::Declared {
+                Degree::Declared
+            } else {
+                Degree::Measured
+            };
+            card(group, place, false, &shown(*state, degree, None));
+            if *state == State::Latched {
+                let inset = style.topic.width * unit / 2.0;
+                let bar = Rect::new(
+                    place.x + inset,
+                    place.y + inset,
+                    style.latched.bar * unit,
+                    place.h - 2.0 * inset,
+                );
+                group.shape(Shape::filled(Form::Rect(bar, 0.0), style.latched.stroke));
+            }
+        }
+        Sign::Line(degree) => {
+            let look = look::of_arrow(
+                style,
+                &ArrowKind::Subscribe,
+                &shown(State::Active, *degree, None),
+            );
+            arrow(
+                group,
+                place,
+                look.stroke.scaled(unit),
+                style.edge.arrow * unit,
+            );
+        }
+        Sign::Width => {
+            let width = [
+                style.edge.width,
+                style.edge.width + 2.0 * style.edge.per_decade,
+            ];
+            for (part, width) in [0.0, 0.55].into_iter().zip(width) {
+                let from = Point::new(place.x + place.w * part, middle.y);
+                let to = Point::new(from.x + place.w * 0.45, middle.y);
+                let color: Color = style.edge.stroke;
+                group.shape(Shape::line(
+                    line(from, to),
+                    Stroke::solid(color, width * unit),
+                ));
+            }
+        }
+    }
+}
+
+fn across(place: Rect) -> Form {
+    let y = place.centre().y;
+    line(Point::new(place.x, y), Point::new(place.right(), y))
+}
+
+fn arrow(group: &mut Group, place: Rect, stroke: Stroke, head: f64) {
+    let color = stroke.color;
+    let shorter = Rect::new(place.x, place.y, place.w - head * 0.7, place.h);
+    group.shape(Shape::line(across(shorter), stroke));
+    let tip = Point::new(place.right(), place.centre().y);
+    group.shape(Shape::filled(
+        arrow_head(tip, Point::new(1.0, 0.0), head),
+        color,
+    ));
+}

@@ -1,0 +1,102 @@
+//! The page: which part is title, caption, graph, legend and timeline, and how the graph is scaled into its part.
+
+use super::Wish;
+use crate::geometry::{Point, Rect, Size};
+use crate::style::Style;
+
+/// The page that furniture lengths are given for.
+const STANDARD: Size = Size::new(1280.0, 720.0);
+/// The largest that the graph is drawn, over its natural size.
+const LARGEST: f64 = 1.35;
+
+/// Where everything on the page stands, at the same place in every frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Page {
+    pub(super) size: Size,
+    /// The scale of furniture: 1 on a page of 1280 × 720.
+    pub(super) unit: f64,
+    /// Empty parts (`--bare`) have no height.
+    pub(super) title: Rect,
+    pub(super) caption: Rect,
+    pub(super) graph: Rect,
+    pub(super) legend: Rect,
+    pub(super) timeline: Rect,
+}
+
+/// How the graph is brought into its part of the page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fit {
+    pub(super) scale: f64,
+    pub(super) origin: Point,
+}
+
+impl Page {
+    /// The page that is wished for, with `rows` rows of legend.
+    pub(super) fn new(style: &Style, wish: &Wish, rows: usize) -> Self {
+        let size = wish.size;
+        let unit = unit(size);
+        let strip = |y: f64, height: f64| Rect::new(0.0, y, size.w, height);
+        let (mut title, mut caption, mut legend, mut timeline) = (0.0, 0.0, 0.0, 0.0);
+        if !wish.bare {
+            title = style.title.height * unit;
+            caption = style.caption.height * unit;
+            legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
+            timeline = (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit;
+        }
+        let margin = (style.page.margin * unit)
+            .min(size.w / 20.0)
+            .min(size.h / 20.0);
+        let top = title + caption;
+        let bottom = (size.h - legend - timeline).max(top + 1.0);
+        let above = if wish.bare { margin } else { margin / 4.0 };
+        let graph = Rect::new(
+            margin,
+            top + above,
+            size.w - 2.0 * margin,
+            bottom - top - above - margin,
+        );
+        Self {
+            size,
+            unit,
+            title: strip(0.0, title),
+            caption: strip(title, caption),
+            graph: Rect::new(graph.x, graph.y, graph.w.max(1.0), graph.h.max(1.0)),
+            legend: strip(bottom, legend),
+            timeline: strip(bottom + legend, timeline),
+        }
+    }
+
+    /// The largest scale at which a layout of this size fits, and where its corner goes so that it stands in the middle.
+    pub(super) fn fit(&self, layout: Size) -> Fit {
+        let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));
+        let scale = (self.graph.w / w)
+            .min(self.graph.h / h)
+            .min(LARGEST * self.unit.max(0.8));
+        let middle = self.graph.centre();
+        Fit {
+            scale,
+            origin: Point::new(middle.x - w * scale / 2.0, middle.y - h * scale / 2.0),
+        }
+    }
+}
+
+/// The scale of furniture on a page of this size.
+pub(super) fn unit(size: Size) -> f64 {
+    (size.w / STANDARD.w)
+        .min(size.h / STANDARD.h)
+        .clamp(0.62, 2.5)
+}
+
+impl Fit {
+    pub(super) fn point(&self, p: Point) -> Point {
+        Point::new(
+            self.origin.x + p.x * self.scale,
+            self.origin.y + p.y * self.scale,
+        )
+    }
+
+    pub(super) fn rect(&self, r: Rect) -> Rect {
+        let corner = self.point(Point::new(r.x, r.y));
+        Rect::new(corner.x, corner.y, r.w * self.scale, r.h * self.scale)
+    }
+}
