@@ -42,8 +42,6 @@ pub struct Wish {
     pub phases: Vec<String>,
     /// From which relative change of a rate on it is told, for the legend.
     pub rate_change: f64,
-    /// How many levels of namespaces get a box.
-    pub namespaces: usize,
 }
 
 impl Default for Wish {
@@ -56,7 +54,6 @@ impl Default for Wish {
             orientation: None,
             phases: Vec::new(),
             rate_change: 0.25,
-            namespaces: 2,
         }
     }
 }
@@ -75,7 +72,7 @@ pub struct Sketch<'a> {
 impl<'a> Sketch<'a> {
     /// Labels, sizes and namespaces of a view, and the parts of the page.
     pub fn new(view: &'a View, style: &'a Style, fonts: &'a Fonts, wish: Wish) -> Self {
-        let draft = Draft::new(view, style, fonts, &wish);
+        let draft = Draft::new(view, style, fonts);
         let signs = legend::signs(view, wish.rate_change);
         let legend = legend::rows(&signs, style, fonts, page::unit(wish.size), wish.size.w);
         let page = Page::new(style, &wish, legend.len());

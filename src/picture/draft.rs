@@ -1,14 +1,9 @@
 //! What to lay out: every label at its widest, every namespace that gets a box.
 
-use std::collections::BTreeMap;
-use std::ops::Bound::Excluded;
-
-use super::Wish;
 use super::words;
 use crate::geometry::Size;
 use crate::graph::{Element, State};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
-use crate::name::namespace;
 use crate::style::{Body, Style};
 use crate::text::{Fonts, Weight};
 use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
@@ -54,14 +49,17 @@ pub(super) struct Draft {
 }
 
 impl Draft {
-    pub(super) fn new(view: &View, style: &Style, fonts: &Fonts, wish: &Wish) -> Self {
-        let (spaces, parents, homes) = spaces(view, wish.namespaces);
+    pub(super) fn new(view: &View, style: &Style, fonts: &Fonts) -> Self {
+        let spaces = spaces(view, fonts);
         let drafter = Drafter { view, style, fonts };
         let seconds = drafter.second_lines();
         let mut labels = Vec::new();
         let mut vertices = Vec::new();
         for (at, item) in view.items.iter().enumerate() {
-            let inside = homes[at].map_or("", |home| spaces[home].name.as_str());
+            let inside = item
+                .cluster
+                .and_then(|c| spaces.get(c))
+                .map_or("", |space| space.name.as_str());
             let label = drafter.label(item, inside, seconds[at].is_some());
             vertices.push(Vertex {
                 size: drafter.size(item, &label, seconds[at].unwrap_or(0.0)),
@@ -69,7 +67,7 @@ impl Draft {
                     ItemKind::Node => Outline::Ellipse,
                     _ => Outline::Box,
                 },
-                cluster: homes[at],
+                cluster: item.cluster,
             });
             labels.push(label);
         }
@@ -79,11 +77,12 @@ impl Draft {
             to: arrow.to as usize,
             label: *room,
         });
-        let clusters = parents
+        let clusters = view
+            .namespaces
             .iter()
             .zip(&spaces)
-            .map(|(parent, space)| layout::Cluster {
-                parent: *parent,
+            .map(|(namespace, space)| layout::Cluster {
+                parent: namespace.parent,
                 title: drafter.title(space),
             });
         let plan = Plan {
@@ -317,125 +316,32 @@ fn members(item: &Item) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
-/// The namespaces that get a box, parents first; the parent of each; and for each item the innermost that holds it.
-fn spaces(view: &View, levels: usize) -> (Vec<Space>, Vec<Option<usize>>, Vec<Option<usize>>) {
-    let paths: Vec<Vec<&str>> = view
-        .items
-        .iter()
-        .map(|item| ancestors(&item.name, levels))
-        .collect();
-    let mut count: BTreeMap<&str, usize> = BTreeMap::new();
-    for path in paths.iter().flatten() {
-        *count.entry(path).or_default() += 1;
-    }
-    // A box around one thing tells nothing, nor does one around just another box.
-    let child_count = |name: &str, n: usize| {
-        // `0` follows `/`: the range holds exactly the names that begin with `name/`.
-        let inner = count.range::<str, _>((
-            Excluded(&*format!("{name}/")),
-            Excluded(&*format!("{name}0")),
-        ));
-        inner.map(|(_, m)| *m).max() == Some(n)
+/// The titles of the namespaces: the part of their names inside the namespace around them.
+fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
+    let title = |at: usize| {
+        let name = &*view.namespaces[at].name;
+        let around = view.namespaces[at]
+            .parent
+            .and_then(|p| view.namespaces.get(p));
+        around.map_or(name, |p| name.strip_prefix(&*p.name).unwrap_or(name))
     };
-    let kept: Vec<&str> = count
-        .iter()
-        .filter(|(name, n)| **n > 1 && !child_count(name, **n))
-        .map(|(name, _)| *name)
-        .collect();
-    let innermost = |path: &[&str]| {
-        path.iter()
-            .rev()
-            .find_map(|name| kept.binary_search(name).ok())
-    };
-    let mut spaces = Vec::new();
-    let mut parents = Vec::new();
-    for name in &kept {
-        let parent = innermost(&ancestors(name, levels));
-        let inside = parent.map_or("", |p| kept[p]);
-        let title = name.strip_prefix(inside).unwrap_or(name).to_owned();
-        spaces.push(Space {
-            name: (*name).to_owned(),
-            title,
-        });
-        parents.push(parent);
-    }
-    let homes = paths.iter().map(|path| innermost(path)).collect();
-    (spaces, parents, homes)
-}
-
-/// The namespaces around a name, outermost first, at most `levels`.
-fn ancestors(name: &str, levels: usize) -> Vec<&str> {
-    let space = namespace(name);
-    let ends = space
-        .char_indices()
-        .skip(1)
-        .filter(|(_, c)| *c == '/')
-        .map(|(at, _)| at);
-    let ends = ends.chain((space != "/").then_some(space.len()));
-    ends.take(levels).map(|end| &space[..end]).collect()
+    (0..view.namespaces.len())
+        .map(|at| Space {
+            name: view.namespaces[at].name.to_string(),
+            title: fonts.shown(title(at)).into_owned(),
+        })
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
-
-    fn view(names: &[&str]) -> View {
-        let item = |name: &&str| Item {
-            kind: ItemKind::Topic,
-            name: Arc::from(*name),
-            members: Vec::new(),
-        };
-        View {
-            items: names.iter().map(item).collect(),
-            ..View::default()
-        }
-    }
-
-    fn boxes(names: &[&str], levels: usize) -> Vec<(String, String, Option<usize>)> {
-        let (spaces, parents, _) = spaces(&view(names), levels);
-        spaces
-            .into_iter()
-            .zip(parents)
-            .map(|(s, p)| (s.name, s.title, p))
-            .collect()
-    }
-
-    fn row(name: &str, title: &str, parent: Option<usize>) -> (String, String, Option<usize>) {
-        (name.to_owned(), title.to_owned(), parent)
-    }
-
-    #[test]
-    fn namespaces_nest() {
-        let names = ["/a/b/x", "/a/b/y", "/a/z", "/q/one", "/root"];
-        assert_eq!(
-            boxes(&names, 9),
-            [row("/a", "/a", None), row("/a/b", "/b", Some(0))]
-        );
-        assert_eq!(boxes(&names, 1), [row("/a", "/a", None)]);
-        assert_eq!(boxes(&names, 0), []);
-    }
-
-    #[test]
-    fn a_namespace_that_holds_only_another_is_no_box() {
-        assert_eq!(boxes(&["/a/b/x", "/a/b/y"], 9), [row("/a/b", "/a/b", None)]);
-        let names = ["/a/b/x", "/a/b/y", "/a-b/x", "/a-b/z"];
-        assert_eq!(
-            boxes(&names, 9),
-            [row("/a-b", "/a-b", None), row("/a/b", "/a/b", None)]
-        );
-    }
 
     #[test]
     fn names_lose_the_namespace_they_stand_in() {
         assert_eq!(short_name("/a/b/c", "/a"), "b/c");
         assert_eq!(short_name("/a", ""), "/a");
         assert_eq!(short_name("/a/", "/a"), "/a/");
-        assert_eq!(ancestors("/a/b/c", 9), ["/a", "/a/b"]);
-        assert_eq!(ancestors("c", 9), Vec::<&str>::new());
-        assert_eq!(
-            ancestors("//c", 9),
-            ["/"].into_iter().filter(|_| false).collect::<Vec<_>>()
-        );
+        assert_eq!(short_name("/ab/c", "/a"), "/ab/c");
     }
 }
