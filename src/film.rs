@@ -1,6 +1,7 @@
 //! The sequence as it is shown: which window when and for how long, and what draws it.
 
 use crate::evolution::Evolution;
+use crate::picture::Picture;
 use crate::pixels::Painter;
 use crate::scene::Scene;
 use crate::view::View;
@@ -39,10 +40,16 @@ impl Default for Options {
 }
 
 /// What draws windows.
-pub trait Stage: Sync {
+pub trait Scenes: Sync {
     /// The drawing of a window, a place in [`View::frames`]; all drawings have one size. `phase` is how far the change
     /// into it has come: 1 is the window itself.
     fn scene(&self, window: usize, phase: f64) -> Scene;
+}
+
+impl Scenes for Picture<'_> {
+    fn scene(&self, window: usize, phase: f64) -> Scene {
+        self.between(window, phase)
+    }
 }
 
 /// A mission ready to be shown.
@@ -53,7 +60,7 @@ pub struct Film<'a> {
     /// What the picture shows of it.
     pub view: &'a View,
     /// What draws a window.
-    pub picture: &'a dyn Stage,
+    pub picture: &'a dyn Scenes,
     /// What turns a drawing into pixels.
     pub painter: &'a Painter,
     /// How it runs.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use bagreel::encode::{Output, Written};
 use bagreel::error::{Error, Result};
 use bagreel::evolution::Evolution;
-use bagreel::film::{Film, Options, Stage};
+use bagreel::film::{Film, Options, Scenes};
 use bagreel::geometry::{Rect, Size};
 use bagreel::pixels::Painter;
 use bagreel::scene::{Form, Group, Scene, Shape};
@@ -20,7 +20,7 @@ use bagreel::{graph, notice, reel};
 /// A disc that moves through every window, over discs in all colours.
 struct Discs;
 
-impl Stage for Discs {
+impl Scenes for Discs {
     fn scene(&self, window: usize, phase: f64) -> Scene {
         let style = Style::builtin("light").unwrap();
         let mut group = Group::named("discs");
