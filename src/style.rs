@@ -108,8 +108,8 @@ sections! {
     Latched { stroke: Color, bar: f64 }
     Stated { width: f64 }
     Inferred { dash: Vec<f64> }
-    Change { color: Color, fill: Color, text: Color, width: f64, dash: Vec<f64> }
-    Badge { radius: f64, sign: Color, halo: Color }
+    Change { glow: Color, color: Color, fill: Color, text: Color, width: f64, dash: Vec<f64> }
+    Badge { glow: f64, radius: f64, sign: Color, halo: Color }
     Chip {
         added: Color, added_text: Color, removed: Color, removed_text: Color, changed: Color, changed_text: Color,
         none: Color, none_text: Color, size: f64,

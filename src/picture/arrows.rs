@@ -7,8 +7,8 @@ use super::page::Fit;
 use super::{badge, words};
 use crate::geometry::{Point, Rect, Size};
 use crate::layout::Route;
-use crate::scene::{Anchor, Form, Group, Shape, Step, Text, polygon};
-use crate::style::Style;
+use crate::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
+use crate::style::{Color, Style};
 use crate::text::{Fonts, Weight};
 use crate::view::{Arrow, Item, Shown};
 
@@ -120,22 +120,26 @@ impl Arrows<'_> {
         };
         let along = direction(&[before, last[0], last[1]], last[2]);
         let head = (self.style.edge.arrow + look.stroke.width) * scale;
-        // The line ends inside the head, so that its own blunt end does not show beside the tip.
-        let back = Point::new(
-            last[2].x - along.x * head * 0.7,
-            last[2].y - along.y * head * 0.7,
-        );
+        // The line ends inside the head, so that its own blunt end does not show beside the tip; at the same place
+        // whatever its width.
+        let short = self.style.edge.arrow * 0.7 * scale;
+        let back = Point::new(last[2].x - along.x * short, last[2].y - along.y * short);
         let mut steps = vec![Step::Move(track.start)];
         steps.extend(track.curves.iter().map(|curve| Step::Curve(*curve)));
         if let Some(Step::Curve(end)) = steps.last_mut() {
             end[1] = Point::new(
-                end[1].x - along.x * head * 0.35,
-                end[1].y - along.y * head * 0.35,
+                end[1].x - along.x * short * 0.5,
+                end[1].y - along.y * short * 0.5,
             );
             end[2] = back;
         }
         let color = stroke.color;
-        group.shape(Shape::line(Form::Path(steps), stroke));
+        let path = Form::Path(steps);
+        if look.glow != Color::NONE {
+            let width = stroke.width + 2.0 * self.style.badge.glow * scale;
+            group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
+        }
+        group.shape(Shape::line(path, stroke));
         group.shape(Shape::filled(arrow_head(last[2], along, head), color));
         if look.dot {
             let dot = Size::new(5.0 * scale, 5.0 * scale);

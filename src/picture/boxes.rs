@@ -7,7 +7,7 @@ use super::{badge, words};
 use crate::geometry::{Point, Rect};
 use crate::graph::State;
 use crate::scene::{Anchor, Form, Group, Shape, Stroke, Text};
-use crate::style::{Body, Style};
+use crate::style::{Body, Color, Style};
 use crate::text::Weight;
 use crate::view::{Item, ItemKind, Mark, Shown};
 
@@ -120,6 +120,15 @@ impl Boxes<'_> {
             ItemKind::Node => Form::Ellipse(place),
             _ => Form::Rect(place, radius),
         };
+        if look.glow != Color::NONE {
+            let width = look.stroke.width * scale + 2.0 * self.style.badge.glow * scale;
+            let stroke = Stroke::solid(look.glow, width);
+            group.shape(Shape {
+                form: form.clone(),
+                fill: look.glow,
+                stroke,
+            });
+        }
         group.shape(Shape {
             form,
             fill: look.fill,

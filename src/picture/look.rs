@@ -12,6 +12,8 @@ pub(super) struct BoxLook {
     pub(super) fill: Color,
     pub(super) stroke: Stroke,
     pub(super) text: Color,
+    /// A soft light around it, so that the eye finds it.
+    pub(super) glow: Color,
 }
 
 /// The paint of an arrow.
@@ -21,6 +23,8 @@ pub(super) struct ArrowLook {
     pub(super) text: Color,
     /// Whether a dot stands at its beginning: alive by a latched message.
     pub(super) dot: bool,
+    /// A soft light around it.
+    pub(super) glow: Color,
 }
 
 /// The section of the style for a mark.
@@ -40,6 +44,7 @@ pub(super) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
             fill: change.fill,
             stroke: line(change.color, change.width, &change.dash),
             text: change.text,
+            glow: change.glow,
         };
     }
     let quiet = match (shown.state, shown.degree) {
@@ -55,6 +60,7 @@ pub(super) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
                 fill: body.fill,
                 stroke: line(body.stroke, body.width, dash),
                 text: body.text,
+                glow: Color::NONE,
             };
         }
     };
@@ -62,6 +68,7 @@ pub(super) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
         fill: quiet.fill,
         stroke: line(quiet.stroke, quiet.width, &quiet.dash),
         text: quiet.text,
+        glow: Color::NONE,
     }
 }
 
@@ -80,6 +87,7 @@ pub(super) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
             stroke: line(change.color, width, &change.dash),
             text: change.text,
             dot: latched,
+            glow: change.glow,
         };
     }
     let quiet = match (shown.state, shown.degree) {
@@ -92,6 +100,7 @@ pub(super) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
             stroke: line(quiet.stroke, quiet.width, &quiet.dash),
             text: quiet.text,
             dot: false,
+            glow: Color::NONE,
         };
     }
     let known = shown.hz.is_some() || *kind == ArrowKind::Publish;
@@ -108,6 +117,7 @@ pub(super) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
         stroke: line(edge.stroke, width, dash),
         text: edge.text,
         dot: latched,
+        glow: Color::NONE,
     }
 }
 

@@ -9,7 +9,9 @@ use crate::view::{ViewOptions, view};
 fn dump() {
     let var = |key: &str, or: &str| std::env::var(key).unwrap_or_else(|_| or.to_owned());
     let path = var("BAG", "../shared/data/graphs/medium.json");
-    let evolution = read_json(&std::fs::read_to_string(&path).unwrap(), Path::new(&path)).unwrap();
+    let mut evolution =
+        read_json(&std::fs::read_to_string(&path).unwrap(), Path::new(&path)).unwrap();
+    evolution.find_changes(0.25, &[]);
     let (view, _) = view(&evolution, &ViewOptions::default());
     let fonts = Fonts::bundled();
     let style = Style::builtin(&var("STYLE", "light")).unwrap();
@@ -23,7 +25,21 @@ fn dump() {
     };
     let t = std::time::Instant::now();
     let sketch = Sketch::new(&view, &style, &fonts, wish);
-    let picture = sketch.laid_out(layout::engine("layered").unwrap());
+    let mut layout = layout::lay_out(
+        sketch.plan(),
+        &sketch.layout_wish(),
+        layout::engine("layered").unwrap(),
+    );
+    for (route, link) in layout.routes.iter_mut().zip(&sketch.plan().links) {
+        if route.label.is_none() && link.label.is_some() && !route.curves.is_empty() {
+            let c = route.curves[0];
+            route.label = Some(crate::geometry::Point::new(
+                (c[0].x + c[1].x) / 2.0,
+                (c[0].y + c[1].y) / 2.0,
+            ));
+        }
+    }
+    let picture = sketch.with(layout);
     println!(
         "layout {:?} text {} px, orientation {:?}",
         t.elapsed(),
