@@ -1,24 +1,116 @@
 //! Who talks to whom, and how we know: one file per kind of proof, one row each in [`SOURCES`].
+//!
+//! A source reads messages whose layout it knows, or the announcement of a connection, or draws a conclusion from the
+//! whole mission; what it finds are claims. `evidence.md` of the design tells where each rule comes from.
 
 mod connection;
+mod layout;
+mod parameter_events;
+mod rosout;
+mod rosout_ros2;
 
-use crate::facts::SourceId;
+use crate::facts::{Claim, Facts, Name, Said, SourceId};
 pub use crate::facts::{Degree, Piece};
-use crate::proof::Known;
+use crate::proof::{Known, Stream};
+use crate::time::Stamp;
+use crate::wire::{self, Cursor};
+pub(crate) use layout::{Fit, Layout};
 
 /// A kind of evidence.
 pub struct Source {
     /// Its word in JSON.
     pub word: &'static str,
+    /// What it reads, in one line.
+    pub about: &'static str,
+    /// The layouts of the messages that it reads.
+    pub(crate) reads: &'static [Layout],
+    /// What the announcement of a connection says.
+    pub(crate) announced: Option<fn(&mut Heard<'_>)>,
     /// What follows from the whole mission; run in the order of the rows.
     pub(crate) conclude: Option<fn(SourceId, &mut Known<'_>)>,
 }
 
+/// A source that does nothing yet, for rows to fill in.
+const NOTHING: Source = Source {
+    word: "",
+    about: "",
+    reads: &[],
+    announced: None,
+    conclude: None,
+};
+
 /// All kinds of evidence; a set of them ([`Evidence`]) holds at most 64.
-pub const SOURCES: &[Source] = &[Source {
-    word: "connection",
-    conclude: Some(connection::conclude),
-}];
+pub const SOURCES: &[Source] = &[
+    Source {
+        word: "connection",
+        about: "ROS 1 connection headers and MCAP channel metadata (`callerid`)",
+        conclude: Some(connection::conclude),
+        ..NOTHING
+    },
+    Source {
+        word: "rosout",
+        about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
+        reads: &[rosout::LAYOUT, rosout::OLD_LAYOUT, rosout_ros2::LAYOUT],
+        conclude: Some(rosout::conclude),
+        ..NOTHING
+    },
+    Source {
+        word: "parameter_events",
+        about: "`rcl_interfaces/msg/ParameterEvent`",
+        reads: &[parameter_events::LAYOUT],
+        ..NOTHING
+    },
+];
+
+/// What a source hears, and where its claims go.
+pub(crate) struct Heard<'a> {
+    pub(crate) facts: &'a mut Facts,
+    pub(crate) stream: &'a Stream,
+    pub(crate) source: SourceId,
+    pub(crate) time: Stamp,
+}
+
+impl Heard<'_> {
+    /// The handle on a text.
+    pub(crate) fn name(&mut self, text: &str) -> Name {
+        self.facts.name(text)
+    }
+
+    /// Takes a claim down, made now, with the words it rests on.
+    pub(crate) fn claim(&mut self, claim: Claim, degree: Degree, words: impl FnOnce() -> String) {
+        let said = Said {
+            claim,
+            degree,
+            snapshot: None,
+        };
+        self.say(said, words);
+    }
+
+    /// Takes a claim down that stands and falls with a snapshot.
+    pub(crate) fn say(&mut self, said: Said, words: impl FnOnce() -> String) {
+        let word = SOURCES.get(self.source).map_or("", |s| s.word);
+        self.facts.explain(said, word, self.time, words);
+        self.facts.add(self.source, said, self.time);
+    }
+}
+
+/// A reader of one layout.
+pub(crate) type Read = fn(&mut Heard<'_>, &mut Cursor<'_>) -> wire::Result<()>;
+
+/// The sources that read a connection's messages, with how; and whether some source knows its type by another layout.
+pub(crate) fn readers(stream: &Stream) -> (Vec<(SourceId, Read)>, bool) {
+    let mut readers = Vec::new();
+    let mut foreign = false;
+    for (id, source) in SOURCES.iter().enumerate() {
+        let fits = source.reads.iter().map(|layout| (layout, layout.fit(&stream.connection)));
+        let known: Vec<_> = fits.filter(|(_, fit)| *fit != Fit::OtherType).collect();
+        match known.iter().find(|(_, fit)| *fit == Fit::Same) {
+            Some((layout, _)) => readers.push((id, layout.read)),
+            None => foreign |= !known.is_empty(),
+        }
+    }
+    (readers, foreign)
+}
 
 /// A set of kinds of evidence: the places of rows in [`SOURCES`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -38,11 +130,8 @@ impl Evidence {
 
     /// The set of this one row.
     pub(crate) fn row(source: SourceId) -> Self {
-        Self(
-            1_u64
-                .checked_shl(u32::try_from(source).unwrap_or(64))
-                .unwrap_or(0),
-        )
+        let bit = u32::try_from(source).unwrap_or(u32::MAX);
+        Self(1_u64.checked_shl(bit).unwrap_or(0))
     }
 
     /// Both together.

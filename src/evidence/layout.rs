@@ -1,0 +1,129 @@
+//! Whether a connection's messages have the layout that a source knows: by type, and by definition or hash.
+
+use super::Read;
+use crate::bag::{Connection, Encoding};
+
+/// A message layout that a source can read.
+pub(crate) struct Layout {
+    /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`.
+    pub(crate) type_name: &'static str,
+    /// Its md5 sum in ROS 1, looked at where the definition is missing; empty in ROS 2.
+    pub(crate) md5: &'static str,
+    /// The encoding it is for.
+    pub(crate) encoding: Encoding,
+    /// The fields of the message and of all messages inside it, as [`outline`] writes them.
+    pub(crate) fields: &'static [(&'static str, &'static str)],
+    /// How its messages are read.
+    pub(crate) read: Read,
+}
+
+/// How well a connection fits a layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fit {
+    /// It has another type or encoding.
+    OtherType,
+    /// It has the type, but not its fields.
+    OtherFields,
+    /// It is the layout, as far as the bag tells.
+    Same,
+}
+
+/// `std_msgs/Header` of ROS 1.
+pub(crate) const HEADER: (&str, &str) = ("Header", "uint32 seq;time stamp;string frame_id");
+/// `std_msgs/msg/Header` of ROS 2.
+pub(crate) const HEADER2: (&str, &str) = ("Header", "Time stamp;string frame_id");
+/// `builtin_interfaces/msg/Time`.
+pub(crate) const TIME2: (&str, &str) = ("Time", "int32 sec;uint32 nanosec");
+
+impl Layout {
+    /// Whether the messages of a connection can be read.
+    pub(crate) fn fit(&self, connection: &Connection) -> Fit {
+        let type_name = connection.type_name.replacen("/msg/", "/", 1);
+        if type_name != self.type_name || connection.encoding != self.encoding {
+            return Fit::OtherType;
+        }
+        let definition = connection.definition.as_deref().unwrap_or_default();
+        let hash = connection.type_hash.as_deref().unwrap_or_default();
+        let same = if definition.trim().is_empty() || is_idl(definition) {
+            // Nothing to compare with: a payload that is not used up exactly is still refused.
+            self.md5.is_empty() || ["", "*", self.md5].contains(&hash)
+        } else {
+            self.matches(definition)
+        };
+        if same { Fit::Same } else { Fit::OtherFields }
+    }
+
+    /// The message itself must have the fields; messages inside it are compared where the definition holds them.
+    fn matches(&self, definition: &str) -> bool {
+        outline(definition).iter().enumerate().all(|(at, (name, fields))| {
+            let name = if at == 0 { "" } else { name.as_str() };
+            match self.fields.iter().find(|(known, _)| *known == name) {
+                Some((_, known)) => fields == known,
+                None => at != 0,
+            }
+        })
+    }
+}
+
+/// Definitions in OMG IDL are not taken apart.
+fn is_idl(definition: &str) -> bool {
+    definition.contains("module ") && definition.contains("struct ")
+}
+
+/// The messages in a definition, the outermost first: last part of the name, then `type name` of each field with `;`
+/// between. Comments, constants, defaults, bounds and packages are left out; all types of one byte are `byte`.
+pub(crate) fn outline(definition: &str) -> Vec<(String, String)> {
+    let mut messages = vec![(String::new(), String::new())];
+    for line in definition.lines() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if let Some(name) = line.strip_prefix("MSG:") {
+            messages.push((last(name.trim()).to_owned(), String::new()));
+        } else if let (Some(field), Some((_, fields))) = (field(line), messages.last_mut()) {
+            if !fields.is_empty() {
+                fields.push(';');
+            }
+            fields.push_str(&field);
+        }
+    }
+    messages
+}
+
+fn last(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
+/// `type name` of a line; `None` if it holds a constant or nothing.
+fn field(line: &str) -> Option<String> {
+    let (kind, rest) = line.split_once(char::is_whitespace)?;
+    let rest = rest.trim_start();
+    let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_'));
+    let (name, tail) = rest.split_at(end.unwrap_or(rest.len()));
+    if name.is_empty() || tail.trim_start().starts_with('=') {
+        return None;
+    }
+    let (kind, array) = kind.split_at(kind.find('[').unwrap_or(kind.len()));
+    let kind = last(kind.split("<=").next().unwrap_or(kind));
+    let kind = match kind {
+        "int8" | "uint8" | "char" | "bool" => "byte",
+        other => other,
+    };
+    let array = if array.starts_with("[<=") { "[]" } else { array };
+    Some(format!("{kind}{array} {name}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_definition_is_boiled_down_to_its_fields() {
+        let text = "# a comment\nbyte OK=0 # fine\nstd_msgs/Header header\nuint8 level # how bad\nstring<=255 id\n\
+                    KeyValue[<=3] values\nint32 n 5\n===\nMSG: some_msgs/KeyValue\nstring key\nstring X = a;b\n";
+        let fields = |at: usize| outline(text)[at].clone();
+        assert_eq!(
+            fields(0).1,
+            "Header header;byte level;string id;KeyValue[] values;int32 n"
+        );
+        assert_eq!(fields(1), ("KeyValue".to_owned(), "string key".to_owned()));
+    }
+}
