@@ -5,17 +5,22 @@ use std::io;
 
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::error::{Error, Result};
-use crate::facts::Facts;
+use crate::evidence::{self, Heard, Piece, Read, SOURCES};
+use crate::facts::{Facts, SourceId};
+use crate::name::TopicName;
 use crate::notice::{Notice, NoticeKind, Notices};
 use crate::proof::Stream;
 use crate::stamps::Stamps;
 use crate::time::{Span, Stamp};
+use crate::wire::Cursor;
 
 /// What to look at while reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// Know every payload's size, even if that means reading more than the index.
     pub sizes: bool,
+    /// Keep every piece of evidence on the elements with all of these names (one: a node or topic; two: an edge).
+    pub why: Vec<String>,
 }
 
 /// Takes in bags, one after another.
@@ -23,6 +28,8 @@ pub struct Options {
 pub struct Collector {
     options: Options,
     streams: Vec<Stream>,
+    /// Who reads the messages of each stream.
+    readers: Vec<Vec<(SourceId, Read)>>,
     messages: Stamps,
     facts: Facts,
     notices: Notices,
@@ -32,10 +39,10 @@ pub struct Collector {
 impl Collector {
     /// A collector of nothing yet.
     pub fn new(options: Options) -> Self {
-        Self {
-            options,
-            ..Self::default()
-        }
+        let mut all = Self::default();
+        all.facts.watched.clone_from(&options.why);
+        all.options = options;
+        all
     }
 
     /// The sink for the next bag; `progress` hears how far its reader is (bytes done, bytes in all).
@@ -46,6 +53,44 @@ impl Collector {
             bag: self.bags - 1,
             collector: self,
             progress,
+        }
+    }
+
+    /// Lets every source look at the newest stream.
+    fn announced(&mut self) {
+        let Some((place, stream)) = self.streams.iter().enumerate().next_back() else {
+            return;
+        };
+        for (source, row) in SOURCES.iter().enumerate() {
+            if let Some(announced) = row.announced {
+                announced(&mut Heard {
+                    facts: &mut self.facts,
+                    stream,
+                    place,
+                    source,
+                    time: Stamp(0),
+                });
+            }
+        }
+    }
+
+    /// Lets the sources that know its layout read a message.
+    fn read(&mut self, place: usize, message: &Message<'_>) {
+        let stream = &self.streams[place];
+        for (source, read) in &self.readers[place] {
+            let mut heard = Heard {
+                facts: &mut self.facts,
+                stream,
+                place,
+                source: *source,
+                time: message.time,
+            };
+            let done = Cursor::new(&stream.connection.encoding, message.data)
+                .and_then(|mut payload| read(&mut heard, &mut payload));
+            if done.is_err() {
+                self.notices
+                    .add(undecodable(stream, "some messages do not have its layout"));
+            }
         }
     }
 
@@ -68,6 +113,20 @@ impl Collector {
         all.span = all.measure().map_err(spool_error)?;
         Ok(all)
     }
+}
+
+/// rospy latches its log, and yet the last record says nothing about its node's life.
+fn is_log(topic: &TopicName) -> bool {
+    topic.as_str() == "/rosout"
+}
+
+/// Says that a stream, or a message of it, has another layout than its type promises.
+fn undecodable(stream: &Stream, why: &str) -> Notice {
+    let (topic, kind) = (&stream.connection.topic, &stream.connection.type_name);
+    Notice::new(
+        NoticeKind::Undecodable,
+        format!("`{topic}` of type `{kind}` was not read for evidence: {why}"),
+    )
 }
 
 /// The temporary file of times could not be written or read.
@@ -104,17 +163,25 @@ impl Sink for BagSink<'_> {
             connection: connection.clone(),
             topic,
             publisher: publisher.map(|p| all.facts.name(p.as_str())),
-            latched: connection.latching,
+            latched: connection.latching && !is_log(&connection.topic),
             trusted: true,
             times: all.messages.series(),
         };
+        let (readers, foreign) = evidence::readers(&stream);
+        if foreign {
+            all.notices
+                .add(undecodable(&stream, "its definition is not the known one"));
+        }
+        let want = match (readers.is_empty(), all.options.sizes) {
+            (false, _) => Want::Payload,
+            (true, true) => Want::Sizes,
+            (true, false) => Want::Stamps,
+        };
         self.streams.push(all.streams.len());
         all.streams.push(stream);
-        if all.options.sizes {
-            Want::Sizes
-        } else {
-            Want::Stamps
-        }
+        all.readers.push(readers);
+        all.announced();
+        want
     }
 
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
@@ -124,7 +191,11 @@ impl Sink for BagSink<'_> {
         }
     }
 
-    fn message(&mut self, _message: Message<'_>) {}
+    fn message(&mut self, message: Message<'_>) {
+        if let Some(stream) = self.stream(message.connection) {
+            self.collector.read(stream, &message);
+        }
+    }
 
     fn notice(&mut self, notice: Notice) {
         self.collector.notices.add(notice);
@@ -151,6 +222,13 @@ pub struct Collected {
 }
 
 impl Collected {
+    /// Every piece of evidence on what [`Options::why`] asks for, in order of time, source and text.
+    pub fn why(&self) -> Vec<Piece> {
+        let mut pieces = self.facts.pieces.clone();
+        pieces.sort_unstable();
+        pieces
+    }
+
     /// Whether a time may be believed.
     pub(crate) fn believes(&self, time: Stamp) -> bool {
         self.believed.is_none_or(|span| span.contains(time))

@@ -3,18 +3,26 @@
 //! A source reads messages whose layout it knows, or the announcement of a connection, or draws a conclusion from the
 //! whole mission; what it finds are claims. `evidence.md` of the design tells where each rule comes from.
 
+mod action;
+mod bond;
 mod connection;
-mod layout;
+mod diagnostics;
+mod dynamic_reconfigure;
+mod links;
 mod parameter_events;
 mod rosout;
 mod rosout_ros2;
+mod rosout_rule;
+mod statistics;
 
+use std::io;
+
+use crate::definition::{self, Fit, Shape};
 use crate::facts::{Claim, Facts, Name, Said, SourceId};
 pub use crate::facts::{Degree, Piece};
 use crate::proof::{Known, Stream};
 use crate::time::Stamp;
 use crate::wire::{self, Cursor};
-pub(crate) use layout::{Fit, Layout};
 
 /// A kind of evidence.
 pub struct Source {
@@ -23,12 +31,15 @@ pub struct Source {
     /// What it reads, in one line.
     pub about: &'static str,
     /// The layouts of the messages that it reads.
-    pub(crate) reads: &'static [Layout],
+    pub(crate) reads: &'static [(Shape, Read)],
     /// What the announcement of a connection says.
     pub(crate) announced: Option<fn(&mut Heard<'_>)>,
     /// What follows from the whole mission; run in the order of the rows.
-    pub(crate) conclude: Option<fn(SourceId, &mut Known<'_>)>,
+    pub(crate) conclude: &'static [Conclude],
 }
+
+/// Draws a conclusion.
+type Conclude = fn(SourceId, &mut Known<'_>) -> io::Result<()>;
 
 /// A source that does nothing yet, for rows to fill in.
 const NOTHING: Source = Source {
@@ -36,7 +47,7 @@ const NOTHING: Source = Source {
     about: "",
     reads: &[],
     announced: None,
-    conclude: None,
+    conclude: &[],
 };
 
 /// All kinds of evidence; a set of them ([`Evidence`]) holds at most 64.
@@ -44,20 +55,74 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "connection",
         about: "ROS 1 connection headers and MCAP channel metadata (`callerid`)",
-        conclude: Some(connection::conclude),
+        conclude: &[connection::conclude],
         ..NOTHING
     },
     Source {
-        word: "rosout",
-        about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
-        reads: &[rosout::LAYOUT, rosout::OLD_LAYOUT, rosout_ros2::LAYOUT],
-        conclude: Some(rosout::conclude),
+        word: "statistics",
+        about: "`/statistics` of ROS 1 (`rosgraph_msgs/TopicStatistics`)",
+        reads: &[(statistics::SHAPE, statistics::read)],
         ..NOTHING
     },
     Source {
         word: "parameter_events",
         about: "`rcl_interfaces/msg/ParameterEvent`",
-        reads: &[parameter_events::LAYOUT],
+        reads: &[(parameter_events::SHAPE, parameter_events::read)],
+        ..NOTHING
+    },
+    Source {
+        word: "links",
+        about: "log records of roscpp about its connections",
+        reads: &[
+            (definition::LOG, links::read),
+            (definition::OLD_LOG, links::read),
+        ],
+        ..NOTHING
+    },
+    Source {
+        word: "rosout",
+        about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
+        reads: &[
+            (definition::LOG, rosout::read),
+            (definition::OLD_LOG, rosout::read),
+            (rosout_ros2::SHAPE, rosout_ros2::read),
+        ],
+        conclude: &[rosout::conclude, rosout_ros2::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "diagnostics",
+        about: "status names of `diagnostic_msgs/DiagnosticArray`, and its aggregator",
+        reads: &[
+            (diagnostics::SHAPE, diagnostics::read),
+            (diagnostics::SHAPE2, diagnostics::read),
+        ],
+        conclude: &[diagnostics::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "dynamic_reconfigure",
+        about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1",
+        conclude: &[dynamic_reconfigure::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "action",
+        about: "the topics of actions, and the clients in `actionlib_msgs/GoalStatusArray`",
+        reads: &[(action::SHAPE, action::read)],
+        conclude: &[action::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "bond",
+        about: "topics of type `bond/Status`",
+        conclude: &[bond::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "rosout_rule",
+        about: "every node of ROS 1 publishes `/rosout`",
+        conclude: &[rosout_rule::conclude],
         ..NOTHING
     },
 ];
@@ -66,6 +131,8 @@ pub const SOURCES: &[Source] = &[
 pub(crate) struct Heard<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) stream: &'a Stream,
+    /// The stream's place among all streams.
+    pub(crate) place: usize,
     pub(crate) source: SourceId,
     pub(crate) time: Stamp,
 }
@@ -74,6 +141,11 @@ impl Heard<'_> {
     /// The handle on a text.
     pub(crate) fn name(&mut self, text: &str) -> Name {
         self.facts.name(text)
+    }
+
+    /// Takes down the sequence number of a message, which falls back when its publisher starts anew.
+    pub(crate) fn sequence(&mut self, number: u32) {
+        self.facts.sequence(self.place, self.time, number);
     }
 
     /// Takes a claim down, made now, with the words it rests on.
@@ -102,10 +174,13 @@ pub(crate) fn readers(stream: &Stream) -> (Vec<(SourceId, Read)>, bool) {
     let mut readers = Vec::new();
     let mut foreign = false;
     for (id, source) in SOURCES.iter().enumerate() {
-        let fits = source.reads.iter().map(|layout| (layout, layout.fit(&stream.connection)));
+        let fits = source
+            .reads
+            .iter()
+            .map(|(shape, read)| (read, shape.fit(&stream.connection)));
         let known: Vec<_> = fits.filter(|(_, fit)| *fit != Fit::OtherType).collect();
         match known.iter().find(|(_, fit)| *fit == Fit::Same) {
-            Some((layout, _)) => readers.push((id, layout.read)),
+            Some((read, _)) => readers.push((id, **read)),
             None => foreign |= !known.is_empty(),
         }
     }

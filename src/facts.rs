@@ -3,7 +3,7 @@
 //! A claim is kept once per source with the times at which it was made, so that millions of messages that repeat
 //! themselves take no more room than their (compressed) times.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io;
 use std::sync::Arc;
 
@@ -51,6 +51,8 @@ pub(crate) enum Claim {
     NodeGone(Name),
     /// This topic exists.
     Topic(Name),
+    /// A recorder of all topics has just seen this topic for the first time.
+    Appears(Name),
     /// This node publishes this topic.
     Publish(Name, Name),
     /// This node subscribes this topic.
@@ -59,6 +61,10 @@ pub(crate) enum Claim {
     Unsubscribe(Name, Name),
     /// This node names this topic as its own, as publisher or as subscriber.
     Lists(Name, Name),
+    /// Log records of the second node come over a connection that names the first as publisher.
+    Carries(Name, Name),
+    /// A logger of this name, which is a node or a part of one, logs.
+    Logger(Name),
     /// This node is in this lifecycle state.
     Lifecycle(Name, Name),
     /// The first node runs the second one in its own process.
@@ -72,16 +78,40 @@ pub(crate) enum Claim {
 }
 
 impl Claim {
+    /// The names in it.
+    fn names(self) -> [Option<Name>; 2] {
+        match self {
+            Self::Node(a)
+            | Self::NodeGone(a)
+            | Self::Topic(a)
+            | Self::Appears(a)
+            | Self::Logger(a)
+            | Self::Snapshot(a) => [Some(a), None],
+            Self::Publish(a, b)
+            | Self::Subscribe(a, b)
+            | Self::Unsubscribe(a, b)
+            | Self::Lists(a, b)
+            | Self::Carries(a, b)
+            | Self::Lifecycle(a, b)
+            | Self::Hosts(a, b)
+            | Self::Type(a, b)
+            | Self::Quality(a, b) => [Some(a), Some(b)],
+        }
+    }
+
     /// The same claim by new names.
     fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
         match self {
             Self::Node(a) => Self::Node(to(a)),
             Self::NodeGone(a) => Self::NodeGone(to(a)),
             Self::Topic(a) => Self::Topic(to(a)),
+            Self::Appears(a) => Self::Appears(to(a)),
             Self::Publish(a, b) => Self::Publish(to(a), to(b)),
             Self::Subscribe(a, b) => Self::Subscribe(to(a), to(b)),
             Self::Unsubscribe(a, b) => Self::Unsubscribe(to(a), to(b)),
             Self::Lists(a, b) => Self::Lists(to(a), to(b)),
+            Self::Carries(a, b) => Self::Carries(to(a), to(b)),
+            Self::Logger(a) => Self::Logger(to(a)),
             Self::Lifecycle(a, b) => Self::Lifecycle(to(a), to(b)),
             Self::Hosts(a, b) => Self::Hosts(to(a), to(b)),
             Self::Type(a, b) => Self::Type(to(a), to(b)),
@@ -125,6 +155,11 @@ const MOST: usize = 1 << 20;
 /// All claims of a mission.
 #[derive(Debug, Default)]
 pub(crate) struct Facts {
+    /// The names somebody asks about ([`Piece`]); none: no pieces are kept.
+    pub(crate) watched: Vec<String>,
+    pub(crate) pieces: Vec<Piece>,
+    /// The sequence numbers of streams, by the streams' places; kept as if they were sizes.
+    pub(crate) sequences: BTreeMap<usize, SeriesId>,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
     places: HashMap<(Claim, SourceId, Option<Name>), usize>,
@@ -161,6 +196,39 @@ impl Facts {
         self.texts
             .get(name.0 as usize)
             .map_or_else(|| "".into(), Arc::clone)
+    }
+
+    /// Keeps the words of a claim, if it is about what somebody asked for.
+    pub(crate) fn explain(
+        &mut self,
+        said: Said,
+        source: &'static str,
+        time: Stamp,
+        words: impl FnOnce() -> String,
+    ) {
+        if self.watched.is_empty() || self.pieces.len() >= MOST {
+            return;
+        }
+        let names = said.claim.names();
+        let named = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
+        if self.watched.iter().all(named) {
+            self.pieces.push(Piece {
+                time: Some(time),
+                source,
+                degree: said.degree,
+                text: words(),
+            });
+        }
+    }
+
+    /// Takes in a sequence number of the stream at `place`.
+    pub(crate) fn sequence(&mut self, place: usize, time: Stamp, number: u32) {
+        let times = &mut self.times;
+        let id = *self
+            .sequences
+            .entry(place)
+            .or_insert_with(|| times.series());
+        self.times.add(id, &[time], Some(&[number]));
     }
 
     /// Takes in that `source` claims something at `time`.

@@ -8,6 +8,7 @@ pub mod bag;
 pub mod cli;
 pub mod collect;
 mod decompress;
+mod definition;
 pub mod diff;
 pub mod encode;
 pub mod error;

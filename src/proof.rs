@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::bag::Connection;
-use crate::facts::{Claim, Degree, Facts, Name, SourceId};
+use crate::facts::{Claim, Degree, Fact, Facts, Name, SourceId};
 use crate::stamps::SeriesId;
 use crate::time::Stamp;
 
@@ -91,6 +91,8 @@ pub(crate) struct Known<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: &'a mut Facts,
     pub(crate) proofs: Vec<Proof>,
+    /// The process that a nodelet or component runs in.
+    pub(crate) hosts: BTreeMap<Name, Name>,
     publishers: BTreeMap<Name, BTreeSet<Name>>,
     nodes: BTreeSet<Name>,
 }
@@ -101,6 +103,7 @@ impl<'a> Known<'a> {
             streams,
             facts,
             proofs: Vec::new(),
+            hosts: BTreeMap::new(),
             publishers: BTreeMap::new(),
             nodes: BTreeSet::new(),
         }
@@ -131,13 +134,73 @@ impl<'a> Known<'a> {
         &self.nodes
     }
 
+    /// The recorded topics whose type fits, in the order of their names.
+    pub(crate) fn topics_of(&self, fits: impl Fn(&str) -> bool) -> Vec<Name> {
+        let fitting = self
+            .streams
+            .iter()
+            .filter(|s| fits(&s.connection.type_name));
+        let mut topics: Vec<_> = fitting
+            .map(|s| (s.connection.topic.clone(), s.topic))
+            .collect();
+        topics.sort();
+        topics.dedup();
+        topics.into_iter().map(|(_, topic)| topic).collect()
+    }
+
+    /// By a convention, `what` lives as long as `basis`.
+    pub(crate) fn like(&mut self, source: SourceId, what: What, basis: What) {
+        self.prove(Proof {
+            what,
+            source,
+            degree: Degree::Inferred,
+            when: When::Like(basis),
+        });
+    }
+
+    /// By a convention, whoever publishes `basis` subscribes `topic` as well.
+    pub(crate) fn subscribes_as_well(
+        &mut self,
+        source: SourceId,
+        node: Name,
+        basis: Name,
+        topic: Name,
+    ) {
+        self.like(
+            source,
+            What::Subscribe(topic, node),
+            What::Publish(node, basis),
+        );
+    }
+
     /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
         self.facts.text(name)
     }
 
+    /// All claims of one source with their signs and ends, sorted.
+    pub(crate) fn claims(
+        &mut self,
+        source: SourceId,
+    ) -> io::Result<Vec<(Fact, Vec<Stamp>, Vec<Stamp>)>> {
+        let endings = self.endings();
+        let facts: Vec<Fact> = self
+            .facts
+            .list
+            .iter()
+            .filter(|f| f.source == source)
+            .copied()
+            .collect();
+        let times = |fact: Fact| {
+            let (signs, ends) = self.times(&fact, &endings)?;
+            Ok((fact, signs, ends))
+        };
+        facts.into_iter().map(times).collect()
+    }
+
     /// What the claims say without any rule: nodes, topics, publications and subscriptions.
     pub(crate) fn take_at_their_word(&mut self) -> io::Result<()> {
+        let endings = self.endings();
         for fact in self.facts.list.clone() {
             let what = match fact.claim {
                 Claim::Node(node) => What::Node(node),
@@ -146,45 +209,60 @@ impl<'a> Known<'a> {
                 Claim::Subscribe(node, topic) => What::Subscribe(topic, node),
                 _ => continue,
             };
-            let signs = self.facts.times(&fact)?;
-            let (ends, held) = self.ends(&fact, &signs)?;
+            let (signs, ends) = self.times(&fact, &endings)?;
             self.prove(Proof {
                 what,
                 source: fact.source,
                 degree: fact.degree,
-                when: When::Signs { signs, ends, held },
+                when: When::Signs {
+                    signs,
+                    ends,
+                    held: false,
+                },
             });
         }
         Ok(())
     }
 
-    /// When a claim was taken back, and whether it holds until then even without a further word.
-    fn ends(
-        &mut self,
-        fact: &crate::facts::Fact,
-        signs: &[Stamp],
-    ) -> io::Result<(Vec<Stamp>, bool)> {
-        let mut ends = Vec::new();
-        let mut held = false;
-        for other in self.facts.list.clone() {
-            let ended = match (fact.claim, other.claim) {
-                (Claim::Node(a), Claim::NodeGone(b)) => a == b,
-                (Claim::Subscribe(a, t), Claim::Unsubscribe(b, u)) => (a, t) == (b, u),
-                (_, Claim::Snapshot(name)) => fact.snapshot == Some(name),
-                _ => false,
-            };
-            if ended {
-                let snapshot = matches!(other.claim, Claim::Snapshot(_));
-                held |= snapshot;
-                let times = self.facts.times(&other)?;
-                ends.extend(
-                    times
-                        .into_iter()
-                        .filter(|t| !snapshot || signs.binary_search(t).is_err()),
-                );
+    /// The facts that end others.
+    fn endings(&self) -> BTreeMap<Claim, Vec<Fact>> {
+        let mut endings: BTreeMap<Claim, Vec<Fact>> = BTreeMap::new();
+        for fact in &self.facts.list {
+            if let Claim::NodeGone(_) | Claim::Unsubscribe(..) | Claim::Snapshot(_) = fact.claim {
+                endings.entry(fact.claim).or_default().push(*fact);
             }
         }
+        endings
+    }
+
+    /// When a claim was made, and when it was taken back, sorted.
+    fn times(
+        &mut self,
+        fact: &Fact,
+        endings: &BTreeMap<Claim, Vec<Fact>>,
+    ) -> io::Result<(Vec<Stamp>, Vec<Stamp>)> {
+        let signs = self.facts.times(fact)?;
+        let mut ends = Vec::new();
+        let ending = match fact.claim {
+            Claim::Node(node) => Some(Claim::NodeGone(node)),
+            Claim::Subscribe(node, topic) => Some(Claim::Unsubscribe(node, topic)),
+            _ => None,
+        };
+        for end in ending.iter().flat_map(|e| endings.get(e)).flatten() {
+            ends.extend(self.facts.times(end)?);
+        }
+        let snapshot = fact.snapshot.map(Claim::Snapshot);
+        for taken in snapshot.iter().flat_map(|s| endings.get(s)).flatten() {
+            // A snapshot that does not hold the claim ends it.
+            let times = self.facts.times(taken)?;
+            ends.extend(
+                times
+                    .into_iter()
+                    .filter(|t| signs.binary_search(t).is_err()),
+            );
+        }
         ends.sort_unstable();
-        Ok((ends, held))
+        ends.dedup();
+        Ok((signs, ends))
     }
 }

@@ -1,10 +1,12 @@
 //! ROS 1 connection headers and MCAP channel metadata: who publishes each message (`callerid`).
 
+use std::io;
+
 use crate::facts::{Degree, SourceId};
 use crate::proof::{Known, Proof, What, When};
 
 /// Every stream proves its topic, and its publisher where that is named and believed.
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
         let proof = |what| Proof {
@@ -18,4 +20,5 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
             known.prove(proof(What::Publish(node, stream.topic)));
         }
     }
+    Ok(())
 }

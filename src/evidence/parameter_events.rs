@@ -1,13 +1,13 @@
 //! Parameter events of ROS 2: a node is alive.
 
-use super::layout::{Layout, TIME2};
 use super::Heard;
 use crate::bag::Encoding;
+use crate::definition::{Shape, TIME2};
 use crate::facts::{Claim, Degree};
 use crate::wire::{self, Cursor};
 
 /// `rcl_interfaces/msg/ParameterEvent`.
-pub(super) const LAYOUT: Layout = Layout {
+pub(super) const SHAPE: Shape = Shape {
     type_name: "rcl_interfaces/ParameterEvent",
     md5: "",
     encoding: Encoding::Cdr,
@@ -24,10 +24,9 @@ pub(super) const LAYOUT: Layout = Layout {
         ),
         TIME2,
     ],
-    read,
 };
 
-fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
+pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
     payload.time()?;
     let name = payload.string()?;
     for _ in 0..3 {
@@ -38,7 +37,9 @@ fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
     payload.finish()?;
     if !name.is_empty() {
         let node = heard.name(name);
-        heard.claim(Claim::Node(node), Degree::Stated, || format!("{name} tells of its parameters"));
+        heard.claim(Claim::Node(node), Degree::Stated, || {
+            format!("{name} tells of its parameters")
+        });
         let topic = heard.stream.topic;
         heard.claim(Claim::Publish(node, topic), Degree::Stated, || {
             format!("{name} tells of its parameters")

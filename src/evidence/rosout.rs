@@ -3,35 +3,15 @@
 //! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy tells itself by the `.py` of
 //! the file that logged.
 
-use super::layout::{HEADER, Layout};
+use std::collections::BTreeSet;
+use std::io;
+
 use super::Heard;
-use crate::bag::Encoding;
-use crate::facts::{Claim, Degree, SourceId};
+use crate::facts::{Claim, Degree, Fact, Name, Said, SourceId};
 use crate::proof::{Known, Proof, What, When};
 use crate::wire::{self, Cursor};
 
-/// `rosgraph_msgs/Log`.
-pub(super) const LAYOUT: Layout = Layout {
-    type_name: "rosgraph_msgs/Log",
-    md5: "acffd30cd6b6de30f120938c17c593fb",
-    encoding: Encoding::Ros1,
-    fields: &[
-        (
-            "",
-            "Header header;byte level;string name;string msg;string file;string function;uint32 line;string[] topics",
-        ),
-        HEADER,
-    ],
-    read,
-};
-
-/// The same before 2011.
-pub(super) const OLD_LAYOUT: Layout = Layout {
-    type_name: "roslib/Log",
-    ..LAYOUT
-};
-
-fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
+pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
     let seq = payload.header()?;
     payload.u8()?;
     let name = payload.string()?;
@@ -40,14 +20,18 @@ fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
     payload.skip_string()?;
     payload.u32()?;
     let count = payload.length(4)?;
-    let topics = (0..count).map(|_| payload.string()).collect::<wire::Result<Vec<_>>>()?;
+    let topics = (0..count)
+        .map(|_| payload.string())
+        .collect::<wire::Result<Vec<_>>>()?;
     payload.finish()?;
     heard.sequence(seq);
     if name.is_empty() {
         return Ok(());
     }
     let node = heard.name(name);
-    heard.claim(Claim::Node(node), Degree::Stated, || format!("{name} logs: {message}"));
+    heard.claim(Claim::Node(node), Degree::Stated, || {
+        format!("{name} logs: {message}")
+    });
     if &*heard.stream.connection.topic.shared() == "/rosout"
         && let Some(publisher) = heard.stream.publisher
         && publisher != node
@@ -55,25 +39,42 @@ fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
         let claim = Claim::Carries(publisher, node);
         heard.claim(claim, Degree::Stated, String::new);
     }
+    // The list is whole: what is in an earlier one and not in this one is no longer the node's.
+    let list = heard.name(&format!("topics of {name}"));
     let rospy = file.ends_with(".py");
     for topic in topics {
-        let text = || format!("{name} logs with {topic} in its list of topics: {message}");
+        let words = || format!("{name} logs with {topic} in its list of topics: {message}");
         let topic = heard.name(topic);
-        let claim = if rospy { Claim::Lists(node, topic) } else { Claim::Publish(node, topic) };
-        heard.claim(claim, Degree::Stated, text);
+        let claim = if rospy {
+            Claim::Lists(node, topic)
+        } else {
+            Claim::Publish(node, topic)
+        };
+        heard.say(
+            Said {
+                claim,
+                degree: Degree::Stated,
+                snapshot: Some(list),
+            },
+            words,
+        );
     }
+    heard.claim(Claim::Snapshot(list), Degree::Stated, String::new);
     Ok(())
 }
 
-/// A topic in a rospy node's list that others publish, and the node itself is not known to, is a subscription.
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
-    for (claim, signs) in known.claims(source) {
-        let Claim::Lists(node, topic) = claim else {
+/// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
+/// subscription. If nobody is known to publish it, a recorder of all topics knows whether somebody advertises it.
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+    let advertised = advertised(known);
+    for (fact, signs, ends) in known.claims(source)? {
+        let Claim::Lists(node, topic) = fact.claim else {
             continue;
         };
         let own = known.publishers(topic).any(|p| p == node);
         let others = known.publishers(topic).any(|p| p != node);
-        let what = match (own, others) {
+        let silent = advertised.as_ref().is_some_and(|all| !all.contains(&topic));
+        let what = match (own, others || silent) {
             (true, _) => What::Publish(node, topic),
             (false, true) => What::Subscribe(topic, node),
             (false, false) => continue,
@@ -84,9 +85,22 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
             degree: Degree::Stated,
             when: When::Signs {
                 signs,
-                ends: Vec::new(),
+                ends,
                 held: false,
             },
         });
     }
+    Ok(())
+}
+
+/// Every topic that a recorder of all topics has seen advertised; `None` if none tells.
+fn advertised(known: &Known<'_>) -> Option<BTreeSet<Name>> {
+    let appears = |fact: &Fact| match fact.claim {
+        Claim::Appears(topic) => Some(topic),
+        _ => None,
+    };
+    let topics: BTreeSet<_> = known.facts.list.iter().filter_map(appears).collect();
+    // Nobody asks for this topic by name: the recorder was told to take all.
+    let all = known.facts.known("/rosout_agg")?;
+    topics.contains(&all).then_some(topics)
 }

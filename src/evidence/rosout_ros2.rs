@@ -1,13 +1,18 @@
 //! Log records of ROS 2: a node is alive. Dots stand for slashes; the loggers of a node's parts are folded into it.
 
-use super::layout::{Layout, TIME2};
+use std::collections::BTreeSet;
+use std::io;
+use std::sync::Arc;
+
 use super::Heard;
 use crate::bag::Encoding;
-use crate::facts::{Claim, Degree};
+use crate::definition::{Shape, TIME2};
+use crate::facts::{Claim, Degree, SourceId};
+use crate::proof::{Known, Proof, What, When};
 use crate::wire::{self, Cursor};
 
 /// `rcl_interfaces/msg/Log`.
-pub(super) const LAYOUT: Layout = Layout {
+pub(super) const SHAPE: Shape = Shape {
     type_name: "rcl_interfaces/Log",
     md5: "",
     encoding: Encoding::Cdr,
@@ -18,10 +23,9 @@ pub(super) const LAYOUT: Layout = Layout {
         ),
         TIME2,
     ],
-    read,
 };
 
-fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
+pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
     payload.time()?;
     payload.u8()?;
     let name = payload.string()?;
@@ -35,6 +39,62 @@ fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
     }
     let text = format!("/{}", name.trim_start_matches('/').replace('.', "/"));
     let node = heard.name(&text);
-    heard.claim(Claim::Logger(node), Degree::Stated, || format!("logger {name}: {message}"));
+    heard.claim(Claim::Logger(node), Degree::Stated, || {
+        format!("logger {name}: {message}")
+    });
     Ok(())
+}
+
+/// Parts of ROS 2 itself that log below the name of the node they work for.
+const PARTS: [&str; 5] = [
+    "rclcpp",
+    "rcl",
+    "rclcpp_action",
+    "rclcpp_lifecycle",
+    "tf2_ros",
+];
+
+/// A logger is a part of the nearest node or logger above it, and a node if there is none.
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+    let claims = known.claims(source)?;
+    let loggers = claims
+        .iter()
+        .filter_map(|(fact, signs, _)| match fact.claim {
+            Claim::Logger(name) => Some((known.text(name), signs.clone())),
+            _ => None,
+        });
+    let mut loggers: Vec<_> = loggers.collect();
+    loggers.sort();
+    let mut nodes: BTreeSet<Arc<str>> = known.nodes().iter().map(|n| known.text(*n)).collect();
+    for (logger, signs) in loggers {
+        let node = owner(&logger, &nodes);
+        nodes.insert(node.into());
+        let what = What::Node(known.facts.name(node));
+        known.prove(Proof {
+            what,
+            source,
+            degree: Degree::Stated,
+            when: When::Signs {
+                signs,
+                ends: Vec::new(),
+                held: false,
+            },
+        });
+    }
+    Ok(())
+}
+
+/// The node that a logger belongs to. Shorter names come first, so that a part finds its node.
+fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
+    let mut above = logger;
+    while !above.is_empty() {
+        if nodes.contains(above) {
+            return above;
+        }
+        above = &above[..above.rfind('/').unwrap_or(0)];
+    }
+    match logger.rsplit_once('/') {
+        Some((node, part)) if !node.is_empty() && PARTS.contains(&part) => node,
+        _ => logger,
+    }
 }

@@ -6,6 +6,7 @@ use std::io;
 use super::assemble::{Traffic, assemble};
 use super::lives::Track;
 use super::rates::{Rates, rates};
+use super::settle::{Frame, settle};
 use super::windows::Windows;
 use super::{Elements, Graph, NodeId};
 use crate::collect::{Collected, spool_error};
@@ -63,8 +64,8 @@ impl<'a> Builder<'a> {
         let mut known = Known::new(&collected.streams, &mut collected.facts);
         known.take_at_their_word()?;
         for (row, source) in SOURCES.iter().enumerate() {
-            if let Some(conclude) = source.conclude {
-                conclude(row, &mut known);
+            for conclude in source.conclude {
+                conclude(row, &mut known)?;
             }
         }
         let mut proofs = known.proofs;
@@ -92,7 +93,15 @@ impl<'a> Builder<'a> {
     fn run(mut self, collected: &mut Collected, options: &Options) -> io::Result<Built> {
         self.count(collected)?;
         self.track(collected);
-        self.settle(options);
+        settle(
+            &mut self.tracks,
+            &self.proofs,
+            &Frame {
+                windows: self.windows,
+                mission: self.mission,
+                grace: options.grace,
+            },
+        );
         Ok(self.assemble(collected))
     }
 
@@ -119,52 +128,19 @@ impl<'a> Builder<'a> {
             }
             match &proof.when {
                 When::Messages(stream) => {
-                    let held = collected.streams[*stream].latched;
+                    let latched = collected.streams[*stream].latched;
                     let rates = self.rates.get(&collected.streams[*stream].topic);
                     if let Some((streams, rates)) = rates {
                         let place = streams.iter().position(|s| s == stream).unwrap_or(0);
-                        follow(track, rates, place, held);
+                        follow(track, rates, place, latched, self.mission.1);
                     }
                 }
                 When::Signs { signs, ends, held } => {
                     track.sign_all(signs, ends, proof.degree, &self.windows);
-                    track.ends.extend(ends);
                     track.held |= held;
                 }
                 When::Like(_) => {}
                 When::Whole => track.whole = true,
-            }
-        }
-    }
-
-    /// Works out the lives of edges, of nodes and topics from their edges, and of what lives like something else.
-    fn settle(&mut self, options: &Options) {
-        let edges: Vec<(What, Track)> = self
-            .tracks
-            .iter()
-            .filter(|(what, _)| matches!(what, What::Publish(..) | What::Subscribe(..)))
-            .map(|(what, track)| (*what, track.clone()))
-            .collect();
-        for (what, track) in &edges {
-            if let What::Publish(node, topic) | What::Subscribe(topic, node) = *what {
-                for end in [What::Node(node), What::Topic(topic)] {
-                    self.tracks.entry(end).or_default().learn(track);
-                }
-            }
-        }
-        let windows = self.windows;
-        for track in self.tracks.values_mut() {
-            track.live(self.mission, |last| {
-                windows.last_moment(last, options.grace)
-            });
-        }
-        for proof in &self.proofs {
-            if let When::Like(other) = proof.when
-                && let Some(lives) = self.tracks.get(&other).map(|t| t.lives.clone())
-                && let Some(track) = self.tracks.get_mut(&proof.what)
-                && track.lives.is_empty()
-            {
-                track.lives = lives;
             }
         }
     }
@@ -175,15 +151,18 @@ impl<'a> Builder<'a> {
 }
 
 /// Puts the messages of one stream on a track.
-fn follow(track: &mut Track, rates: &Rates, place: usize, held: bool) {
-    let Some((first, last)) = rates.bounds.get(place).copied().flatten() else {
+fn follow(track: &mut Track, rates: &Rates, place: usize, latched: bool, end: Stamp) {
+    let Some(trace) = rates.traces.get(place).copied().flatten() else {
         track.whole = true;
         return;
     };
-    track.signs.extend([first, last]);
-    if held {
+    track.signs.extend([trace.first, trace.last]);
+    track.ceased |= trace.ceased(end);
+    if latched {
         track.held = true;
-        track.latched = track.latched.map_or(Some(first), |l| Some(l.min(first)));
+        track.latched = track
+            .latched
+            .map_or(Some(trace.first), |l| Some(l.min(trace.first)));
     }
     for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
         track.mark(tally.window, Degree::Measured);

@@ -28,6 +28,8 @@ pub(super) struct Track {
     pub(super) ends: Vec<Stamp>,
     /// Whether it lives on after its last sign.
     pub(super) held: bool,
+    /// Whether messages came in a rhythm that broke off before the mission's end.
+    pub(super) ceased: bool,
     /// Since when a latched message stands for it.
     pub(super) latched: Option<Stamp>,
     /// Windows with signs, and how strong the best one is.
@@ -45,6 +47,7 @@ impl Default for Track {
             signs: Vec::new(),
             ends: Vec::new(),
             held: false,
+            ceased: false,
             latched: None,
             active: BTreeMap::new(),
             whole: false,
@@ -87,6 +90,7 @@ impl Track {
         self.quiet = self.quiet.min(other.quiet);
         self.signs.extend(&other.signs);
         self.held |= other.held;
+        self.ceased |= other.ceased;
         self.whole |= other.whole;
         self.latched = match (self.latched, other.latched) {
             (Some(a), Some(b)) => Some(a.min(b)),
@@ -97,14 +101,14 @@ impl Track {
         }
     }
 
-    /// Works out the lives; `to` is the mission's end, `linger` the last moment of somebody whose last sign is known.
+    /// Works out the lives from the signs alone; `linger` is the last moment of somebody whose last sign is known.
     pub(super) fn live(&mut self, mission: (Stamp, Stamp), linger: impl Fn(Stamp) -> Stamp) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
         self.lives = lives(&self.signs, &self.ends);
         if let Some(life) = self.lives.last_mut() {
             let ended = self.ends.last().is_some_and(|end| *end >= life.spoke);
-            life.to = match (ended, self.held) {
+            life.to = match (ended, self.held && !self.ceased) {
                 (true, _) => life.to,
                 (false, true) => mission.1,
                 (false, false) => linger(life.spoke),
@@ -119,6 +123,42 @@ impl Track {
         }
     }
 
+    /// Works out the lives of an edge inside those of its node: whoever has advertised or subscribed a topic does so
+    /// until it ends, unless something else is known; and from the start, unless the topic was seen to be absent.
+    pub(super) fn live_within(&mut self, node: &[Life], absent: &[Stamp]) {
+        self.signs.sort_unstable();
+        self.ends.sort_unstable();
+        self.ends.dedup();
+        if self.signs.is_empty() {
+            self.lives = if self.whole {
+                node.to_vec()
+            } else {
+                Vec::new()
+            };
+            return;
+        }
+        self.lives.clear();
+        for around in node {
+            let from = self.signs.partition_point(|s| *s < around.from);
+            let to = self.signs.partition_point(|s| *s <= around.to);
+            let mut inside = lives(&self.signs[from..to], &self.ends);
+            if let Some(first) = inside.first_mut() {
+                let gone = |times: &[Stamp]| {
+                    times[..times.partition_point(|t| *t < first.from)]
+                        .last()
+                        .copied()
+                };
+                let since = gone(&self.ends).max(gone(absent)).unwrap_or(Stamp::MIN);
+                first.from = since.plus(1).max(around.from).min(first.from);
+            }
+            if let Some(last) = inside.last_mut() {
+                let ended = self.ends.iter().find(|end| **end >= last.spoke);
+                last.to = ended.map_or(around.to, |end| (*end).min(around.to));
+            }
+            self.lives.extend(inside);
+        }
+    }
+
     /// How alive it is in a window, and how well that is known; `None` if it is not there.
     pub(super) fn state(&self, window: usize, span: Span) -> Option<(State, Degree)> {
         if let Some(degree) = self.active.get(&window) {
@@ -126,7 +166,7 @@ impl Track {
         }
         let alive = |life: &&Life| life.from < span.end && span.start <= life.to;
         let life = self.lives.iter().find(alive)?;
-        let state = if self.signs.is_empty() && self.whole {
+        let state = if self.signs.is_empty() && self.whole && self.quiet == Degree::Declared {
             State::Declared
         } else if life.spoke < span.start && self.latched.is_some_and(|since| since < span.end) {
             State::Latched

@@ -24,9 +24,44 @@ pub(super) struct Tally {
 pub(super) struct Rates {
     /// Windows with messages, in order.
     pub(super) tallies: Vec<Tally>,
-    /// First and last believable message of each stream.
-    pub(super) bounds: Vec<Option<(Stamp, Stamp)>>,
+    /// When each stream had messages; `None` if never.
+    pub(super) traces: Vec<Option<Trace>>,
 }
+
+/// When a stream had messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Trace {
+    pub(super) first: Stamp,
+    pub(super) last: Stamp,
+    pub(super) count: u64,
+    /// The longest time between two of them in nanoseconds.
+    pub(super) longest_gap: i64,
+}
+
+impl Trace {
+    fn extend(trace: &mut Option<Self>, time: Stamp) {
+        let all = trace.get_or_insert(Self {
+            first: time,
+            last: time,
+            count: 0,
+            longest_gap: 0,
+        });
+        all.longest_gap = all.longest_gap.max(time.since(all.last));
+        all.last = time;
+        all.count += 1;
+    }
+
+    /// Whether it spoke often enough to say that it has fallen silent before `end`.
+    pub(super) fn ceased(&self, end: Stamp) -> bool {
+        let silence = end.since(self.last);
+        self.count >= SPOKE_OFTEN && silence > self.longest_gap.saturating_mul(3).max(SILENCE_NS)
+    }
+}
+
+/// Fewer messages than this tell no rhythm.
+const SPOKE_OFTEN: u64 = 5;
+/// Less silence than this is none: a recorder stops writing topics up to a second apart.
+const SILENCE_NS: i64 = 2_000_000_000;
 
 /// A window that messages still fall into.
 struct Open {
@@ -56,7 +91,7 @@ pub(super) fn rates(
     let believed = collected.believed;
     let mut all = Rates {
         tallies: Vec::new(),
-        bounds: vec![None; streams.len()],
+        traces: vec![None; streams.len()],
     };
     let mut open: VecDeque<Open> = VecDeque::new();
     let mut next = 0;
@@ -64,8 +99,7 @@ pub(super) fn rates(
         if believed.is_some_and(|span| !span.contains(timed.time)) {
             return;
         }
-        let bounds = all.bounds[timed.series].get_or_insert((timed.time, timed.time));
-        bounds.1 = timed.time;
+        Trace::extend(&mut all.traces[timed.series], timed.time);
         while open
             .front()
             .is_some_and(|o| windows.end(o.window) <= timed.time)

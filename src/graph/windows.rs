@@ -28,11 +28,17 @@ impl Windows<'_> {
         first..end.max(first)
     }
 
-    /// The last moment of the `more`th window after the last one that holds `time`.
+    /// The last moment at which somebody whose last sign was at `time` counts as alive, after `more` windows of
+    /// silence.
     pub(super) fn last_moment(&self, time: Stamp, more: usize) -> Stamp {
         let last = self.over(time, time).end.saturating_sub(1);
-        let last = last.saturating_add(more).min(self.len().saturating_sub(1));
-        self.0.get(last).map_or(time, |w| w.end.plus(-1)).max(time)
+        match self
+            .0
+            .get(last.saturating_add(more).min(self.len().saturating_sub(1)))
+        {
+            Some(window) if more > 0 => window.start.max(time),
+            _ => time,
+        }
     }
 }
 

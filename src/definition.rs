@@ -1,10 +1,9 @@
-//! Whether a connection's messages have the layout that a source knows: by type, and by definition or hash.
+//! Whether a connection's messages have a layout that we know: by type, and by definition or hash.
 
-use super::Read;
 use crate::bag::{Connection, Encoding};
 
-/// A message layout that a source can read.
-pub(crate) struct Layout {
+/// A message layout.
+pub(crate) struct Shape {
     /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`.
     pub(crate) type_name: &'static str,
     /// Its md5 sum in ROS 1, looked at where the definition is missing; empty in ROS 2.
@@ -13,8 +12,6 @@ pub(crate) struct Layout {
     pub(crate) encoding: Encoding,
     /// The fields of the message and of all messages inside it, as [`outline`] writes them.
     pub(crate) fields: &'static [(&'static str, &'static str)],
-    /// How its messages are read.
-    pub(crate) read: Read,
 }
 
 /// How well a connection fits a layout.
@@ -35,7 +32,27 @@ pub(crate) const HEADER2: (&str, &str) = ("Header", "Time stamp;string frame_id"
 /// `builtin_interfaces/msg/Time`.
 pub(crate) const TIME2: (&str, &str) = ("Time", "int32 sec;uint32 nanosec");
 
-impl Layout {
+/// `rosgraph_msgs/Log`.
+pub(crate) const LOG: Shape = Shape {
+    type_name: "rosgraph_msgs/Log",
+    md5: "acffd30cd6b6de30f120938c17c593fb",
+    encoding: Encoding::Ros1,
+    fields: &[
+        (
+            "",
+            "Header header;byte level;string name;string msg;string file;string function;uint32 line;string[] topics",
+        ),
+        HEADER,
+    ],
+};
+
+/// The same before 2011.
+pub(crate) const OLD_LOG: Shape = Shape {
+    type_name: "roslib/Log",
+    ..LOG
+};
+
+impl Shape {
     /// Whether the messages of a connection can be read.
     pub(crate) fn fit(&self, connection: &Connection) -> Fit {
         let type_name = connection.type_name.replacen("/msg/", "/", 1);
@@ -55,13 +72,16 @@ impl Layout {
 
     /// The message itself must have the fields; messages inside it are compared where the definition holds them.
     fn matches(&self, definition: &str) -> bool {
-        outline(definition).iter().enumerate().all(|(at, (name, fields))| {
-            let name = if at == 0 { "" } else { name.as_str() };
-            match self.fields.iter().find(|(known, _)| *known == name) {
-                Some((_, known)) => fields == known,
-                None => at != 0,
-            }
-        })
+        outline(definition)
+            .iter()
+            .enumerate()
+            .all(|(at, (name, fields))| {
+                let name = if at == 0 { "" } else { name.as_str() };
+                match self.fields.iter().find(|(known, _)| *known == name) {
+                    Some((_, known)) => fields == known,
+                    None => at != 0,
+                }
+            })
     }
 }
 
@@ -107,7 +127,11 @@ fn field(line: &str) -> Option<String> {
         "int8" | "uint8" | "char" | "bool" => "byte",
         other => other,
     };
-    let array = if array.starts_with("[<=") { "[]" } else { array };
+    let array = if array.starts_with("[<=") {
+        "[]"
+    } else {
+        array
+    };
     Some(format!("{kind}{array} {name}"))
 }
 

@@ -1,0 +1,105 @@
+//! Diagnostics: the name of a status begins with its node (`ns/node: …`); whoever publishes `/diagnostics_agg`
+//! subscribes `/diagnostics`.
+
+use std::io;
+
+use super::Heard;
+use crate::bag::Encoding;
+use crate::definition::{HEADER, HEADER2, Shape};
+use crate::facts::{Claim, Degree, SourceId};
+use crate::proof::Known;
+use crate::wire::{self, Cursor};
+
+/// `diagnostic_msgs/DiagnosticArray`, as diagnostic_msgs 1.2 and later.
+pub(super) const SHAPE: Shape = Shape {
+    type_name: "diagnostic_msgs/DiagnosticArray",
+    md5: "60810da900de1dd6ddd437c3503511da",
+    encoding: Encoding::Ros1,
+    fields: &[
+        ("", "Header header;DiagnosticStatus[] status"),
+        HEADER,
+        STATUS,
+        VALUE,
+    ],
+};
+
+/// The same in ROS 2.
+pub(super) const SHAPE2: Shape = Shape {
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[
+        ("", "Header header;DiagnosticStatus[] status"),
+        HEADER2,
+        STATUS,
+        VALUE,
+    ],
+    ..SHAPE
+};
+
+const STATUS: (&str, &str) = (
+    "DiagnosticStatus",
+    "byte level;string name;string message;string hardware_id;KeyValue[] values",
+);
+const VALUE: (&str, &str) = ("KeyValue", "string key;string value");
+
+pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
+    let seq = payload.header()?;
+    let mut names = Vec::new();
+    for _ in 0..payload.length(4)? {
+        payload.u8()?;
+        names.push(payload.string()?);
+        payload.skip_string()?;
+        payload.skip_string()?;
+        for _ in 0..payload.length(8)? {
+            payload.skip_string()?;
+            payload.skip_string()?;
+        }
+    }
+    payload.finish()?;
+    heard.sequence(seq);
+    let topic = heard.stream.connection.topic.shared();
+    if heard.stream.publisher.is_some() || !topic.ends_with("/diagnostics") {
+        // The header knows the node, or the names are those of an aggregator.
+        return Ok(());
+    }
+    for name in names {
+        if let Some(node) = node(name) {
+            let node = heard.name(&format!("/{node}"));
+            heard.claim(Claim::Node(node), Degree::Inferred, || {
+                format!("status `{name}`")
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The node in the name of a status, without its first slash; `None` if what stands before the colon is no name.
+fn node(name: &str) -> Option<&str> {
+    let (node, _) = name.split_once(": ")?;
+    let node = node.trim_start_matches('/');
+    let part = |p: &str| {
+        p.starts_with(|c: char| c.is_ascii_alphabetic())
+            && p.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    node.split('/').all(part).then_some(node)
+}
+
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+    let [all, each] = ["/diagnostics_agg", "/diagnostics"].map(|name| known.facts.name(name));
+    for node in known.publishers(all).collect::<Vec<_>>() {
+        known.subscribes_as_well(source, node, all, each);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_names_its_node_before_the_colon() {
+        assert_eq!(node("robot1/lidar: Frequency"), Some("robot1/lidar"));
+        assert_eq!(node("CPU 0: load"), None);
+        assert_eq!(node("battery"), None);
+    }
+}
