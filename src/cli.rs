@@ -79,7 +79,10 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Reading {
             align: time.align,
         },
         skip_unchanged: time.skip_unchanged,
-        collect: collect::Options { sizes: graph.bytes },
+        collect: collect::Options {
+            sizes: graph.bytes,
+            ..collect::Options::default()
+        },
         graph: graph::Options {
             grace: graph.grace.unwrap_or(0) as usize,
         },

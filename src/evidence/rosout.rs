@@ -7,8 +7,9 @@ use std::collections::BTreeSet;
 use std::io;
 
 use super::Heard;
-use crate::facts::{Claim, Degree, Fact, Name, Said, SourceId};
+use crate::facts::{Claim, Degree, Name, Said, SourceId};
 use crate::proof::{Known, Proof, What, When};
+use crate::time::Stamp;
 use crate::wire::{self, Cursor};
 
 pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
@@ -66,7 +67,7 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
 /// subscription. If nobody is known to publish it, a recorder of all topics knows whether somebody advertises it.
 pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
-    let advertised = advertised(known);
+    let advertised = advertised(known)?;
     for (fact, signs, ends) in known.claims(source)? {
         let Claim::Lists(node, topic) = fact.claim else {
             continue;
@@ -93,14 +94,23 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
     Ok(())
 }
 
-/// Every topic that a recorder of all topics has seen advertised; `None` if none tells.
-fn advertised(known: &Known<'_>) -> Option<BTreeSet<Name>> {
-    let appears = |fact: &Fact| match fact.claim {
-        Claim::Appears(topic) => Some(topic),
-        _ => None,
-    };
-    let topics: BTreeSet<_> = known.facts.list.iter().filter_map(appears).collect();
-    // Nobody asks for this topic by name: the recorder was told to take all.
-    let all = known.facts.known("/rosout_agg")?;
-    topics.contains(&all).then_some(topics)
+/// Every topic that a recorder of all topics has seen advertised; `None` if none tells. Such a recorder goes on to
+/// subscribe long after its start; one that was given names does not.
+fn advertised(known: &mut Known<'_>) -> io::Result<Option<BTreeSet<Name>>> {
+    let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
+    let mut seen: Option<(Stamp, Stamp)> = None;
+    for fact in known.facts.list.clone() {
+        if let Claim::Appears(topic) = fact.claim {
+            topics.insert(topic);
+            for time in known.facts.times(&fact)? {
+                let (first, last) = seen.unwrap_or((time, time));
+                seen = Some((first.min(time), last.max(time)));
+            }
+        }
+    }
+    let all = seen.is_some_and(|(first, last)| last.since(first) > LATE_NS);
+    Ok(all.then_some(topics))
 }
+
+/// A recorder subscribes the topics that it was told by name sooner than this.
+const LATE_NS: i64 = 5_000_000_000;
