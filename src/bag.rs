@@ -16,6 +16,7 @@ use crate::time::{Span, Stamp};
 
 use relay::{Clip, Gather, in_order};
 
+mod index;
 mod relay;
 mod rosbag1;
 mod sqlite3;

@@ -5,13 +5,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use super::index::threads;
 use super::{Clip, FormatRow, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order};
 use crate::decompress::Compression;
 use crate::error::{Error, Result};
 use crate::notice::{Notice, NoticeKind};
 use crate::source::{FAR, Source, Stream};
 use crate::time::Span;
-use chunk::{Chunk, Chunks};
+use chunk::Chunk;
 use plan::{Plan, Unindexed};
 
 #[path = "rosbag1_chunk.rs"]
@@ -124,17 +125,13 @@ fn by_index(source: &Source, plan: &Plan, range: Option<Span>, sink: &mut Clip<'
     plan.notices(sink);
     let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
     let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();
-    let reader = Chunks {
-        source,
-        table: &plan.table,
-        wants: &wants,
-        range,
-    };
+    let resolve = |raw| plan.table.get(raw);
+    let reader = plan.reader(source, &resolve, &wants, range);
     let work = |at: usize, sink: &mut dyn Sink| reader.read(chunks[at], sink);
     let total = chunks.len() as u64;
     in_order(
         chunks.len(),
-        plan.threads(chunks.len()),
+        threads(chunks.len(), plan.longest_index()),
         &work,
         sink,
         |at, sink| {
@@ -146,7 +143,9 @@ fn by_index(source: &Source, plan: &Plan, range: Option<Span>, sink: &mut Clip<'
     let complete = !sink.lost;
     let samples = [chunks.first(), chunks.get(chunks.len() / 2), chunks.last()];
     let compression = samples.into_iter().flatten();
-    let compression = compression.filter_map(|c| reader.compression(c)).collect();
+    let compression = compression
+        .filter_map(|c| Some(reader.body(c).ok()??.how))
+        .collect();
     Report {
         complete,
         bytes_read: source.bytes_read(),

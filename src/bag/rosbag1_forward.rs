@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::chunk::{hand_over, unknown};
 use super::records::{self, Record, Stop, Table};
+use crate::bag::index::{hand_over, pass, unknown};
 use crate::bag::{Gather, MOST_PAYLOAD, Sink, Want};
 use crate::decompress::Compression;
 use crate::notice::{Notice, NoticeKind};
@@ -91,7 +91,7 @@ impl Walk<'_> {
     ) -> Result<(), Stop> {
         let Some(how) = Compression::named(name) else {
             self.damage("a chunk is compressed in a way that no reader knows");
-            return pass(stream, len);
+            return Ok(pass(stream, u64::from(len))?);
         };
         self.found.compression.insert(how);
         if size == 0 && len == 0 && how != Compression::None {
@@ -150,7 +150,7 @@ impl Walk<'_> {
         match record {
             Record::Message { id, time } => self.message(stream, id, time, len),
             Record::Connection { id, topic } => self.connection(stream, id, &topic, len),
-            _ => pass(stream, len),
+            _ => Ok(pass(stream, u64::from(len))?),
         }
     }
 
@@ -162,11 +162,12 @@ impl Walk<'_> {
         len: u32,
     ) -> Result<(), Stop> {
         let Some(id) = self.table.get(raw) else {
-            pass(stream, len)?;
+            pass(stream, u64::from(len))?;
             self.early.hold(raw, time, len);
             return Ok(());
         };
-        hand_over(stream, id, time, len, self.wants[id.0 as usize], self.sink)?;
+        let want = self.wants[id.0 as usize];
+        hand_over(stream, (id, time, len), want, self.sink)?;
         self.gather.add(id, time, len, self.sink);
         Ok(())
     }
@@ -179,7 +180,7 @@ impl Walk<'_> {
         len: u32,
     ) -> Result<(), Stop> {
         if self.table.get(raw).is_some() || len as usize > MOST_PAYLOAD {
-            return pass(stream, len);
+            return Ok(pass(stream, u64::from(len))?);
         }
         let data = stream.peek(len as usize)?;
         if data.len() < len as usize {
@@ -192,7 +193,7 @@ impl Walk<'_> {
                 self.sink.stamps(id, &stamps, Some(&sizes));
             }
         }
-        pass(stream, len)
+        Ok(pass(stream, u64::from(len))?)
     }
 
     fn damage(&mut self, text: &str) {
@@ -243,13 +244,5 @@ impl Early {
         let run = self.runs.entry(id).or_default();
         run.0.push(time);
         run.1.push(size);
-    }
-}
-
-/// Passes over a record's data.
-fn pass(stream: &mut Stream<'_>, len: u32) -> Result<(), Stop> {
-    match stream.skip(u64::from(len))? {
-        n if n < u64::from(len) => Err(Stop::Cut),
-        _ => Ok(()),
     }
 }

@@ -2,12 +2,13 @@
 
 use std::io;
 
-use super::chunk::{Chunk, Chunks, LONGEST_INDEX, Tally};
+use super::chunk::{self, Chunk, Chunks};
 use super::records::{self, Record, Stop, Table};
-use crate::bag::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
+use crate::bag::index::{self, Ask, Tally};
+use crate::bag::{ConnectionId, MOST_PAYLOAD, Sink, Want};
 use crate::notice::{Notice, NoticeKind};
 use crate::source::{FAR, NEAR, Source, Stream};
-use crate::time::{Span, Stamp};
+use crate::time::Span;
 
 /// What the tail says.
 pub(super) struct Plan {
@@ -137,15 +138,6 @@ impl Plan {
         Ok(())
     }
 
-    /// How many threads pay: the reads wait for the disk, and a long index takes memory.
-    pub(super) fn threads(&self, chunks: usize) -> usize {
-        let long = |c: &Chunk| c.tally.index_len() > LONGEST_INDEX / 16;
-        if self.chunks.iter().any(long) {
-            return 1;
-        }
-        (chunks / 256).clamp(1, 8)
-    }
-
     /// Says what names cannot be known.
     pub(super) fn notices(&self, sink: &mut dyn Sink) {
         if !self.encryptor.is_empty() {
@@ -157,36 +149,41 @@ impl Plan {
         }
     }
 
-    /// The time covered. The chunks that the tail calls first and last are looked into; all, if they are few.
+    /// How many bytes the longest index takes.
+    pub(super) fn longest_index(&self) -> u64 {
+        self.chunks.iter().map(Chunk::index_len).max().unwrap_or(0)
+    }
+
+    /// The time covered.
     pub(super) fn span(&self, source: &Source) -> Option<Span> {
-        let full: Vec<&Chunk> = self
-            .chunks
-            .iter()
-            .filter(|c| c.tally.messages > 0)
-            .collect();
-        let mut seen = Extremes(None);
         let wants = vec![Want::Stamps; self.table.list().len()];
-        let reader = Chunks {
+        let resolve = |raw| self.table.get(raw);
+        let reader = self.reader(source, &resolve, &wants, None);
+        let full = self.chunks.iter().enumerate();
+        let full = full.filter(|(_, c)| c.tally.messages > 0);
+        let claims = full.map(|(at, c)| (at, c.first, c.last));
+        index::span(claims, |at, sink| reader.read(&self.chunks[at], sink))
+    }
+
+    /// What reads its chunks.
+    pub(super) fn reader<'a>(
+        &'a self,
+        source: &'a Source,
+        resolve: &'a (dyn Fn(u32) -> Option<ConnectionId> + Sync),
+        wants: &'a [Want],
+        range: Option<Span>,
+    ) -> Chunks<'a> {
+        let ask = Ask {
+            resolve,
+            wants,
+            range,
+            head: chunk::head,
+        };
+        Chunks {
             source,
             table: &self.table,
-            wants: &wants,
-            range: None,
-        };
-        if full.len() <= 512 {
-            for chunk in full {
-                reader.read(chunk, &mut seen);
-            }
-        } else {
-            let first = full.iter().min_by_key(|c| c.first)?;
-            let last = full.iter().max_by_key(|c| c.last)?;
-            reader.read(first, &mut seen);
-            reader.read(last, &mut seen);
+            ask,
         }
-        let (first, last) = seen.0?;
-        Some(Span {
-            start: first,
-            end: last.plus(1),
-        })
     }
 }
 
@@ -203,24 +200,4 @@ fn tally(stream: &mut Stream<'_>, count: u32, len: u32) -> Result<Tally, Stop> {
         stream.advance(8);
     }
     Ok(tally)
-}
-
-/// A sink that only keeps the first and the last stamp.
-struct Extremes(Option<(Stamp, Stamp)>);
-
-impl Sink for Extremes {
-    fn connection(&mut self, _: &crate::bag::Connection) -> Want {
-        Want::Stamps
-    }
-
-    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
-        for at in stamps {
-            let (first, last) = self.0.unwrap_or((*at, *at));
-            self.0 = Some((first.min(*at), last.max(*at)));
-        }
-    }
-
-    fn message(&mut self, _: Message<'_>) {}
-
-    fn notice(&mut self, _: Notice) {}
 }

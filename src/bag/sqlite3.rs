@@ -12,6 +12,7 @@ use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{OpenFlags, Row};
 
+use super::index::TOO_LARGE;
 use super::{
     Clip, Connection, ConnectionId, Encoding, FormatRow, Gather, MOST_PAYLOAD, Message,
     OpenOptions, Place, Reader, Report, Sink, Tier, Want, file_name, in_order,
@@ -497,8 +498,7 @@ impl Rows<'_> {
             return;
         }
         let Ok(ValueRef::Blob(data)) = row.get_ref(4) else {
-            let text = "messages larger than 16 MiB were counted and not looked into";
-            return sink.notice(Notice::new(NoticeKind::Undecodable, text));
+            return sink.notice(Notice::new(NoticeKind::Undecodable, TOO_LARGE));
         };
         if !data.starts_with(ZSTD) {
             return sink.message(Message {

@@ -1,0 +1,343 @@
+//! What an index says of one chunk, told to a sink; and wanted messages, picked out of the chunk's bytes.
+
+use std::io;
+use std::ops::Range;
+
+use super::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
+use crate::decompress::Compression;
+use crate::notice::{Notice, NoticeKind};
+use crate::source::{FAR, NEAR, Source, Stream};
+use crate::time::{Span, Stamp};
+
+/// What index records of a chunk should add up to, in any order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Tally {
+    pub(super) connections: u32,
+    pub(super) messages: u64,
+    mix: u64,
+}
+
+impl Tally {
+    /// Adds `count` messages of the connection that the bag calls `raw`.
+    pub(super) fn add(&mut self, raw: u32, count: u32) {
+        // A multiplication by an odd number loses nothing; folding in its high bits tells sums of pairs apart.
+        let pair = u64::from(raw) << 32 | u64::from(count);
+        let spread = pair.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        self.mix = self.mix.wrapping_add(spread ^ spread >> 29);
+        self.connections = self.connections.saturating_add(1);
+        self.messages = self.messages.saturating_add(u64::from(count));
+    }
+}
+
+/// A longer index, in bytes, is not held in memory; its chunk is walked instead.
+pub(super) const LONGEST_INDEX: u64 = 16 << 20;
+
+/// How many threads pay for `chunks` chunks of which the longest index takes `index` bytes: the reads wait for the
+/// disk, and a long index takes memory.
+pub(super) fn threads(chunks: usize, index: u64) -> usize {
+    if index > LONGEST_INDEX / 16 {
+        return 1;
+    }
+    (chunks / 256).clamp(1, 8)
+}
+
+/// The entries of a chunk's index.
+#[derive(Default)]
+pub(super) struct Index {
+    /// The bag's own number for a connection, and the place of its entries.
+    runs: Vec<(u32, Range<usize>)>,
+    stamps: Vec<Stamp>,
+    /// From the start of the chunk's plain bytes.
+    offsets: Vec<u64>,
+}
+
+impl Index {
+    /// Adds the entries of one connection.
+    pub(super) fn add(&mut self, raw: u32, entries: impl Iterator<Item = (Stamp, u64)>) {
+        let start = self.stamps.len();
+        for (time, offset) in entries {
+            self.stamps.push(time);
+            self.offsets.push(offset);
+        }
+        self.runs.push((raw, start..self.stamps.len()));
+    }
+}
+
+/// Where a chunk's records lie.
+pub(super) struct Body {
+    pub(super) how: Compression,
+    pub(super) range: Range<u64>,
+}
+
+impl Body {
+    /// Its plain bytes, and the position at which they start. `step` is how much is read at a time if they are plain
+    /// in the file.
+    pub(super) fn plain<'a>(
+        &self,
+        source: &'a Source,
+        step: usize,
+    ) -> io::Result<(Stream<'a>, u64)> {
+        if self.how == Compression::None {
+            let stream = Stream::of_file(source, self.range.start, self.range.end, step);
+            return Ok((stream, self.range.start));
+        }
+        let packed = Stream::of_file(source, self.range.start, self.range.end, FAR);
+        Ok((Stream::of_reader(self.how.reader(packed)?), 0))
+    }
+}
+
+/// What is asked for of a bag: the same for all of its chunks.
+#[derive(Clone, Copy)]
+pub(super) struct Ask<'a> {
+    /// The connection that the bag calls so.
+    pub(super) resolve: &'a (dyn Fn(u32) -> Option<ConnectionId> + Sync),
+    /// What is wanted, by connection.
+    pub(super) wants: &'a [Want],
+    pub(super) range: Option<Span>,
+    /// Takes the head of a message record: the bag's number of its connection, and the length of the payload, which
+    /// the stream then stands at.
+    pub(super) head: fn(&mut Stream<'_>) -> Option<(u32, u32)>,
+}
+
+impl Ask<'_> {
+    /// Tells `sink` the stamps of `index`, and the wanted messages from `body`.
+    pub(super) fn tell(
+        &self,
+        index: &Index,
+        source: &Source,
+        body: impl FnOnce() -> Option<Body>,
+        sink: &mut dyn Sink,
+    ) {
+        let wanted = self.wanted(index);
+        let sizes = if wanted.is_empty() {
+            None
+        } else {
+            self.fetch(&wanted, index.stamps.len(), source, body(), sink)
+        };
+        for (raw, entries) in &index.runs {
+            let Some(id) = (self.resolve)(*raw) else {
+                unknown(sink, entries.len() as u64);
+                continue;
+            };
+            let known = self.wants[id.0 as usize] > Want::Stamps && self.range.is_none();
+            let sizes = sizes
+                .as_ref()
+                .filter(|_| known)
+                .map(|s| &s[entries.clone()]);
+            sink.stamps(id, &index.stamps[entries.clone()], sizes);
+        }
+    }
+
+    /// The entries of which more than the stamp is wanted, in the order of the chunk.
+    fn wanted(&self, index: &Index) -> Vec<Wanted> {
+        let mut all = Vec::new();
+        for (raw, entries) in &index.runs {
+            let Some(id) = (self.resolve)(*raw) else {
+                continue;
+            };
+            let want = self.wants[id.0 as usize];
+            if want == Want::Stamps {
+                continue;
+            }
+            for entry in entries.clone() {
+                let (time, offset) = (index.stamps[entry], index.offsets[entry]);
+                if self.range.is_none_or(|r| r.contains(time)) {
+                    all.push(Wanted {
+                        offset,
+                        entry,
+                        raw: *raw,
+                        id,
+                        time,
+                        want,
+                    });
+                }
+            }
+        }
+        all.sort_unstable_by_key(|w| (w.offset, w.entry));
+        all
+    }
+
+    /// Fetches wanted messages; answers the size per entry if all were there.
+    fn fetch(
+        &self,
+        wanted: &[Wanted],
+        entries: usize,
+        source: &Source,
+        body: Option<Body>,
+        sink: &mut dyn Sink,
+    ) -> Option<Vec<u32>> {
+        let mut sizes = vec![0; entries];
+        let mut missing = 0;
+        let plain = body.and_then(|b| b.plain(source, NEAR).ok());
+        match plain {
+            None => missing = wanted.len(),
+            Some((mut stream, base)) => {
+                for one in wanted {
+                    match self.pick(&mut stream, base, one, sink) {
+                        Some(size) => sizes[one.entry] = size,
+                        None => missing += 1,
+                    }
+                }
+            }
+        }
+        if missing == 0 {
+            return Some(sizes);
+        }
+        sink.notice(Notice {
+            kind: NoticeKind::Damaged,
+            count: missing as u64,
+            text: "messages are in the index but not in their chunk".to_owned(),
+        });
+        None
+    }
+
+    fn pick(
+        &self,
+        stream: &mut Stream<'_>,
+        base: u64,
+        one: &Wanted,
+        sink: &mut dyn Sink,
+    ) -> Option<u32> {
+        let ahead = base
+            .checked_add(one.offset)?
+            .checked_sub(stream.position())?;
+        if stream.skip(ahead).ok()? < ahead {
+            return None;
+        }
+        let (_, size) = (self.head)(stream).filter(|(raw, _)| *raw == one.raw)?;
+        let data = wanted_part(stream, size, one.want, sink).ok()?;
+        if let Some(data) = data {
+            sink.message(Message {
+                connection: one.id,
+                time: one.time,
+                data,
+                size,
+            });
+        }
+        Some(size)
+    }
+}
+
+/// A message to be fetched.
+struct Wanted {
+    offset: u64,
+    entry: usize,
+    raw: u32,
+    id: ConnectionId,
+    time: Stamp,
+    want: Want,
+}
+
+/// Messages of a connection that the bag does not describe.
+pub(super) fn unknown(sink: &mut dyn Sink, count: u64) {
+    sink.notice(Notice {
+        kind: NoticeKind::Damaged,
+        count,
+        text: "messages belong to a connection that the bag does not describe".to_owned(),
+    });
+}
+
+/// Hands over what is wanted of the message that `stream` stands at, and passes over it.
+pub(super) fn hand_over(
+    stream: &mut Stream<'_>,
+    (connection, time, size): (ConnectionId, Stamp, u32),
+    want: Want,
+    sink: &mut dyn Sink,
+) -> io::Result<()> {
+    if let Some(data) = wanted_part(stream, size, want, sink)? {
+        sink.message(Message {
+            connection,
+            time,
+            data,
+            size,
+        });
+    }
+    pass(stream, u64::from(size))
+}
+
+/// Passes over `len` bytes, which must be there.
+pub(super) fn pass(stream: &mut Stream<'_>, len: u64) -> io::Result<()> {
+    match stream.skip(len)? {
+        n if n < len => Err(io::ErrorKind::UnexpectedEof.into()),
+        _ => Ok(()),
+    }
+}
+
+/// The bytes that are wanted of the message that `stream` stands at; `None` if none are, or too many.
+fn wanted_part<'s>(
+    stream: &'s mut Stream<'_>,
+    size: u32,
+    want: Want,
+    sink: &mut dyn Sink,
+) -> io::Result<Option<&'s [u8]>> {
+    let len = match want {
+        Want::Stamps | Want::Sizes => return Ok(None),
+        Want::Head(n) => (size as usize).min(n),
+        Want::Payload => size as usize,
+    };
+    if len > MOST_PAYLOAD {
+        sink.notice(Notice::new(NoticeKind::Undecodable, TOO_LARGE));
+        return Ok(None);
+    }
+    let data = stream.peek(len)?;
+    if data.len() < len {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(Some(data))
+}
+
+/// What is said of a payload past [`MOST_PAYLOAD`].
+pub(super) const TOO_LARGE: &str = "messages larger than 16 MiB were counted and not looked into";
+
+/// A way to find the first and the last stamp: all the rest is forgotten.
+#[derive(Default)]
+pub(super) struct Extremes(Option<(Stamp, Stamp)>);
+
+impl Extremes {
+    /// The span of the stamps.
+    pub(super) fn span(&self) -> Option<Span> {
+        let (start, last) = self.0?;
+        Some(Span {
+            start,
+            end: last.plus(1),
+        })
+    }
+}
+
+impl Sink for Extremes {
+    fn connection(&mut self, _: &super::Connection) -> Want {
+        Want::Stamps
+    }
+
+    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+        for at in stamps {
+            let (first, last) = self.0.unwrap_or((*at, *at));
+            self.0 = Some((first.min(*at), last.max(*at)));
+        }
+    }
+
+    fn message(&mut self, _: Message<'_>) {}
+
+    fn notice(&mut self, _: Notice) {}
+}
+
+/// The span of a bag from the claimed spans of its chunks: `read` looks into the chunks that are said to be first and
+/// last, or into all if they are few.
+pub(super) fn span(
+    claims: impl Iterator<Item = (usize, Stamp, Stamp)>,
+    read: impl Fn(usize, &mut dyn Sink),
+) -> Option<Span> {
+    let claims: Vec<_> = claims.collect();
+    let mut seen = Extremes::default();
+    if claims.len() <= 512 {
+        for (at, ..) in &claims {
+            read(*at, &mut seen);
+        }
+    } else {
+        let first = claims.iter().min_by_key(|c| c.1)?;
+        let last = claims.iter().max_by_key(|c| c.2)?;
+        read(first.0, &mut seen);
+        read(last.0, &mut seen);
+    }
+    seen.span()
+}
