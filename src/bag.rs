@@ -17,10 +17,13 @@ use crate::time::{Span, Stamp};
 use relay::{Clip, Gather, in_order};
 
 mod index;
+mod mcap;
 mod relay;
 mod rosbag1;
+mod rosbag2;
 mod sqlite3;
 mod unknown;
+mod zstd_file;
 
 /// How a payload is written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -210,7 +213,13 @@ pub struct FormatRow {
 }
 
 /// Every format that can be read.
-pub const FORMATS: &[FormatRow] = &[rosbag1::FORMAT, sqlite3::FORMAT];
+pub const FORMATS: &[FormatRow] = &[
+    rosbag1::FORMAT,
+    mcap::FORMAT,
+    sqlite3::FORMAT,
+    rosbag2::FORMAT,
+    zstd_file::FORMAT,
+];
 
 /// Where a bag lies.
 pub(crate) enum Place {

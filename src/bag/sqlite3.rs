@@ -98,7 +98,7 @@ fn broken(path: &Path, error: &rusqlite::Error) -> Error {
 
 /// Opens the database so that nothing in it can run, write or grow.
 fn connect(ready: &Ready) -> rusqlite::Result<Db> {
-    let access = if ready.copied {
+    let access = if ready.is_copy() {
         OpenFlags::SQLITE_OPEN_READ_WRITE
     } else {
         OpenFlags::SQLITE_OPEN_READ_ONLY
@@ -255,10 +255,9 @@ impl Bag {
         let mut query = db.prepare(&sql)?;
         let mut rows = query.query([])?;
         while let Some(row) = rows.next()? {
-            if let (Some(time), Some(id)) = (integer(row, 0), integer(row, 1)) {
-                if self.ids.contains_key(&id) {
-                    return Ok(Some(Stamp(time)));
-                }
+            let topic = integer(row, 1).filter(|id| self.ids.contains_key(id));
+            if let (Some(time), Some(_)) = (integer(row, 0), topic) {
+                return Ok(Some(Stamp(time)));
             }
         }
         Ok(None)

@@ -9,12 +9,17 @@ use crate::source::Temporary;
 /// A database ready to be opened.
 pub(super) struct Ready {
     pub(super) path: PathBuf,
-    /// A copy of ours, which SQLite may bring up to date; else the user's file, which it must not touch.
-    pub(super) copied: bool,
     /// Rows that are not looked at since the copy would be too large.
     pub(super) left_behind: bool,
     /// Removed when the bag has been read.
-    _copy: Option<Temporary>,
+    copy: Option<Temporary>,
+}
+
+impl Ready {
+    /// Whether it is a copy of ours, which SQLite may bring up to date; else it must not touch the file.
+    pub(super) fn is_copy(&self) -> bool {
+        self.copy.is_some()
+    }
 }
 
 /// Above this size in bytes nothing is copied: 16 GiB.
@@ -29,9 +34,8 @@ pub(super) fn ready(path: &Path) -> Result<Ready> {
         .collect();
     let mut ready = Ready {
         path: path.to_owned(),
-        copied: false,
         left_behind: false,
-        _copy: None,
+        copy: None,
     };
     if beside.is_empty() {
         return Ok(ready);
@@ -48,8 +52,7 @@ pub(super) fn ready(path: &Path) -> Result<Ready> {
         fs::copy(from, to).map_err(Error::io("copy", from))?;
     }
     ready.path = copy.path().join(path.file_name().unwrap_or_default());
-    ready.copied = true;
-    ready._copy = Some(copy);
+    ready.copy = Some(copy);
     Ok(ready)
 }
 
@@ -66,10 +69,13 @@ pub(super) fn address(ready: &Ready) -> String {
         if byte.is_ascii_alphanumeric() || b"/._-~".contains(&byte) {
             address.push(byte as char);
         } else {
-            address += &format!("%{byte:02X}");
+            address.push('%');
+            for half in [byte >> 4, byte & 15] {
+                address.extend(char::from_digit(half.into(), 16));
+            }
         }
     }
-    address += if ready.copied {
+    address += if ready.is_copy() {
         "?mode=rw"
     } else {
         "?mode=ro&immutable=1"

@@ -1,0 +1,328 @@
+//! rosbag2 folders: the storage files in them, read as one recording, with `metadata.yaml` as a hint.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::{
+    Connection, ConnectionId, Encoding, FormatRow, Input, Message, OpenOptions, Place, Reader,
+    Report, Sink, Want, file_name, unknown,
+};
+use crate::error::{Error, Result};
+use crate::name::NodeName;
+use crate::notice::{Notice, NoticeKind};
+use crate::time::{Span, Stamp};
+use metadata::{Metadata, is_storage};
+
+#[path = "rosbag2_metadata.rs"]
+mod metadata;
+
+/// Folders.
+pub(super) const FORMAT: FormatRow = FormatRow {
+    name: "rosbag2",
+    what: "ROS 2 recording: a folder with metadata.yaml or storage files",
+    extensions: &[],
+    sniff: |place, _| match place {
+        Place::Folder(path) => path.join("metadata.yaml").is_file() || !storage(path).is_empty(),
+        _ => false,
+    },
+    open,
+};
+
+/// A folder's storage files, open.
+struct Folder {
+    name: String,
+    parts: Vec<Box<dyn Reader>>,
+    metadata: Metadata,
+    notices: Vec<Notice>,
+}
+
+/// More files than this are not opened.
+const MOST_FILES: usize = 10_000;
+
+fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+    let Place::Folder(path) = place else {
+        return Err(Error::Unsupported {
+            path: PathBuf::new(),
+            what: "it is no folder".to_owned(),
+            hint: String::new(),
+        });
+    };
+    let mut folder = Folder {
+        name: file_name(&path),
+        parts: Vec::new(),
+        metadata: Metadata::default(),
+        notices: Vec::new(),
+    };
+    match metadata::read(&path) {
+        Ok(found) => folder.metadata = found.unwrap_or_default(),
+        Err(why) => folder.say(
+            NoticeKind::Note,
+            format!("`metadata.yaml` was left out: {why}"),
+        ),
+    }
+    let mut failed = None;
+    for file in folder.files(&path) {
+        match super::open(&Input::Path(file.clone()), options) {
+            Ok(reader) => folder.parts.push(reader),
+            Err(e) => {
+                folder.say(NoticeKind::Damaged, format!("a part was left out: {e}"));
+                failed.get_or_insert(e);
+            }
+        }
+    }
+    match failed {
+        Some(e) if folder.parts.is_empty() => Err(e),
+        None if folder.parts.is_empty() => Err(folder.nothing(&path)),
+        _ => Ok(Box::new(folder)),
+    }
+}
+
+/// The storage files in a folder, in the order of their numbers.
+fn storage(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = folder.read_dir() else {
+        return Vec::new();
+    };
+    let files = entries.filter_map(|e| Some(e.ok()?.path()));
+    let mut files: Vec<PathBuf> = files.filter(|p| is_storage(p) && p.is_file()).collect();
+    files.sort_by_cached_key(|p| {
+        let name = file_name(p);
+        let stem = name.split('.').next().unwrap_or_default();
+        let number = stem.rsplit('_').next().and_then(|n| n.parse::<u64>().ok());
+        (number, name)
+    });
+    files.truncate(MOST_FILES);
+    files
+}
+
+impl Folder {
+    fn say(&mut self, kind: NoticeKind, text: String) {
+        self.notices.push(Notice::new(kind, text));
+    }
+
+    /// The files to read: those that the metadata names; if none of them is there, all that look like it.
+    fn files(&mut self, path: &Path) -> Vec<PathBuf> {
+        let named = std::mem::take(&mut self.metadata.files);
+        let mut found = Vec::new();
+        let mut missing = Vec::new();
+        for name in named.iter().take(MOST_FILES) {
+            match metadata::locate(path, name) {
+                Ok(file) if !found.contains(&file) => found.push(file),
+                Ok(_) => {}
+                Err(why) => missing.push(why),
+            }
+        }
+        let there = storage(path);
+        let instead = found.is_empty() && !there.is_empty();
+        for why in missing {
+            if instead {
+                self.say(
+                    NoticeKind::Note,
+                    format!("{why}; read what lies there instead"),
+                );
+            } else {
+                self.say(
+                    NoticeKind::Damaged,
+                    format!("a part of the recording: {why}"),
+                );
+            }
+        }
+        if instead {
+            return there;
+        }
+        for file in there.iter().filter(|f| !found.contains(f)) {
+            let text = format!(
+                "`{}` is not named in `metadata.yaml` and was left out",
+                file_name(file)
+            );
+            self.say(NoticeKind::Note, text);
+        }
+        found
+    }
+
+    /// The error for a folder of which no file is there.
+    fn nothing(&self, path: &Path) -> Error {
+        let said: Vec<&str> = self.notices.iter().map(|n| n.text.as_str()).collect();
+        if said.is_empty() {
+            return unknown::explain(path, &[], true);
+        }
+        Error::UnknownBag {
+            path: path.to_owned(),
+            looks_like: format!(
+                "a folder whose recording is not there ({})",
+                said.join("; ")
+            ),
+            hint: "copy the `.db3` or `.mcap` files that `metadata.yaml` names into it".to_owned(),
+        }
+    }
+}
+
+impl Reader for Folder {
+    fn span(&mut self) -> Result<Option<Span>> {
+        let mut whole: Option<Span> = None;
+        let mut parts = 0;
+        for part in &mut self.parts {
+            let Some(span) = part.span()? else {
+                continue;
+            };
+            parts += 1;
+            whole = Some(whole.map_or(span, |w| Span {
+                start: w.start.min(span.start),
+                end: w.end.max(span.end),
+            }));
+        }
+        // A part without an answer is empty or must be read; either way the rest is no answer if it is all we have.
+        Ok(whole.filter(|_| parts == self.parts.len()))
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        for notice in &self.notices {
+            sink.notice(notice.clone());
+        }
+        let mut complete = !self.notices.iter().any(|n| n.kind.is_loss());
+        let mut joined = Joined::new(&self.metadata, sink);
+        let mut reports = Vec::new();
+        for part in &mut self.parts {
+            joined.part.clear();
+            match part.read(range, &mut joined) {
+                Ok(report) => reports.push(report),
+                Err(e) => {
+                    complete = false;
+                    joined.notice(Notice::new(
+                        NoticeKind::Damaged,
+                        format!("a part was left out: {e}"),
+                    ));
+                }
+            }
+        }
+        joined.silent();
+        Ok(self.report(&reports, complete))
+    }
+}
+
+impl Folder {
+    fn report(&self, parts: &[Report], complete: bool) -> Report {
+        let compression: BTreeSet<&String> = parts.iter().flat_map(|r| &r.compression).collect();
+        let worst = parts
+            .iter()
+            .max_by_key(|r| (r.tier, r.tier_reason.is_some()));
+        let mut facts = self.metadata.facts.clone();
+        for fact in parts.iter().flat_map(|r| &r.facts) {
+            if !facts.iter().any(|(name, _)| *name == fact.0) {
+                facts.push(fact.clone());
+            }
+        }
+        if parts.len() > 1 {
+            facts.push(("files".to_owned(), parts.len().to_string()));
+        }
+        Report {
+            name: self.name.clone(),
+            format: parts
+                .first()
+                .map_or_else(|| FORMAT.name.to_owned(), |r| r.format.clone()),
+            compression: compression.into_iter().cloned().collect(),
+            tier: worst.map_or(super::Tier::Index, |r| r.tier),
+            tier_reason: worst.and_then(|r| r.tier_reason.clone()),
+            complete: complete && parts.iter().all(|r| r.complete),
+            bytes_read: parts.iter().map(|r| r.bytes_read).sum(),
+            file_bytes: parts.iter().map(|r| r.file_bytes).sum(),
+            facts,
+        }
+    }
+}
+
+/// Connections that are one across the parts of a recording.
+type Key = (Arc<str>, Arc<str>, Option<NodeName>);
+
+/// Gives the parts' connections ids that are the same in all parts.
+struct Joined<'a> {
+    metadata: &'a Metadata,
+    sink: &'a mut dyn Sink,
+    known: BTreeMap<Key, (ConnectionId, Want)>,
+    /// The ids of this part's connections in the whole.
+    part: Vec<ConnectionId>,
+}
+
+impl<'a> Joined<'a> {
+    fn new(metadata: &'a Metadata, sink: &'a mut dyn Sink) -> Self {
+        Self {
+            metadata,
+            sink,
+            known: BTreeMap::new(),
+            part: Vec::new(),
+        }
+    }
+
+    fn announce(&mut self, key: Key, mut connection: Connection) -> (ConnectionId, Want) {
+        let id = ConnectionId(u32::try_from(self.known.len()).unwrap_or(u32::MAX));
+        connection.id = id;
+        if let Some(topic) = self.metadata.topics.get(connection.topic.as_str()) {
+            connection.qos = connection.qos.or_else(|| topic.qos.clone());
+            connection.type_hash = connection.type_hash.or_else(|| topic.hash.clone());
+        }
+        let want = self.sink.connection(&connection);
+        self.known.insert(key, (id, want));
+        (id, want)
+    }
+
+    /// Announces the topics that only the metadata names: nothing was said on them.
+    fn silent(&mut self) {
+        for (name, topic) in &self.metadata.topics {
+            if self.known.keys().any(|(known, ..)| **known == **name) {
+                continue;
+            }
+            let key = (Arc::from(name.as_str()), Arc::clone(&topic.type_name), None);
+            let connection = Connection {
+                id: ConnectionId(0),
+                topic: name.as_str().into(),
+                type_name: Arc::clone(&topic.type_name),
+                definition: None,
+                type_hash: None,
+                publisher: None,
+                latching: false,
+                qos: None,
+                encoding: match topic.encoding.as_str() {
+                    "" | "cdr" => Encoding::Cdr,
+                    other => Encoding::Other(other.to_owned()),
+                },
+            };
+            self.announce(key, connection);
+        }
+    }
+}
+
+impl Sink for Joined<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let publisher = connection.publisher.clone();
+        let key = (
+            connection.topic.shared(),
+            Arc::clone(&connection.type_name),
+            publisher,
+        );
+        let known = self.known.get(&key).copied();
+        let (id, want) = known.unwrap_or_else(|| self.announce(key, connection.clone()));
+        self.part.push(id);
+        want
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        self.sink
+            .stamps(self.part[connection.0 as usize], stamps, sizes);
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        let connection = self.part[message.connection.0 as usize];
+        self.sink.message(Message {
+            connection,
+            ..message
+        });
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.sink.notice(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        self.sink.progress(done, total);
+    }
+}
