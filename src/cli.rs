@@ -1,5 +1,6 @@
 //! What was typed, turned into work; the only file (with its folder) that knows clap and the environment.
 
+mod look;
 mod typed;
 
 use std::ffi::OsString;
@@ -13,7 +14,8 @@ use crate::error::Error;
 use crate::evolution::Evolution;
 use crate::graph;
 use crate::info::{SurveyRow, json, survey_csv, survey_text};
-use crate::pipeline::{Reading, is_survey, read, survey};
+use crate::encode::Output;
+use crate::pipeline::{Drawing, Reading, Render, Rendered, Watch as _, is_survey, read, survey};
 use crate::terminal::Terminal;
 use crate::window::{Division, Length};
 use typed::{
@@ -45,7 +47,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Render(args) => render(&args, &mut terminal),
         Command::Info(args) => info(&args, &mut terminal),
         Command::Events(args) => events(&args, &mut terminal),
-        Command::Styles { .. } => Ok(DONE),
+        Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
             let mut text = Vec::new();
             clap_complete::generate(shell, &mut Typed::command(), "bagreel", &mut text);
@@ -108,17 +110,107 @@ fn code(evolution: &Evolution) -> u8 {
 }
 
 fn render(args: &RenderArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let evolution = read(&reading(&args.inputs, &args.time, &args.graph), terminal)?;
-    for output in &args.outputs {
-        let path = PathBuf::from(output);
-        let mut out = Vec::new();
-        let written = crate::evolution::write_json(&evolution, &mut out);
-        written
-            .and_then(|()| std::fs::write(&path, out))
-            .map_err(Error::io("write", &path))?;
+    let job = job(args)?;
+    if args.watch {
+        return watch(args, job, terminal);
+    }
+    let done = crate::pipeline::render(&job, terminal)?;
+    report(&done, args.timings, terminal);
+    Ok(code(&done.evolution))
+}
+
+/// Draws again whenever the style file changes, until interrupted. The bag is read once.
+fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<u8, Error> {
+    crate::pipeline::check(&job)?;
+    let evolution = read(&job.reading, terminal)?;
+    let path = PathBuf::from(&args.look.style);
+    if !path.is_file() {
+        return Err(Error::usage("`--watch` watches a style file", "`bagreel styles light > mine.toml`, then `--style mine.toml`"));
+    }
+    let mut seen = None;
+    while !terminal.stopped() {
+        let now = std::fs::read_to_string(&path).ok();
+        if now == seen {
+            terminal.wait();
+            continue;
+        }
+        seen = now;
+        let style = look::style(&args.look.style);
+        let drawn = style.and_then(|style| {
+            job.drawing.style = style;
+            crate::pipeline::show(&job, evolution.clone(), terminal)
+        });
+        match drawn {
+            Ok(done) => report(&done, args.timings, terminal),
+            Err(error) => terminal.error(&error),
+        }
+    }
+    Ok(code(&evolution))
+}
+
+/// Tells what was written, how many windows and changes, in what time.
+fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
+    let evolution = &done.evolution;
+    for remark in done.written.iter().flat_map(|w| &w.remarks) {
+        terminal.note(remark);
     }
     terminal.notices(&evolution.notices);
-    Ok(code(&evolution))
+    if timings {
+        terminal.timings();
+    }
+    let names: Vec<String> = done.written.iter().map(|w| w.path.display().to_string()).collect();
+    let changes: usize = evolution.windows.iter().map(|w| w.changes.len()).sum();
+    let windows = evolution.windows.len();
+    let seconds = terminal.seconds();
+    terminal.say(&format!(
+        "wrote {}: {windows} windows of {}, {changes} changes, in {seconds:.1} s",
+        names.join(", "),
+        evolution.period
+    ));
+}
+
+/// The work that `render` was asked to do.
+fn job(args: &RenderArgs) -> Result<Render, Error> {
+    let reading = reading(&args.inputs, &args.time, &args.graph);
+    let title = args.look.title.clone().unwrap_or_else(|| title(&reading.inputs));
+    let outputs = match &args.outputs[..] {
+        [] => vec![Output::parse(&default_output(&reading.inputs), args.format.as_deref())?],
+        some => some.iter().map(|o| Output::parse(o, args.format.as_deref())).collect::<Result<_, _>>()?,
+    };
+    Ok(Render {
+        drawing: Drawing {
+            view: look::view(&args.view)?,
+            style: look::style(&args.look.style)?,
+            fonts: look::fonts(args.look.font.as_deref())?,
+            wish: look::wish(&args.look, title, args.graph.rate_change),
+            is_sized: args.look.size.is_some(),
+            is_fitted: args.look.fit == "auto",
+            engine: crate::layout::engine(&args.look.layout)?,
+        },
+        sequence: look::sequence(&args.sequence),
+        outputs,
+        captions: args.look.captions.clone(),
+        is_filtered: args.view.filtered,
+        reading,
+    })
+}
+
+fn title(inputs: &[Input]) -> String {
+    match inputs {
+        [] => String::new(),
+        [one] => one.name(),
+        [first, rest @ ..] => format!("{} and {} more", first.name(), rest.len()),
+    }
+}
+
+/// `out/<bag name>.gif`, the name without what tells the format.
+fn default_output(inputs: &[Input]) -> String {
+    let name = inputs.first().map_or_else(String::new, Input::name);
+    let mut stem = name.as_str();
+    for end in [".active", ".zstd", ".bag", ".db3", ".mcap", ".json"] {
+        stem = stem.strip_suffix(end).unwrap_or(stem);
+    }
+    format!("out/{}.gif", stem.replace('/', "_"))
 }
 
 fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
@@ -171,4 +263,12 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     });
     terminal.notices(&evolution.notices);
     Ok(code(&evolution))
+}
+
+fn styles(name: Option<&str>, terminal: &mut Terminal) -> Result<u8, Error> {
+    match name {
+        Some(name) => terminal.results(crate::style::builtin_text(name)?),
+        None => terminal.results(&look::styles()),
+    }
+    Ok(DONE)
 }

@@ -1,6 +1,8 @@
 //! The whole sequence: every window with its graph and what changed; written as JSON and read back as an input.
 
 mod lines;
+mod names;
+mod raw;
 mod read;
 mod write;
 

@@ -1,9 +1,14 @@
 //! The whole program in the order it happens: read, divide, build, compare, draw, write.
 
+mod captions;
+mod draw;
 mod read;
+mod render;
 mod survey;
 
+pub use draw::Drawing;
 pub use read::{Reading, read};
+pub use render::{Render, Rendered, check, render, show};
 pub use survey::{is_survey, survey};
 
 /// A part of the work, as progress and timings tell it.

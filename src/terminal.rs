@@ -87,6 +87,18 @@ impl Terminal {
         let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     }
 
+    /// Prints something worth knowing unless quiet.
+    pub fn note(&mut self, text: &str) {
+        if !self.quiet {
+            self.line("36", "note", text);
+        }
+    }
+
+    /// Waits a moment before looking at a file again.
+    pub fn wait(&self) {
+        std::thread::sleep(Duration::from_millis(200));
+    }
+
     /// Seconds since the command began.
     pub fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()

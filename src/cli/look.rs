@@ -1,0 +1,91 @@
+//! How things are to look, from what was typed.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::typed::{LookArgs, SequenceArgs, ViewArgs};
+use crate::error::{Error, Result};
+use crate::film;
+use crate::geometry::Size;
+use crate::layout::Orientation;
+use crate::picture::Wish;
+use crate::style::{BUILTIN, Style};
+use crate::text::Fonts;
+use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
+
+/// What is shown: `rqt_graph`'s defaults or ours, then what was asked for.
+pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
+    let mut view = if args.rqt_defaults { ViewOptions::rqt_defaults() } else { ViewOptions::default() };
+    if let Some(mode) = &args.mode {
+        view.mode = Mode::parse(mode)?;
+    }
+    if let Some(filter) = &args.ns_filter {
+        view.ns_filter = NameFilter::parse(filter)?;
+    }
+    if let Some(filter) = &args.topic_filter {
+        view.topic_filter = NameFilter::parse(filter)?;
+    }
+    if let Some(hide) = &args.hide {
+        view.hide = Hide::parse(hide)?;
+    }
+    if let Some(group) = &args.group {
+        view.group = Grouping::parse(group)?;
+    }
+    let names = |names: &[String]| names.iter().map(|n| Arc::from(n.as_str())).collect();
+    view.collapse = names(&args.collapse);
+    view.expand = names(&args.expand);
+    view.show_recorder = args.show_recorder;
+    Ok(view)
+}
+
+/// A built-in style by its name, else a file.
+pub(super) fn style(name: &str) -> Result<Style> {
+    let path = Path::new(name);
+    if BUILTIN.iter().any(|row| row.0 == name) || !path.exists() {
+        return Style::builtin(name);
+    }
+    let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+    Style::from_toml(&text, path)
+}
+
+/// The built-in styles, one a line.
+pub(super) fn styles() -> String {
+    BUILTIN.iter().map(|row| format!("{}\n", row.0)).collect()
+}
+
+/// The bundled font, with a file of the user's for what it lacks.
+pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
+    let Some(path) = file else { return Ok(Fonts::bundled()) };
+    let data = fs::read(path).map_err(Error::io("read", path))?;
+    Fonts::bundled().with(data, path)
+}
+
+
+pub(super) fn wish(args: &LookArgs, title: String, rate_change: f64) -> Wish {
+    let default = Wish::default();
+    let size = args.size.map_or(default.size, |(w, h)| Size::new(f64::from(w), f64::from(h)));
+    Wish {
+        size,
+        width_mm: args.width,
+        bare: args.bare,
+        title,
+        orientation: match args.orientation.as_str() {
+            "LR" => Some(Orientation::LeftRight),
+            "TB" => Some(Orientation::TopBottom),
+            _ => None,
+        },
+        rate_change,
+        ..default
+    }
+}
+
+pub(super) fn sequence(args: &SequenceArgs) -> film::Options {
+    film::Options {
+        frame_ms: args.frame_ms,
+        tween: args.tween,
+        hold_changes: args.hold_changes,
+        max_bytes: args.max_bytes,
+        ..film::Options::default()
+    }
+}

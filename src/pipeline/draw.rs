@@ -1,0 +1,121 @@
+//! From the evolution to the picture: choose what is shown, and make it readable on its page.
+
+use std::sync::Arc;
+
+use super::{Stage, Watch};
+use crate::error::Result;
+use crate::evolution::{Evolution, Place, Places};
+use crate::geometry::Size;
+use crate::layout::{Engine, Layout};
+use crate::notice::{Notice, NoticeKind, Notices};
+use crate::picture::{Sketch, Wish};
+use crate::style::Style;
+use crate::text::Fonts;
+use crate::view::{View, ViewOptions, outline, view};
+
+/// What to draw and how.
+#[derive(Clone)]
+pub struct Drawing {
+    /// What is shown.
+    pub view: ViewOptions,
+    /// Colours, strokes and fonts.
+    pub style: Style,
+    /// What text is set in.
+    pub fonts: Fonts,
+    /// Page, title, orientation.
+    pub wish: Wish,
+    /// Whether the user chose the size of the page, so that it may not grow.
+    pub is_sized: bool,
+    /// Whether to grow the page and collapse namespaces until the text can be read.
+    pub is_fitted: bool,
+    /// What lays out.
+    pub engine: &'static (dyn Engine + Sync),
+}
+
+/// The smallest text that `--fit auto` accepts, in pixels.
+const READABLE: f64 = 9.0;
+
+/// The largest page that `--fit auto` grows to.
+const LARGEST: Size = Size::new(1920.0, 1080.0);
+
+/// What is shown, on which page, and where.
+pub(super) struct Composed {
+    pub(super) view: View,
+    pub(super) options: ViewOptions,
+    pub(super) wish: Wish,
+    pub(super) layout: Layout,
+    pub(super) notices: Notices,
+}
+
+/// Chooses what is shown and lays it out. With `--fit auto` the page grows, then the largest innermost namespaces are
+/// collapsed, until the smallest text is at least 9 pixels high or nothing is left to collapse.
+pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
+    watch.stage(Stage::Layout);
+    let mut options = drawing.view.clone();
+    let mut wish = drawing.wish.clone();
+    let mut collapsed: Vec<Arc<str>> = Vec::new();
+    let layout = loop {
+        let (layout, text, next) = attempt(evolution, drawing, &options, &wish);
+        if !drawing.is_fitted || text >= READABLE {
+            break layout;
+        }
+        if !drawing.is_sized && wish.size != LARGEST && wish.width_mm.is_none() {
+            wish.size = LARGEST;
+            continue;
+        }
+        // Far too small a text is not worth a layout for every namespace on the way.
+        let many = if text < READABLE / 2.0 { next.len().div_ceil(4) } else { 1 };
+        if next.is_empty() {
+            break layout;
+        }
+        collapsed.extend(next.iter().take(many).cloned());
+        options.collapse.extend(next.into_iter().take(many));
+    };
+    let (view, mut notices) = view(evolution, &options);
+    notices.extend(told(&collapsed, &drawing.wish, &wish));
+    let remarks = layout.remarks.iter();
+    notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
+    Composed { view, options, wish, layout, notices }
+}
+
+/// One try: the layout, the size of its smallest text, and which namespaces to collapse next.
+fn attempt(evolution: &Evolution, drawing: &Drawing, options: &ViewOptions, wish: &Wish) -> (Layout, f64, Vec<Arc<str>>) {
+    // The widest labels depend on rates, so that the frames are needed; without them only candidates are found.
+    let (view, _) = view(evolution, options);
+    let sketch = Sketch::new(&view, &drawing.style, &drawing.fonts, wish.clone());
+    let layout = crate::layout::lay_out(sketch.plan(), &sketch.layout_wish(), drawing.engine);
+    let text = sketch.text_px(&layout);
+    let candidates = outline(evolution, options).collapsible(options);
+    let fresh = candidates.into_iter().map(|c| c.name).filter(|name| !options.collapse.contains(name));
+    (layout, text, fresh.collect())
+}
+
+/// What `--fit auto` did.
+fn told(collapsed: &[Arc<str>], asked: &Wish, got: &Wish) -> Vec<Notice> {
+    let mut notices = Vec::new();
+    if asked.size != got.size {
+        let text = format!("the page is {}x{} so that the text can be read; `--size` takes another", got.size.w, got.size.h);
+        notices.push(Notice::new(NoticeKind::Chosen, text));
+    }
+    if !collapsed.is_empty() {
+        let names: Vec<&str> = collapsed.iter().map(AsRef::as_ref).collect();
+        let text = format!(
+            "drawn as one box each so that the text can be read: {}; `--expand {}` opens one, `--fit none` all",
+            names.join(", "),
+            names[0]
+        );
+        notices.push(Notice::new(NoticeKind::Hidden, text));
+    }
+    notices
+}
+
+/// The places of a layout, for the JSON.
+pub(super) fn places(view: &View, layout: &Layout) -> Places {
+    let boxes = view.items.iter().zip(&layout.boxes);
+    let mut boxes: Vec<Place> = boxes
+        .map(|(item, rect)| Place { what: item.kind.word().to_owned(), name: item.name.to_string(), rect: *rect })
+        .collect();
+    boxes.sort_by(|a, b| (&a.what, &a.name).cmp(&(&b.what, &b.name)));
+    Places { width: layout.size.w, height: layout.size.h, orientation: layout.orientation.word().to_owned(), boxes }
+}
+
