@@ -10,11 +10,11 @@ use clap::{CommandFactory as _, Parser as _};
 
 use crate::bag::Input;
 use crate::collect;
+use crate::encode::Output;
 use crate::error::Error;
 use crate::evolution::Evolution;
 use crate::graph;
 use crate::info::{SurveyRow, json, survey_csv, survey_text};
-use crate::encode::Output;
 use crate::pipeline::{Drawing, Reading, Render, Rendered, Watch as _, is_survey, read, survey};
 use crate::terminal::Terminal;
 use crate::window::{Division, Length};
@@ -125,7 +125,10 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
     let evolution = read(&job.reading, terminal)?;
     let path = PathBuf::from(&args.look.style);
     if !path.is_file() {
-        return Err(Error::usage("`--watch` watches a style file", "`bagreel styles light > mine.toml`, then `--style mine.toml`"));
+        return Err(Error::usage(
+            "`--watch` watches a style file",
+            "`bagreel styles light > mine.toml`, then `--style mine.toml`",
+        ));
     }
     let mut seen = None;
     while !terminal.stopped() {
@@ -158,7 +161,11 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
     if timings {
         terminal.timings();
     }
-    let names: Vec<String> = done.written.iter().map(|w| w.path.display().to_string()).collect();
+    let names: Vec<String> = done
+        .written
+        .iter()
+        .map(|w| w.path.display().to_string())
+        .collect();
     let changes: usize = evolution.windows.iter().map(|w| w.changes.len()).sum();
     let windows = evolution.windows.len();
     let seconds = terminal.seconds();
@@ -172,10 +179,20 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
 /// The work that `render` was asked to do.
 fn job(args: &RenderArgs) -> Result<Render, Error> {
     let reading = reading(&args.inputs, &args.time, &args.graph);
-    let title = args.look.title.clone().unwrap_or_else(|| title(&reading.inputs));
+    let title = args
+        .look
+        .title
+        .clone()
+        .unwrap_or_else(|| title(&reading.inputs));
     let outputs = match &args.outputs[..] {
-        [] => vec![Output::parse(&default_output(&reading.inputs), args.format.as_deref())?],
-        some => some.iter().map(|o| Output::parse(o, args.format.as_deref())).collect::<Result<_, _>>()?,
+        [] => vec![Output::parse(
+            &default_output(&reading.inputs),
+            args.format.as_deref(),
+        )?],
+        some => some
+            .iter()
+            .map(|o| Output::parse(o, args.format.as_deref()))
+            .collect::<Result<_, _>>()?,
     };
     Ok(Render {
         drawing: Drawing {

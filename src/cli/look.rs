@@ -16,7 +16,11 @@ use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
 /// What is shown: `rqt_graph`'s defaults or ours, then what was asked for.
 pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
-    let mut view = if args.rqt_defaults { ViewOptions::rqt_defaults() } else { ViewOptions::default() };
+    let mut view = if args.rqt_defaults {
+        ViewOptions::rqt_defaults()
+    } else {
+        ViewOptions::default()
+    };
     if let Some(mode) = &args.mode {
         view.mode = Mode::parse(mode)?;
     }
@@ -56,15 +60,18 @@ pub(super) fn styles() -> String {
 
 /// The bundled font, with a file of the user's for what it lacks.
 pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
-    let Some(path) = file else { return Ok(Fonts::bundled()) };
+    let Some(path) = file else {
+        return Ok(Fonts::bundled());
+    };
     let data = fs::read(path).map_err(Error::io("read", path))?;
     Fonts::bundled().with(data, path)
 }
 
-
 pub(super) fn wish(args: &LookArgs, title: String, rate_change: f64) -> Wish {
     let default = Wish::default();
-    let size = args.size.map_or(default.size, |(w, h)| Size::new(f64::from(w), f64::from(h)));
+    let size = args
+        .size
+        .map_or(default.size, |(w, h)| Size::new(f64::from(w), f64::from(h)));
     Wish {
         size,
         width_mm: args.width,

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::names::Names;
-use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice, RawWindow};
+use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice};
 use super::write::SCHEMA;
 use super::{Evolution, Place, Places, Window};
 use crate::bag::{Report, Tier};

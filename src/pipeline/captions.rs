@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use crate::bag::{self, Connection, ConnectionId, Encoding, Input, Message, OpenOptions, Sink, Want};
+use crate::bag::{
+    self, Connection, ConnectionId, Encoding, Input, Message, OpenOptions, Sink, Want,
+};
 use crate::error::{Error, Result};
 use crate::evolution::Evolution;
 use crate::notice::Notice;
@@ -19,19 +21,41 @@ use crate::wire::Cursor;
 pub fn phases(evolution: &Evolution, inputs: &[Input], from: &str) -> Result<Vec<String>> {
     let path = Path::new(from);
     let captions = if path.is_file() {
-        from_file(&fs::read_to_string(path).map_err(Error::io("read", path))?, path)?
+        from_file(
+            &fs::read_to_string(path).map_err(Error::io("read", path))?,
+            path,
+        )?
     } else {
-        from_topic(inputs, from)?.into_iter().map(|(at, text)| (evolution.offset(at), text)).collect()
+        from_topic(inputs, from)?
+            .into_iter()
+            .map(|(at, text)| (evolution.offset(at), text))
+            .collect()
     };
-    let phase = |end: i64| captions.iter().rev().find(|(at, _)| *at < end).map_or("", |(_, text)| text);
-    Ok(evolution.windows.iter().map(|w| phase(evolution.offset(w.span.end)).to_owned()).collect())
+    let phase = |end: i64| {
+        captions
+            .iter()
+            .rev()
+            .find(|(at, _)| *at < end)
+            .map_or("", |(_, text)| text)
+    };
+    Ok(evolution
+        .windows
+        .iter()
+        .map(|w| phase(evolution.offset(w.span.end)).to_owned())
+        .collect())
 }
 
 /// Captions by nanoseconds after the mission's start, sorted. Empty lines and lines that begin with `#` are skipped.
 fn from_file(text: &str, path: &Path) -> Result<Vec<(i64, String)>> {
     let mut captions = Vec::new();
-    for (number, line) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#')) {
-        let caption = line.split_once('|').and_then(|(at, text)| Some((parse_nanos(at)?, text.trim().to_owned())));
+    for (number, line) in text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'))
+    {
+        let caption = line
+            .split_once('|')
+            .and_then(|(at, text)| Some((parse_nanos(at)?, text.trim().to_owned())));
         captions.push(caption.ok_or_else(|| Error::BadFile {
             path: path.to_owned(),
             line: number + 1,
@@ -49,7 +73,11 @@ const MOST: usize = 10_000;
 const LONGEST: usize = 200;
 
 fn from_topic(inputs: &[Input], topic: &str) -> Result<Vec<(Stamp, String)>> {
-    let mut ear = Ear { topic, encodings: Vec::new(), captions: Vec::new() };
+    let mut ear = Ear {
+        topic,
+        encodings: Vec::new(),
+        captions: Vec::new(),
+    };
     for input in inputs.iter().filter(|input| **input != Input::Stdin) {
         ear.encodings.clear();
         bag::open(input, &OpenOptions::default())?.read(None, &mut ear)?;
@@ -74,19 +102,27 @@ struct Ear<'a> {
 
 impl Sink for Ear<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
-        let is_string = matches!(&*connection.type_name, "std_msgs/String" | "std_msgs/msg/String");
+        let is_string = matches!(
+            &*connection.type_name,
+            "std_msgs/String" | "std_msgs/msg/String"
+        );
         let heard = is_string && connection.topic.as_str() == self.topic;
-        self.encodings.push(heard.then(|| connection.encoding.clone()));
+        self.encodings
+            .push(heard.then(|| connection.encoding.clone()));
         if heard { Want::Payload } else { Want::Stamps }
     }
 
     fn stamps(&mut self, _: ConnectionId, _: &[Stamp], _: Option<&[u32]>) {}
 
     fn message(&mut self, message: Message<'_>) {
-        let encoding = self.encodings.get(message.connection.0 as usize).and_then(Option::as_ref);
+        let encoding = self
+            .encodings
+            .get(message.connection.0 as usize)
+            .and_then(Option::as_ref);
         let text = encoding.and_then(|e| string(message.data, e));
         if let (Some(text), true) = (text, self.captions.len() < MOST) {
-            self.captions.push((message.time, text.chars().take(LONGEST).collect()));
+            self.captions
+                .push((message.time, text.chars().take(LONGEST).collect()));
         }
     }
 
@@ -94,7 +130,10 @@ impl Sink for Ear<'_> {
 }
 
 fn string(data: &[u8], encoding: &Encoding) -> Option<String> {
-    Cursor::new(encoding, data).and_then(|mut cursor| cursor.string()).ok().map(str::to_owned)
+    Cursor::new(encoding, data)
+        .and_then(|mut cursor| cursor.string())
+        .ok()
+        .map(str::to_owned)
 }
 
 #[cfg(test)]
@@ -104,7 +143,13 @@ mod tests {
     #[test]
     fn a_file_gives_captions_in_order_of_time() {
         let captions = from_file("# phases\n90|picking\n\n0|start\n", Path::new("c.txt")).unwrap();
-        assert_eq!(captions, [(0, "start".to_owned()), (90_000_000_000, "picking".to_owned())]);
+        assert_eq!(
+            captions,
+            [
+                (0, "start".to_owned()),
+                (90_000_000_000, "picking".to_owned())
+            ]
+        );
         let error = from_file("0|a\nsoon|b\n", Path::new("c.txt")).unwrap_err();
         assert_eq!(error.to_string(), "`c.txt` line 2: `soon|b` is no caption");
     }

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::{Stage, Watch};
-use crate::error::Result;
 use crate::evolution::{Evolution, Place, Places};
 use crate::geometry::Size;
 use crate::layout::{Engine, Layout};
@@ -64,7 +63,11 @@ pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn 
             continue;
         }
         // Far too small a text is not worth a layout for every namespace on the way.
-        let many = if text < READABLE / 2.0 { next.len().div_ceil(4) } else { 1 };
+        let many = if text < READABLE / 2.0 {
+            next.len().div_ceil(4)
+        } else {
+            1
+        };
         if next.is_empty() {
             break layout;
         }
@@ -75,18 +78,32 @@ pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn 
     notices.extend(told(&collapsed, &drawing.wish, &wish));
     let remarks = layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
-    Composed { view, options, wish, layout, notices }
+    Composed {
+        view,
+        options,
+        wish,
+        layout,
+        notices,
+    }
 }
 
 /// One try: the layout, the size of its smallest text, and which namespaces to collapse next.
-fn attempt(evolution: &Evolution, drawing: &Drawing, options: &ViewOptions, wish: &Wish) -> (Layout, f64, Vec<Arc<str>>) {
+fn attempt(
+    evolution: &Evolution,
+    drawing: &Drawing,
+    options: &ViewOptions,
+    wish: &Wish,
+) -> (Layout, f64, Vec<Arc<str>>) {
     // The widest labels depend on rates, so that the frames are needed; without them only candidates are found.
     let (view, _) = view(evolution, options);
     let sketch = Sketch::new(&view, &drawing.style, &drawing.fonts, wish.clone());
     let layout = crate::layout::lay_out(sketch.plan(), &sketch.layout_wish(), drawing.engine);
     let text = sketch.text_px(&layout);
     let candidates = outline(evolution, options).collapsible(options);
-    let fresh = candidates.into_iter().map(|c| c.name).filter(|name| !options.collapse.contains(name));
+    let fresh = candidates
+        .into_iter()
+        .map(|c| c.name)
+        .filter(|name| !options.collapse.contains(name));
     (layout, text, fresh.collect())
 }
 
@@ -94,7 +111,10 @@ fn attempt(evolution: &Evolution, drawing: &Drawing, options: &ViewOptions, wish
 fn told(collapsed: &[Arc<str>], asked: &Wish, got: &Wish) -> Vec<Notice> {
     let mut notices = Vec::new();
     if asked.size != got.size {
-        let text = format!("the page is {}x{} so that the text can be read; `--size` takes another", got.size.w, got.size.h);
+        let text = format!(
+            "the page is {}x{} so that the text can be read; `--size` takes another",
+            got.size.w, got.size.h
+        );
         notices.push(Notice::new(NoticeKind::Chosen, text));
     }
     if !collapsed.is_empty() {
@@ -113,9 +133,17 @@ fn told(collapsed: &[Arc<str>], asked: &Wish, got: &Wish) -> Vec<Notice> {
 pub(super) fn places(view: &View, layout: &Layout) -> Places {
     let boxes = view.items.iter().zip(&layout.boxes);
     let mut boxes: Vec<Place> = boxes
-        .map(|(item, rect)| Place { what: item.kind.word().to_owned(), name: item.name.to_string(), rect: *rect })
+        .map(|(item, rect)| Place {
+            what: item.kind.word().to_owned(),
+            name: item.name.to_string(),
+            rect: *rect,
+        })
         .collect();
     boxes.sort_by(|a, b| (&a.what, &a.name).cmp(&(&b.what, &b.name)));
-    Places { width: layout.size.w, height: layout.size.h, orientation: layout.orientation.word().to_owned(), boxes }
+    Places {
+        width: layout.size.w,
+        height: layout.size.h,
+        orientation: layout.orientation.word().to_owned(),
+        boxes,
+    }
 }
-

@@ -74,10 +74,20 @@ pub fn show(job: &Render, mut evolution: Evolution, watch: &mut dyn Watch) -> Re
     if let Some(from) = &job.captions {
         drawing.wish.phases = captions::phases(&evolution, &job.reading.inputs, from)?;
     }
-    let Composed { view, options, wish, layout, notices } = compose(&evolution, &drawing, watch);
+    let Composed {
+        view,
+        options,
+        wish,
+        layout,
+        notices,
+    } = compose(&evolution, &drawing, watch);
     evolution.notices.extend(notices.iter());
     evolution.layout = Some(places(&view, &layout));
-    let data = if job.is_filtered { filtered(&evolution, &options) } else { evolution.clone() };
+    let data = if job.is_filtered {
+        filtered(&evolution, &options)
+    } else {
+        evolution.clone()
+    };
     let picture = Sketch::new(&view, &drawing.style, &drawing.fonts, wish).with(layout);
     let film = Film {
         evolution: &data,
@@ -89,7 +99,11 @@ pub fn show(job: &Render, mut evolution: Evolution, watch: &mut dyn Watch) -> Re
     watch.stage(Stage::Draw);
     let mut progress = |done: usize, total: usize| {
         watch.progress(done as u64, total as u64);
-        if watch.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if watch.stopped() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     };
     let written = reel::run(&film, &job.outputs, &mut progress)?;
     Ok(Rendered { evolution, written })
