@@ -2,8 +2,10 @@
 
 mod apng;
 mod csv;
+mod dot;
 mod gif;
 mod json;
+mod mermaid;
 mod png;
 mod svg;
 
@@ -145,6 +147,18 @@ pub const FORMATS: &[Format] = &[
         what: "an image per window with `{n}`",
         is_limited: false,
         start: png::start_webp,
+    },
+    Format {
+        word: "dot",
+        what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
+        is_limited: false,
+        start: dot::start,
+    },
+    Format {
+        word: "mmd",
+        what: "a Mermaid flow chart, per window with `{n}`, else the union",
+        is_limited: false,
+        start: mermaid::start,
     },
     Format {
         word: "json",

@@ -1,5 +1,6 @@
 //! The sequence as it is shown: which window when and for how long, and what draws it.
 
+use crate::dot::Profile;
 use crate::evolution::Evolution;
 use crate::picture::Picture;
 use crate::pixels::Painter;
@@ -23,6 +24,8 @@ pub struct Options {
     pub scale: f64,
     /// The most bytes that an animation may have.
     pub max_bytes: Option<u64>,
+    /// How DOT is written.
+    pub dot_profile: Profile,
 }
 
 impl Default for Options {
@@ -35,6 +38,7 @@ impl Default for Options {
             changes_only: false,
             scale: 1.0,
             max_bytes: None,
+            dot_profile: Profile::default(),
         }
     }
 }

@@ -10,6 +10,7 @@ pub mod collect;
 mod decompress;
 mod definition;
 pub mod diff;
+pub mod dot;
 pub mod encode;
 pub mod error;
 pub mod events;

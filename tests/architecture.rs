@@ -28,6 +28,7 @@ const LAYERS: &[&str] = &[
     "text",
     "layout",
     "style",
+    "dot",
     "scene",
     "svg",
     "pixels",

@@ -106,10 +106,10 @@ impl Keep {
         publishes.retain(|p| shows_topic(p.state, options));
         let subscribes = edges(&graph.subscribes, &self.subscribes, &cast.subscribed);
         Graph {
-            publishes,
-            subscribes,
             nodes,
             topics,
+            publishes,
+            subscribes,
         }
     }
 
