@@ -9,9 +9,10 @@ use crate::evidence::{self, Heard, Piece, Read, SOURCES};
 use crate::facts::{Facts, SourceId};
 use crate::name::TopicName;
 use crate::notice::{Notice, NoticeKind, Notices};
-use crate::proof::Stream;
+use crate::proof::{Stream, Trust};
 use crate::stamps::Stamps;
 use crate::time::{Span, Stamp};
+use crate::trust;
 use crate::wire::Cursor;
 
 /// What to look at while reading.
@@ -102,6 +103,8 @@ impl Collector {
         self.messages.finish().map_err(spool_error)?;
         self.facts.times.finish().map_err(spool_error)?;
         let believed = believed(self.messages.days());
+        self.notices
+            .extend(trust::judge(&mut self.streams, &self.facts));
         let mut all = Collected {
             streams: self.streams,
             messages: self.messages,
@@ -164,7 +167,7 @@ impl Sink for BagSink<'_> {
             topic,
             publisher: publisher.map(|p| all.facts.name(p.as_str())),
             latched: connection.latching && !is_log(&connection.topic),
-            trusted: true,
+            trust: Trust::Whole,
             times: all.messages.series(),
         };
         let (readers, foreign) = evidence::readers(&stream);

@@ -65,6 +65,8 @@ pub(crate) enum Claim {
     Carries(Name, Name),
     /// A logger of this name, which is a node or a part of one, logs.
     Logger(Name),
+    /// A status on this topic (second) is named after this node (first).
+    Reports(Name, Name),
     /// This node is in this lifecycle state.
     Lifecycle(Name, Name),
     /// The first node runs the second one in its own process.
@@ -92,6 +94,7 @@ impl Claim {
             | Self::Unsubscribe(a, b)
             | Self::Lists(a, b)
             | Self::Carries(a, b)
+            | Self::Reports(a, b)
             | Self::Lifecycle(a, b)
             | Self::Hosts(a, b)
             | Self::Type(a, b)
@@ -111,6 +114,7 @@ impl Claim {
             Self::Unsubscribe(a, b) => Self::Unsubscribe(to(a), to(b)),
             Self::Lists(a, b) => Self::Lists(to(a), to(b)),
             Self::Carries(a, b) => Self::Carries(to(a), to(b)),
+            Self::Reports(a, b) => Self::Reports(to(a), to(b)),
             Self::Logger(a) => Self::Logger(to(a)),
             Self::Lifecycle(a, b) => Self::Lifecycle(to(a), to(b)),
             Self::Hosts(a, b) => Self::Hosts(to(a), to(b)),

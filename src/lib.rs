@@ -41,6 +41,7 @@ mod table;
 pub mod terminal;
 pub mod text;
 pub mod time;
+mod trust;
 pub mod view;
 pub mod window;
 pub mod wire;

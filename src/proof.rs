@@ -20,10 +20,21 @@ pub(crate) struct Stream {
     pub(crate) publisher: Option<Name>,
     /// Whether a message outlives its moment: latched (ROS 1) or transient local (ROS 2).
     pub(crate) latched: bool,
-    /// Whether its publisher's name is believed.
-    pub(crate) trusted: bool,
+    /// How far its publisher's name is believed.
+    pub(crate) trust: Trust,
     /// The log times of its messages.
     pub(crate) times: SeriesId,
+}
+
+/// How far the publisher that a header names is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Trust {
+    /// It publishes every message.
+    Whole,
+    /// It publishes the first message; the others are anybody's.
+    First,
+    /// It plays back what others published once.
+    Player,
 }
 
 /// A node, a topic or an edge.
@@ -54,6 +65,8 @@ impl What {
 pub(crate) enum When {
     /// While the messages of this stream come.
     Messages(usize),
+    /// At the first message of this stream.
+    First(usize),
     /// From the first sign to the last; after an end only from the next sign on.
     Signs {
         signs: Vec<Stamp>,
@@ -122,6 +135,13 @@ impl<'a> Known<'a> {
             What::Topic(_) => {}
         }
         self.proofs.push(proof);
+    }
+
+    /// Everybody who names this topic as its own, as publisher or subscriber.
+    pub(crate) fn named_by_others(&self, topic: Name, node: Name) -> bool {
+        self.facts.list.iter().any(|fact| {
+            matches!(fact.claim, Claim::Lists(n, t) | Claim::Publish(n, t) if t == topic && n != node)
+        })
     }
 
     /// Everybody who is known to publish `topic` so far.

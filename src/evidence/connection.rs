@@ -3,21 +3,28 @@
 use std::io;
 
 use crate::facts::{Degree, SourceId};
-use crate::proof::{Known, Proof, What, When};
+use crate::proof::{Known, Proof, Trust, What, When};
 
-/// Every stream proves its topic, and its publisher where that is named and believed.
+/// Every stream proves its topic, and its publisher as far as that is believed.
 pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
-        let proof = |what| Proof {
+        let proof = |what, when| Proof {
             what,
             source,
             degree: Degree::Measured,
-            when: When::Messages(at),
+            when,
         };
-        known.prove(proof(What::Topic(stream.topic)));
-        if let Some(node) = stream.publisher.filter(|_| stream.trusted) {
-            known.prove(proof(What::Publish(node, stream.topic)));
+        known.prove(proof(What::Topic(stream.topic), When::Messages(at)));
+        let Some(node) = stream.publisher else {
+            continue;
+        };
+        let edge = What::Publish(node, stream.topic);
+        match stream.trust {
+            Trust::Whole => known.prove(proof(edge, When::Messages(at))),
+            Trust::First => known.prove(proof(edge, When::First(at))),
+            Trust::Player if known.named_by_others(stream.topic, node) => {}
+            Trust::Player => known.prove(proof(edge, When::Messages(at))),
         }
     }
     Ok(())

@@ -1,13 +1,14 @@
 //! Diagnostics: the name of a status begins with its node (`ns/node: …`); whoever publishes `/diagnostics_agg`
 //! subscribes `/diagnostics`.
 
+use std::collections::BTreeSet;
 use std::io;
 
 use super::Heard;
 use crate::bag::Encoding;
 use crate::definition::{HEADER, HEADER2, Shape};
-use crate::facts::{Claim, Degree, SourceId};
-use crate::proof::Known;
+use crate::facts::{Claim, Degree, Name, SourceId};
+use crate::proof::{Known, Proof, Trust, What, When};
 use crate::wire::{self, Cursor};
 
 /// `diagnostic_msgs/DiagnosticArray`, as diagnostic_msgs 1.2 and later.
@@ -57,17 +58,15 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
     }
     payload.finish()?;
     heard.sequence(seq);
-    let topic = heard.stream.connection.topic.shared();
-    if heard.stream.publisher.is_some() || !topic.ends_with("/diagnostics") {
-        // The header knows the node, or the names are those of an aggregator.
-        return Ok(());
-    }
-    for name in names {
-        if let Some(node) = node(name) {
-            let node = heard.name(&format!("/{node}"));
-            heard.claim(Claim::Node(node), Degree::Inferred, || {
-                format!("status `{name}`")
-            });
+    let topic = heard.stream.connection.topic.as_str();
+    if topic == "diagnostics" || topic.ends_with("/diagnostics") {
+        for name in names {
+            if let Some(node) = node(name) {
+                let node = heard.name(&format!("/{node}"));
+                let topic = heard.stream.topic;
+                let words = || format!("status `{name}`");
+                heard.claim(Claim::Reports(node, topic), Degree::Inferred, words);
+            }
         }
     }
     Ok(())
@@ -84,12 +83,52 @@ fn node(name: &str) -> Option<&str> {
     node.split('/').all(part).then_some(node)
 }
 
+/// Names in statuses count where the header does not tell who publishes them.
 pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+    let told = |topic| {
+        let mut of = known.streams.iter().filter(|s| s.topic == topic);
+        of.all(|s| s.publisher.is_some() && s.trust == Trust::Whole)
+    };
+    let claims = known.facts.list.iter().map(|fact| fact.claim);
+    let untold: BTreeSet<Claim> = claims
+        .filter(|claim| matches!(claim, Claim::Reports(_, topic) if !told(*topic)))
+        .collect();
+    for (fact, signs, ends) in known.claims(source)? {
+        let Claim::Reports(node, topic) = fact.claim else {
+            continue;
+        };
+        if untold.contains(&fact.claim) {
+            let node = settled(known, node);
+            known.prove(Proof {
+                what: What::Publish(node, topic),
+                source,
+                degree: Degree::Inferred,
+                when: When::Signs {
+                    signs,
+                    ends,
+                    held: false,
+                },
+            });
+        }
+    }
     let [all, each] = ["/diagnostics_agg", "/diagnostics"].map(|name| known.facts.name(name));
     for node in known.publishers(all).collect::<Vec<_>>() {
         known.subscribes_as_well(source, node, all, each);
     }
     Ok(())
+}
+
+/// In ROS 2 a status names its node without the namespace: the only known node that ends so is meant.
+fn settled(known: &Known<'_>, node: Name) -> Name {
+    let text = known.text(node);
+    let mut ending = known
+        .nodes()
+        .iter()
+        .filter(|n| known.text(**n).ends_with(&*text));
+    match (known.nodes().contains(&node), ending.next(), ending.next()) {
+        (false, Some(only), None) => *only,
+        _ => node,
+    }
 }
 
 #[cfg(test)]

@@ -33,12 +33,14 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
     heard.claim(Claim::Node(node), Degree::Stated, || {
         format!("{name} logs: {message}")
     });
-    if &*heard.stream.connection.topic.shared() == "/rosout"
-        && let Some(publisher) = heard.stream.publisher
-        && publisher != node
-    {
-        let claim = Claim::Carries(publisher, node);
-        heard.claim(claim, Degree::Stated, String::new);
+    let log = heard.stream.topic;
+    if heard.stream.connection.topic.as_str() == "/rosout" {
+        heard.claim(Claim::Publish(node, log), Degree::Stated, || {
+            format!("{name} logs: {message}")
+        });
+        if let Some(publisher) = heard.stream.publisher.filter(|p| *p != node) {
+            heard.claim(Claim::Carries(publisher, node), Degree::Stated, String::new);
+        }
     }
     // The list is whole: what is in an earlier one and not in this one is no longer the node's.
     let list = heard.name(&format!("topics of {name}"));

@@ -9,7 +9,7 @@ use super::windows::Windows;
 use super::{Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, Topic, TopicState};
 use crate::collect::Collected;
 use crate::facts::Name;
-use crate::proof::What;
+use crate::proof::{Trust, What};
 use crate::time::Span;
 
 /// What happened on each topic: its streams, and their messages per window.
@@ -70,7 +70,7 @@ impl Assembly<'_> {
             }
             for (place, stream) in streams.iter().enumerate() {
                 let stream = &self.collected.streams[*stream];
-                let Some(node) = stream.publisher.filter(|_| stream.trusted) else {
+                let Some(node) = stream.publisher.filter(|_| stream.trust != Trust::First) else {
                     continue;
                 };
                 let of = self

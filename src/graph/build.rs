@@ -135,6 +135,14 @@ impl<'a> Builder<'a> {
                         follow(track, rates, place, latched, self.mission.1);
                     }
                 }
+                When::First(stream) => {
+                    let rates = self.rates.get(&collected.streams[*stream].topic);
+                    let place = |streams: &[usize]| streams.iter().position(|s| s == stream);
+                    let trace = rates.and_then(|(streams, rates)| rates.traces[place(streams)?]);
+                    if let Some(trace) = trace {
+                        track.sign_all(&[trace.first], &[], proof.degree, &self.windows);
+                    }
+                }
                 When::Signs { signs, ends, held } => {
                     track.sign_all(signs, ends, proof.degree, &self.windows);
                     track.held |= held;
