@@ -14,7 +14,7 @@ mod words;
 
 use self::arrows::{Arrows, Track};
 use self::boxes::Boxes;
-use self::draft::Draft;
+use self::draft::{Draft, Tells};
 use self::page::{Fit, Page};
 use self::timeline::Timeline;
 use self::title::Title;
@@ -135,8 +135,8 @@ pub struct Picture<'a> {
     order: Vec<usize>,
     item_ids: Vec<String>,
     arrow_ids: Vec<String>,
-    /// For each item, whether it tells its rate itself because no publisher is known.
-    unpublished: Vec<bool>,
+    /// What each item tells of its rate.
+    tells: Vec<Tells>,
     /// What is the same in every frame, behind the graph and before what moves.
     ground: Vec<Group>,
 }
@@ -166,7 +166,7 @@ impl<'a> Picture<'a> {
             arrow_ids: (0..view.arrows.len())
                 .map(|at| arrow_id(view, at))
                 .collect(),
-            unpublished: draft::unpublished(view),
+            tells: draft::tells(view),
             ground: Vec::new(),
             sketch,
             layout,
@@ -308,14 +308,7 @@ impl<'a> Picture<'a> {
             let at = shown.id as usize;
             if let (Some(item), Some(place)) = (view.items.get(at), self.layout.boxes.get(at)) {
                 let id = self.item_ids[at].clone();
-                groups.push(boxes.item(
-                    item,
-                    &draft.labels[at],
-                    *place,
-                    shown,
-                    self.unpublished[at],
-                    id,
-                ));
+                groups.push(boxes.item(item, &draft.labels[at], *place, shown, self.tells[at], id));
             }
         }
     }

@@ -102,7 +102,7 @@ impl Arrows<'_> {
                 self.style,
                 mark,
                 track.badge,
-                self.fit.scale * 0.8,
+                self.fit.pen * 0.8,
             );
         }
         group
@@ -112,7 +112,7 @@ impl Arrows<'_> {
         let Some(last) = track.curves.last() else {
             return;
         };
-        let scale = self.fit.scale;
+        let scale = self.fit.pen;
         let stroke = look.stroke.scaled(scale);
         let before = match track.curves.len() {
             1 => track.start,

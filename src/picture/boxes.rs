@@ -1,6 +1,6 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
-use super::draft::{LINE, Label, Space, second_line};
+use super::draft::{LINE, Label, Space, Tells, second_line};
 use super::look::{self, BoxLook};
 use super::page::Fit;
 use super::{badge, words};
@@ -38,7 +38,7 @@ impl Boxes<'_> {
         group.shape(Shape {
             form: Form::Rect(place, style.radius * scale),
             fill: style.fill,
-            stroke: stroke.scaled(scale),
+            stroke: stroke.scaled(self.fit.pen),
         });
         group.text(Text {
             at: Point::new(
@@ -62,7 +62,7 @@ impl Boxes<'_> {
         label: &Label,
         place: Rect,
         shown: &Shown,
-        rates: bool,
+        tells: Tells,
         id: String,
     ) -> Group {
         let style = self.style;
@@ -87,7 +87,7 @@ impl Boxes<'_> {
             self.latch(&mut group, inner, body);
         }
         let second = if label.fixed.is_empty() {
-            second_line(shown, rates).unwrap_or_default()
+            second_line(shown, tells).unwrap_or_default()
         } else {
             label.fixed.clone()
         };
@@ -98,7 +98,7 @@ impl Boxes<'_> {
                 style,
                 mark,
                 corner(item.kind, place, self.fit.scale),
-                self.fit.scale,
+                self.fit.pen,
             );
         }
         group
@@ -114,14 +114,14 @@ impl Boxes<'_> {
         look: &BoxLook,
     ) -> Rect {
         let scale = self.fit.scale;
-        let stroke = look.stroke.scaled(scale);
+        let stroke = look.stroke.scaled(self.fit.pen);
         let radius = body.radius * scale;
         let form = match kind {
             ItemKind::Node => Form::Ellipse(place),
             _ => Form::Rect(place, radius),
         };
         if look.glow != Color::NONE {
-            let width = look.stroke.width * scale + 2.0 * self.style.badge.glow * scale;
+            let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
             let stroke = Stroke::solid(look.glow, width);
             group.shape(Shape {
                 form: form.clone(),
@@ -150,7 +150,7 @@ impl Boxes<'_> {
 
     fn latch(&self, group: &mut Group, place: Rect, body: &Body) {
         let width = self.style.latched.bar * self.fit.scale;
-        let inset = body.width * self.fit.scale / 2.0;
+        let inset = body.width * self.fit.pen / 2.0;
         let bar = Rect::new(
             place.x + inset,
             place.y + inset,

@@ -1,5 +1,7 @@
 //! What to lay out: every label at its widest, every namespace that gets a box.
 
+use std::collections::BTreeSet;
+
 use super::words;
 use crate::geometry::Size;
 use crate::graph::{Element, State};
@@ -162,17 +164,16 @@ impl Drafter<'_> {
         )
     }
 
-    /// The width of the widest smaller line that each box shows in some window: lifecycle states, and the rates of a
-    /// topic that nobody is known to publish.
+    /// The width of the widest smaller line that each box shows in some window: lifecycle states and rates.
     fn second_lines(&self) -> Vec<Option<f64>> {
-        let unpublished = unpublished(self.view);
+        let tells = tells(self.view);
         let mut widest = vec![None; self.view.items.len()];
         for shown in self.view.frames.iter().flat_map(|f| &f.items) {
             let at = shown.id as usize;
             let Some(item) = self.view.items.get(at) else {
                 continue;
             };
-            if let Some(line) = second_line(shown, unpublished[at]) {
+            if let Some(line) = second_line(shown, tells[at]) {
                 let width = self
                     .fonts
                     .width(&line, self.body(item).small, Weight::SemiBold);
@@ -215,16 +216,62 @@ fn widen(most: &mut Option<f64>, width: f64) {
     *most = Some(most.map_or(width, |m: f64| m.max(width)));
 }
 
-/// For each item, whether it is a topic that nobody is ever known to publish.
-pub(super) fn unpublished(view: &View) -> Vec<bool> {
-    let is_topic = |item: &Item| matches!(item.kind, ItemKind::Topic | ItemKind::Group);
-    let mut alone: Vec<bool> = view.items.iter().map(is_topic).collect();
+/// Which rates a box tells itself, because no arrow does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tells {
+    /// None: the arrows of its publishers tell them.
+    Nothing,
+    /// Those that changed: in some window its publisher's arrow cannot tell, being gone or new.
+    Changes,
+    /// All: nobody is ever known to publish it.
+    Rates,
+}
+
+/// What each item tells of its rate.
+pub(super) fn tells(view: &View) -> Vec<Tells> {
+    let first = |item: &Item| match item.kind {
+        ItemKind::Topic | ItemKind::Group => Tells::Rates,
+        ItemKind::Node | ItemKind::Namespace => Tells::Nothing,
+    };
+    let mut tells: Vec<Tells> = view.items.iter().map(first).collect();
     for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
-        if let Some(flag) = alone.get_mut(arrow.to as usize) {
-            *flag = false;
+        if let Some(tell) = tells.get_mut(arrow.to as usize) {
+            *tell = Tells::Nothing;
         }
     }
-    alone
+    for frame in &view.frames {
+        let publishers = frame
+            .arrows
+            .iter()
+            .filter_map(|s| Some((view.arrows.get(s.id as usize)?, s)));
+        let told = publishers.filter(|(arrow, shown)| {
+            arrow.kind == ArrowKind::Publish && changed_rate(shown).is_some()
+        });
+        let told: BTreeSet<u32> = told.map(|(arrow, _)| arrow.to).collect();
+        for shown in frame
+            .items
+            .iter()
+            .filter(|s| changed_rate(s).is_some() && !told.contains(&s.id))
+        {
+            let topic = view
+                .items
+                .get(shown.id as usize)
+                .is_some_and(|item| first(item) == Tells::Rates);
+            match tells.get_mut(shown.id as usize) {
+                Some(tell) if topic && *tell == Tells::Nothing => *tell = Tells::Changes,
+                _ => {}
+            }
+        }
+    }
+    tells
+}
+
+/// The rates before and now of what is marked as faster or slower.
+fn changed_rate(shown: &Shown) -> Option<(f64, f64)> {
+    match shown.mark {
+        Some(Mark::Faster | Mark::Slower) => Some((shown.from_hz?, shown.hz?)),
+        _ => None,
+    }
 }
 
 /// What an arrow says in a window, and whether on a pill because it changed.
@@ -240,9 +287,7 @@ pub(super) fn arrow_label(
         ArrowKind::Direct(topic) => format!("{topic} "),
         _ => String::new(),
     };
-    if let (Some(Mark::Faster | Mark::Slower), Some(before), Some(now)) =
-        (shown.mark, shown.from_hz, shown.hz)
-    {
+    if let Some((before, now)) = changed_rate(shown) {
         return Some((topic + &words::hz_change(before, now), true));
     }
     let rate = shown
@@ -263,17 +308,17 @@ pub(super) fn arrow_label(
 }
 
 /// The smaller line of a box in a window.
-pub(super) fn second_line(shown: &Shown, rates: bool) -> Option<String> {
+pub(super) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
     if shown.mark == Some(Mark::Removed) {
         return None;
     }
     if let Some(state) = &shown.lifecycle {
         return Some(state.to_string());
     }
-    match (shown.from_hz, shown.hz) {
-        (Some(before), Some(now)) if rates => Some(words::hz_change(before, now)),
-        (_, Some(now)) if rates && now > 0.0 => Some(words::hz(now)),
-        _ => None,
+    match (tells, changed_rate(shown), shown.hz) {
+        (Tells::Nothing, _, _) | (Tells::Changes, None, _) => None,
+        (_, Some((before, now)), _) => Some(words::hz_change(before, now)),
+        (Tells::Rates, None, rate) => rate.filter(|hz| *hz > 0.0).map(words::hz),
     }
 }
 

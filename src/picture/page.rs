@@ -27,6 +27,8 @@ pub(super) struct Page {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
     pub(super) scale: f64,
+    /// The scale of strokes and badges: they shrink less than what they surround, to stay visible.
+    pub(super) pen: f64,
     pub(super) origin: Point,
 }
 
@@ -75,6 +77,7 @@ impl Page {
         let middle = self.graph.centre();
         Fit {
             scale,
+            pen: libm::sqrt(scale),
             origin: Point::new(middle.x - w * scale / 2.0, middle.y - h * scale / 2.0),
         }
     }
