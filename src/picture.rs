@@ -12,18 +12,20 @@ mod title;
 mod tween;
 mod words;
 
+use std::fmt::Write as _;
+
 use self::arrows::{Arrows, Track};
-use self::boxes::Boxes;
-use self::draft::{Draft, Tells};
+use self::boxes::{Boxes, Card};
+use self::draft::Draft;
 use self::page::{Fit, Page};
 use self::timeline::Timeline;
 use self::title::Title;
-use crate::geometry::{Rect, Size};
+use crate::geometry::Size;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
 use crate::scene::{Group, Scene};
 use crate::style::Style;
 use crate::text::Fonts;
-use crate::view::{ArrowKind, Frame, Item, Mark, Shown, View};
+use crate::view::{Arrow, ArrowKind, Frame, Item, View};
 
 /// What the user wishes of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,49 +132,47 @@ pub struct Picture<'a> {
     sketch: Sketch<'a>,
     layout: Layout,
     fit: Fit,
+    /// What never changes of each item and each arrow.
+    cards: Vec<Card>,
     tracks: Vec<Track>,
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
     order: Vec<usize>,
-    item_ids: Vec<String>,
-    arrow_ids: Vec<String>,
-    /// What each item tells of its rate.
-    tells: Vec<Tells>,
+    title: Title<'a>,
+    timeline: Timeline<'a>,
     /// What is the same in every frame, behind the graph and before what moves.
     ground: Vec<Group>,
 }
 
 impl<'a> Picture<'a> {
     fn new(sketch: Sketch<'a>, layout: Layout) -> Self {
-        let view = sketch.view;
-        let fit = sketch.page.fit(layout.size);
-        let plan = &sketch.draft.plan;
-        let empty = layout::Route::default();
-        let tracks: Vec<Track> = plan
-            .links
-            .iter()
-            .enumerate()
-            .map(|(at, link)| Track::new(layout.routes.get(at).unwrap_or(&empty), link.label, fit))
-            .collect();
+        let Sketch {
+            view,
+            style,
+            fonts,
+            page,
+            ..
+        } = &sketch;
+        let fit = page.fit(layout.size);
+        let tracks = tracks(&sketch, &layout, fit);
         let mut order: Vec<usize> = (0..tracks.len()).collect();
-        order.sort_by(|a, b| {
-            let by_kind = (view.arrows[*a].kind == ArrowKind::Publish)
-                .cmp(&(view.arrows[*b].kind == ArrowKind::Publish));
-            by_kind
-                .then(tracks[*b].length.total_cmp(&tracks[*a].length))
-                .then(a.cmp(b))
+        let is_publish = |at: usize| view.arrows[at].kind == ArrowKind::Publish;
+        order.sort_by(|&a, &b| {
+            let length = tracks[b].length.total_cmp(&tracks[a].length);
+            is_publish(a)
+                .cmp(&is_publish(b))
+                .then(length)
+                .then(a.cmp(&b))
         });
         let mut picture = Self {
-            item_ids: view.items.iter().map(item_id).collect(),
-            arrow_ids: (0..view.arrows.len())
-                .map(|at| arrow_id(view, at))
-                .collect(),
-            tells: draft::tells(view),
+            cards: cards(&sketch, &layout, fit),
+            tracks,
+            order,
+            title: Title::new(style, fonts, page, view, &sketch.wish),
+            timeline: Timeline::new(style, fonts, page, view),
             ground: Vec::new(),
             sketch,
             layout,
             fit,
-            tracks,
-            order,
         };
         picture.ground = picture.ground();
         picture
@@ -245,30 +245,27 @@ impl<'a> Picture<'a> {
             .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name)))
             .collect();
         if !sketch.wish.bare {
-            groups.push(self.title().ground());
+            groups.push(self.title.ground());
             groups.push(legend::legend(&sketch.legend, sketch.style, &sketch.page));
-            groups.extend(self.timeline().ground(sketch.view));
+            groups.extend(self.timeline.ground(sketch.view));
         }
         groups
     }
 
     fn furniture(&self, k: usize, frame: &Frame, groups: &mut Vec<Group>) {
-        let sketch = &self.sketch;
-        let title = self.title();
-        let phase = sketch.wish.phases.get(k).map_or("", String::as_str);
-        groups.push(title.window(sketch.view, frame));
-        groups.push(title.chips(frame));
-        groups.push(title.clock(frame));
-        groups.push(title.caption(frame, phase));
-        groups.extend(self.timeline().head(k));
+        let phase = self.sketch.wish.phases.get(k).map_or("", String::as_str);
+        groups.push(self.title.window(self.sketch.view, frame));
+        groups.push(self.title.chips(frame));
+        groups.push(self.title.clock(frame));
+        groups.push(self.title.caption(frame, phase));
+        groups.extend(self.timeline.head(k));
     }
 
     fn graph(&self, frame: &Frame, groups: &mut Vec<Group>) {
-        let sketch = &self.sketch;
-        let (view, draft) = (sketch.view, &sketch.draft);
+        let view = self.sketch.view;
         let arrows = Arrows {
-            style: sketch.style,
-            fonts: sketch.fonts,
+            style: self.sketch.style,
+            fonts: self.sketch.fonts,
             fit: self.fit,
         };
         // What changed lies on top.
@@ -278,37 +275,21 @@ impl<'a> Picture<'a> {
                 continue;
             };
             let arrow = &view.arrows[at];
-            let (Some(from), Some(to)) = (
-                view.items.get(arrow.from as usize),
-                view.items.get(arrow.to as usize),
-            ) else {
-                continue;
-            };
             let ends = [arrow.from, arrow.to].map(|id| draft::find(&frame.items, id as usize));
-            let badged = is_badged(shown, ends);
-            let id = self.arrow_ids[at].clone();
-            let group = arrows.arrow(
-                arrow,
-                (from, to),
-                &self.tracks[at],
-                shown,
-                ends[0],
-                badged,
-                id,
-            );
-            if shown.mark.is_some() {
-                changed.push(group)
+            let group = arrows.arrow(arrow, &self.tracks[at], shown, ends);
+            let pile = if shown.mark.is_some() {
+                &mut changed
             } else {
-                groups.push(group)
-            }
+                &mut *groups
+            };
+            pile.push(group);
         }
         groups.append(&mut changed);
         let boxes = self.boxes();
         for shown in &frame.items {
             let at = shown.id as usize;
-            if let (Some(item), Some(place)) = (view.items.get(at), self.layout.boxes.get(at)) {
-                let id = self.item_ids[at].clone();
-                groups.push(boxes.item(item, &draft.labels[at], *place, shown, self.tells[at], id));
+            if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
+                groups.push(boxes.item(item, card, shown));
             }
         }
     }
@@ -319,40 +300,35 @@ impl<'a> Picture<'a> {
             fit: self.fit,
         }
     }
-
-    fn title(&self) -> Title<'_> {
-        let s = &self.sketch;
-        Title::new(
-            s.style,
-            s.fonts,
-            &s.page,
-            s.view,
-            &s.wish.title,
-            &s.wish.phases,
-        )
-    }
-
-    fn timeline(&self) -> Timeline<'_> {
-        let s = &self.sketch;
-        Timeline::new(s.style, s.fonts, &s.page, s.view)
-    }
-
-    /// Where an item stands on the page, by its place in the view.
-    pub fn place(&self, item: usize) -> Option<Rect> {
-        self.layout.boxes.get(item).map(|r| self.fit.rect(*r))
-    }
 }
 
-/// Whether a changed arrow carries a badge: not where one of its ends tells the same, and not where its rate does.
-fn is_badged(shown: &Shown, ends: [Option<&Shown>; 2]) -> bool {
-    let Some(mark) = shown.mark else { return false };
-    let rate = matches!(mark, Mark::Faster | Mark::Slower);
-    let told = ends
-        .into_iter()
-        .flatten()
-        .filter_map(|end| end.mark)
-        .any(|m| m.class() == mark.class());
-    !rate && !told
+fn cards(sketch: &Sketch<'_>, layout: &Layout, fit: Fit) -> Vec<Card> {
+    let tells = draft::tells(sketch.view);
+    let items = sketch.view.items.iter().zip(&layout.boxes);
+    let labels = sketch.draft.labels.iter().zip(tells);
+    items
+        .zip(labels)
+        .map(|((item, place), (label, tells))| Card {
+            id: item_id(item),
+            label: label.clone(),
+            tells,
+            place: fit.rect(*place),
+        })
+        .collect()
+}
+
+fn tracks(sketch: &Sketch<'_>, layout: &Layout, fit: Fit) -> Vec<Track> {
+    let view = sketch.view;
+    let name = |id: u32| view.items.get(id as usize).map_or("", |item| &*item.name);
+    let empty = layout::Route::default();
+    let arrows = view.arrows.iter().zip(&sketch.draft.plan.links).enumerate();
+    arrows
+        .map(|(at, (arrow, link))| {
+            let ends = [arrow.from, arrow.to].map(|id| name(id).to_owned());
+            let route = layout.routes.get(at).unwrap_or(&empty);
+            Track::new(arrow_id(arrow, &ends), ends, route, link.label, fit)
+        })
+        .collect()
 }
 
 fn item_id(item: &Item) -> String {
@@ -360,14 +336,8 @@ fn item_id(item: &Item) -> String {
     format!("{prefix}{}", encoded(&item.name))
 }
 
-fn arrow_id(view: &View, at: usize) -> String {
-    let arrow = &view.arrows[at];
-    let name = |id: u32| {
-        view.items
-            .get(id as usize)
-            .map_or_else(String::new, |item| encoded(&item.name))
-    };
-    let (from, to) = (name(arrow.from), name(arrow.to));
+fn arrow_id(arrow: &Arrow, ends: &[String; 2]) -> String {
+    let [from, to] = ends.each_ref().map(|name| encoded(name));
     match &arrow.kind {
         ArrowKind::Publish => format!("p{from}..{to}"),
         ArrowKind::Subscribe => format!("s{from}..{to}"),
@@ -383,7 +353,9 @@ fn encoded(name: &str) -> String {
         match c {
             '/' => out.push('-'),
             '_' | 'a'..='z' | 'A'..='Z' | '0'..='9' => out.push(c),
-            _ => out.push_str(&format!(".{:06x}", u32::from(c))),
+            _ => {
+                let _ = write!(out, ".{:06x}", u32::from(c));
+            }
         }
     }
     out

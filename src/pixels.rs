@@ -138,7 +138,9 @@ impl Sheet {
     /// A sheet with the whole scene on it.
     fn covered(scene: &Scene, drawn: &[Arc<Drawn>], scale: f64) -> Result<Self> {
         let mut sheet = Self::of(scene, scale)?;
-        drawn.iter().for_each(|d| sheet.draw(d));
+        for group in drawn {
+            sheet.draw(group);
+        }
         Ok(sheet)
     }
 

@@ -10,7 +10,7 @@ use crate::layout::Route;
 use crate::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::style::{Color, Style};
 use crate::text::{Fonts, Weight};
-use crate::view::{Arrow, Item, Shown};
+use crate::view::{Arrow, Mark, Shown};
 
 /// What arrows are drawn with.
 pub(super) struct Arrows<'a> {
@@ -22,6 +22,9 @@ pub(super) struct Arrows<'a> {
 /// Where the parts of one arrow stand on the page, the same in every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Track {
+    pub(super) id: String,
+    /// The names of its ends.
+    pub(super) ends: [String; 2],
     start: Point,
     curves: Vec<[Point; 3]>,
     /// The middle of its label.
@@ -34,7 +37,13 @@ pub(super) struct Track {
 
 impl Track {
     /// The route on the page. `room` is the size of its label, if it has one.
-    pub(super) fn new(route: &Route, room: Option<Size>, fit: Fit) -> Self {
+    pub(super) fn new(
+        id: String,
+        ends: [String; 2],
+        route: &Route,
+        room: Option<Size>,
+        fit: Fit,
+    ) -> Self {
         let curves: Vec<[Point; 3]> = route
             .curves
             .iter()
@@ -56,6 +65,8 @@ impl Track {
             _ => middle,
         };
         Self {
+            id,
+            ends,
             start,
             curves,
             label,
@@ -66,44 +77,31 @@ impl Track {
 }
 
 impl Arrows<'_> {
-    /// One arrow in one window. `badged` is whether its change is not told by one of its ends.
+    /// One arrow in one window, whose ends are `ends` there.
     pub(super) fn arrow(
         &self,
         arrow: &Arrow,
-        ends: (&Item, &Item),
         track: &Track,
         shown: &Shown,
-        from: Option<&Shown>,
-        badged: bool,
-        id: String,
+        ends: [Option<&Shown>; 2],
     ) -> Group {
         let look = look::of_arrow(self.style, &arrow.kind, shown);
+        let [from, to] = &track.ends;
+        let kind = arrow.kind.word();
         let mut group = Group {
-            id,
-            class: class(&format!("edge {}", arrow.kind.word()), shown),
-            data: vec![
-                ("from", ends.0.name.to_string()),
-                ("to", ends.1.name.to_string()),
-            ],
-            title: format!(
-                "{} → {}\n{}: {}",
-                ends.0.name,
-                ends.1.name,
-                arrow.kind.word(),
-                words::facts(shown)
-            ),
+            id: track.id.clone(),
+            class: class(&format!("edge {kind}"), shown),
+            data: vec![("from", from.clone()), ("to", to.clone())],
+            title: format!("{from} → {to}\n{kind}: {}", words::facts(shown)),
             ..Group::default()
         };
         self.line(&mut group, track, &look);
-        self.label(&mut group, arrow, track, shown, from, &look);
-        if let Some(mark) = shown.mark.filter(|_| badged) {
-            badge::badge(
-                &mut group,
-                self.style,
-                mark,
-                track.badge,
-                self.fit.pen * 0.8,
-            );
+        if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0]) {
+            self.label(&mut group, &text, is_pill, track, shown, &look);
+        }
+        if let Some(mark) = shown.mark.filter(|mark| is_badged(*mark, ends)) {
+            let size = self.fit.pen * 0.8;
+            badge::badge(&mut group, self.style, mark, track.badge, size);
         }
         group
     }
@@ -153,16 +151,14 @@ impl Arrows<'_> {
     fn label(
         &self,
         group: &mut Group,
-        arrow: &Arrow,
+        text: &str,
+        is_pill: bool,
         track: &Track,
         shown: &Shown,
-        from: Option<&Shown>,
         look: &ArrowLook,
     ) {
-        let Some((text, is_pill)) = arrow_label(arrow, shown, from) else {
-            return;
-        };
         let Some(centre) = track.label else { return };
+        let text = self.fonts.shown(text);
         let style = &self.style.edge;
         let size = style.size * self.fit.scale;
         if is_pill {
@@ -185,9 +181,16 @@ impl Arrows<'_> {
                 look.text
             },
             halo: Some((style.halo, style.halo_width * self.fit.scale)),
-            text,
+            text: text.into_owned(),
         });
     }
+}
+
+/// Whether a changed arrow carries a badge: not where one of its ends tells the same, and not where its rate does.
+fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
+    let rate = matches!(mark, Mark::Faster | Mark::Slower);
+    let mut marks = ends.into_iter().flatten().filter_map(|end| end.mark);
+    !rate && !marks.any(|m| m.class() == mark.class())
 }
 
 /// A triangle with its tip here, pointing along a direction of length 1.

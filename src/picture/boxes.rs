@@ -17,6 +17,16 @@ pub(super) struct Boxes<'a> {
     pub(super) fit: Fit,
 }
 
+/// What is the same of an item in every window.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Card {
+    pub(super) id: String,
+    pub(super) label: Label,
+    pub(super) tells: Tells,
+    /// Its box on the page.
+    pub(super) place: Rect,
+}
+
 impl Boxes<'_> {
     /// The box around a namespace.
     pub(super) fn space(&self, space: &Space, place: Rect, id: &str) -> Group {
@@ -56,24 +66,16 @@ impl Boxes<'_> {
     }
 
     /// One item in one window.
-    pub(super) fn item(
-        &self,
-        item: &Item,
-        label: &Label,
-        place: Rect,
-        shown: &Shown,
-        tells: Tells,
-        id: String,
-    ) -> Group {
+    pub(super) fn item(&self, item: &Item, card: &Card, shown: &Shown) -> Group {
         let style = self.style;
         let body = match item.kind {
             ItemKind::Node | ItemKind::Namespace => &style.node,
             ItemKind::Topic | ItemKind::Group => &style.topic,
         };
         let look = look::of_box(style, body, shown);
-        let place = self.fit.rect(place);
+        let place = card.place;
         let mut group = Group {
-            id,
+            id: card.id.clone(),
             class: class(item.kind.word(), shown),
             data: vec![("name", item.name.to_string())],
             title: title(item, shown),
@@ -86,12 +88,11 @@ impl Boxes<'_> {
         {
             self.latch(&mut group, inner, body);
         }
-        let second = if label.fixed.is_empty() {
-            second_line(shown, tells).unwrap_or_default()
-        } else {
-            label.fixed.clone()
+        let second = match card.label.fixed.as_str() {
+            "" => second_line(shown, card.tells).unwrap_or_default(),
+            fixed => fixed.to_owned(),
         };
-        self.lines(&mut group, label, &second, inner, body, &look, shown);
+        self.lines(&mut group, &card.label, &second, inner, body, &look);
         if let Some(mark) = shown.mark {
             badge::badge(
                 &mut group,
@@ -163,10 +164,6 @@ impl Boxes<'_> {
         ));
     }
 
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "all that the words of one box depend on"
-    )]
     fn lines(
         &self,
         group: &mut Group,
@@ -175,7 +172,6 @@ impl Boxes<'_> {
         place: Rect,
         body: &Body,
         look: &BoxLook,
-        shown: &Shown,
     ) {
         let scale = self.fit.scale;
         let middle = place.centre();
@@ -194,11 +190,7 @@ impl Boxes<'_> {
         let y = top + body.size * (LINE / 2.0 + 0.35) * scale;
         group.text(line(y, body.size, body.weight(), look.text, &label.name));
         let y = top + (body.size * LINE + body.small * (LINE / 2.0 + 0.28)) * scale;
-        let (weight, color) = match shown.mark {
-            Some(mark) => (Weight::SemiBold, look::change(self.style, mark).color),
-            None if look.text == body.text => (Weight::Regular, self.style.page.quiet),
-            None => (Weight::Regular, look.text),
-        };
+        let (weight, color) = look.small;
         group.text(line(y, body.small, weight, color, second));
     }
 }

@@ -197,9 +197,10 @@ impl Drafter<'_> {
                 let Some((text, is_pill)) = arrow_label(arrow, shown, topic) else {
                     continue;
                 };
-                let (weight, pad) = match is_pill {
-                    true => (Weight::SemiBold, style.size * PILL_PAD),
-                    false => (Weight::Regular, style.halo_width),
+                let (weight, pad) = if is_pill {
+                    (Weight::SemiBold, style.size * PILL_PAD)
+                } else {
+                    (Weight::Regular, style.halo_width)
                 };
                 widen(
                     &mut widest[at],

@@ -9,7 +9,7 @@ use crate::evidence::Degree;
 use crate::geometry::{Point, Rect};
 use crate::graph::State;
 use crate::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
-use crate::style::{Color, Style};
+use crate::style::Style;
 use crate::text::{Fonts, Weight};
 use crate::view::{ArrowKind, ItemKind, Mark, Shown, View};
 
@@ -176,8 +176,66 @@ pub(super) fn legend(rows: &[Vec<(Sign, String, f64)>], style: &Style, page: &Pa
 }
 
 fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
-    let middle = place.centre();
-    let shown = |state, degree, mark| Shown {
+    let arrow_of = |kind, degree, mark| {
+        look::of_arrow(style, &kind, &shown(State::Active, degree, mark))
+            .stroke
+            .scaled(unit)
+    };
+    match sign {
+        Sign::Node => card(group, style, place, true, State::Active, unit),
+        Sign::Topic => card(group, style, place, false, State::Active, unit),
+        Sign::Group => {
+            card(group, style, place, false, State::Active, unit);
+            card(
+                group,
+                style,
+                front(place, style, unit),
+                false,
+                State::Active,
+                unit,
+            );
+        }
+        Sign::Namespace => {
+            let stroke = Stroke::solid(style.node.stroke, style.node.width * unit);
+            for place in [place, front(place, style, unit)] {
+                let form = Form::Rect(place, 4.0 * unit);
+                group.shape(Shape {
+                    form,
+                    fill: style.node.fill,
+                    stroke: stroke.clone(),
+                });
+            }
+        }
+        Sign::Change(mark) => {
+            let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, Some(*mark));
+            group.shape(Shape::line(across(place), stroke));
+            badge(group, style, *mark, place.centre(), unit * 0.9);
+        }
+        Sign::Box(state) => {
+            card(group, style, place, false, *state, unit);
+            if *state == State::Latched {
+                let inset = style.topic.width * unit / 2.0;
+                let width = style.latched.bar * unit;
+                let bar = Rect::new(
+                    place.x + inset,
+                    place.y + inset,
+                    width,
+                    place.h - 2.0 * inset,
+                );
+                group.shape(Shape::filled(Form::Rect(bar, 0.0), style.latched.stroke));
+            }
+        }
+        Sign::Line(degree) => {
+            let stroke = arrow_of(ArrowKind::Subscribe, *degree, None);
+            arrow(group, place, stroke, style.edge.arrow * unit);
+        }
+        Sign::Width => widths(group, style, place, unit),
+    }
+}
+
+/// An element that stands for all of its kind.
+fn shown(state: State, degree: Degree, mark: Option<Mark>) -> Shown {
+    Shown {
         id: 0,
         state,
         degree,
@@ -186,96 +244,48 @@ fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
         from_hz: None,
         count: None,
         lifecycle: None,
+    }
+}
+
+fn card(group: &mut Group, style: &Style, place: Rect, round: bool, state: State, unit: f64) {
+    let body = if round { &style.node } else { &style.topic };
+    let degree = match state {
+        State::Declared => Degree::Declared,
+        _ => Degree::Measured,
     };
-    let active = shown(State::Active, Degree::Measured, None);
-    let card = |group: &mut Group, place: Rect, round: bool, shown: &Shown| {
-        let body = if round { &style.node } else { &style.topic };
-        let look = look::of_box(style, body, shown);
-        let form = if round {
-            Form::Ellipse(place)
-        } else {
-            Form::Rect(place, body.radius * unit)
-        };
-        group.shape(Shape {
-            form,
-            fill: look.fill,
-            stroke: look.stroke.scaled(unit),
-        });
+    let look = look::of_box(style, body, &shown(state, degree, None));
+    let form = if round {
+        Form::Ellipse(place)
+    } else {
+        Form::Rect(place, body.radius * unit)
     };
+    group.shape(Shape {
+        form,
+        fill: look.fill,
+        stroke: look.stroke.scaled(unit),
+    });
+}
+
+/// The second card of a stack.
+fn front(place: Rect, style: &Style, unit: f64) -> Rect {
     let depth = style.stack.depth * 0.7 * unit;
-    let front = Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth);
-    match sign {
-        Sign::Node => card(group, place, true, &active),
-        Sign::Topic => card(group, place, false, &active),
-        Sign::Group => {
-            card(group, place, false, &active);
-            card(group, front, false, &active);
-        }
-        Sign::Namespace => {
-            for place in [place, front] {
-                let stroke = Stroke::solid(style.node.stroke, style.node.width * unit);
-                group.shape(Shape {
-                    form: Form::Rect(place, 4.0 * unit),
-                    fill: style.node.fill,
-                    stroke,
-                });
-            }
-        }
-        Sign::Change(mark) => {
-            let look = look::of_arrow(
-                style,
-                &ArrowKind::Publish,
-                &shown(State::Active, Degree::Measured, Some(*mark)),
-            );
-            group.shape(Shape::line(across(place), look.stroke.scaled(unit)));
-            badge(group, style, *mark, middle, unit * 0.9);
-        }
-        Sign::Box(state) => {
-            let degree = if *state == State::Declared {
-                Degree::Declared
-            } else {
-                Degree::Measured
-            };
-            card(group, place, false, &shown(*state, degree, None));
-            if *state == State::Latched {
-                let inset = style.topic.width * unit / 2.0;
-                let bar = Rect::new(
-                    place.x + inset,
-                    place.y + inset,
-                    style.latched.bar * unit,
-                    place.h - 2.0 * inset,
-                );
-                group.shape(Shape::filled(Form::Rect(bar, 0.0), style.latched.stroke));
-            }
-        }
-        Sign::Line(degree) => {
-            let look = look::of_arrow(
-                style,
-                &ArrowKind::Subscribe,
-                &shown(State::Active, *degree, None),
-            );
-            arrow(
-                group,
-                place,
-                look.stroke.scaled(unit),
-                style.edge.arrow * unit,
-            );
-        }
-        Sign::Width => {
-            let width = [
-                style.edge.width,
-                style.edge.width + 2.0 * style.edge.per_decade,
-            ];
-            for (part, width) in [0.0, 0.55].into_iter().zip(width) {
-                let from = Point::new(place.x + place.w * part, middle.y);
-                let to = Point::new(from.x + place.w * 0.45, middle.y);
-                let color: Color = style.edge.stroke;
-                group.shape(Shape::line(
-                    line(from, to),
-                    Stroke::solid(color, width * unit),
-                ));
-            }
-        }
+    Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth)
+}
+
+/// A thin line and a thick one.
+fn widths(group: &mut Group, style: &Style, place: Rect, unit: f64) {
+    let edge = &style.edge;
+    let y = place.centre().y;
+    for (part, width) in [
+        (0.0, edge.width),
+        (0.55, edge.width + 2.0 * edge.per_decade),
+    ] {
+        let from = Point::new(place.x + place.w * part, y);
+        let to = Point::new(from.x + place.w * 0.45, y);
+        group.shape(Shape::line(
+            line(from, to),
+            Stroke::solid(edge.stroke, width * unit),
+        ));
     }
 }
 

@@ -4,6 +4,7 @@ use crate::evidence::Degree;
 use crate::graph::State;
 use crate::scene::Stroke;
 use crate::style::{Body, Change, Color, Style};
+use crate::text::Weight;
 use crate::view::{ArrowKind, Mark, Shown};
 
 /// The paint of a box.
@@ -12,6 +13,8 @@ pub(super) struct BoxLook {
     pub(super) fill: Color,
     pub(super) stroke: Stroke,
     pub(super) text: Color,
+    /// The smaller line.
+    pub(super) small: (Weight, Color),
     /// A soft light around it, so that the eye finds it.
     pub(super) glow: Color,
 }
@@ -44,6 +47,7 @@ pub(super) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
             fill: change.fill,
             stroke: line(change.color, change.width, &change.dash),
             text: change.text,
+            small: (Weight::SemiBold, change.color),
             glow: change.glow,
         };
     }
@@ -60,6 +64,7 @@ pub(super) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
                 fill: body.fill,
                 stroke: line(body.stroke, body.width, dash),
                 text: body.text,
+                small: (Weight::Regular, style.page.quiet),
                 glow: Color::NONE,
             };
         }
@@ -68,6 +73,7 @@ pub(super) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
         fill: quiet.fill,
         stroke: line(quiet.stroke, quiet.width, &quiet.dash),
         text: quiet.text,
+        small: (Weight::Regular, quiet.text),
         glow: Color::NONE,
     }
 }

@@ -17,7 +17,7 @@ struct Bar {
 /// The strip's fixed places.
 pub(super) struct Timeline<'a> {
     style: &'a Style,
-    page: &'a Page,
+    page: Page,
     fonts: &'a Fonts,
     bars: Vec<Bar>,
     /// Windows per bar, 1...
@@ -32,7 +32,7 @@ pub(super) struct Timeline<'a> {
 const NARROWEST: f64 = 2.5;
 
 impl<'a> Timeline<'a> {
-    pub(super) fn new(style: &'a Style, fonts: &'a Fonts, page: &'a Page, view: &View) -> Self {
+    pub(super) fn new(style: &'a Style, fonts: &'a Fonts, page: &Page, view: &View) -> Self {
         let unit = page.unit;
         let strip = page.timeline;
         let margin = style.page.margin * unit;
@@ -50,7 +50,7 @@ impl<'a> Timeline<'a> {
         let busiest = bars.iter().map(|b| b.messages).max().unwrap_or(0).max(1);
         Self {
             style,
-            page,
+            page: page.clone(),
             fonts,
             bars,
             per_bar,

@@ -1,7 +1,7 @@
 //! The bar on top and the line below it: which bag, which window, what time, how many changes, and which in words.
 
 use super::page::Page;
-use super::words;
+use super::{Wish, words};
 use crate::geometry::{Point, Rect};
 use crate::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::style::{Color, Style};
@@ -13,7 +13,7 @@ use crate::view::{Frame, Tally, View};
 pub(super) struct Title<'a> {
     style: &'a Style,
     fonts: &'a Fonts,
-    page: &'a Page,
+    page: Page,
     name: String,
     /// The left edges and widths of the chips for what came, went and changed.
     chips: [(f64, f64); 3],
@@ -27,10 +27,9 @@ impl<'a> Title<'a> {
     pub(super) fn new(
         style: &'a Style,
         fonts: &'a Fonts,
-        page: &'a Page,
+        page: &Page,
         view: &View,
-        name: &str,
-        phases: &[String],
+        wish: &Wish,
     ) -> Self {
         let unit = page.unit;
         let clock = fonts.width("00:00:00", style.title.clock_size * unit, Weight::SemiBold);
@@ -52,15 +51,16 @@ impl<'a> Title<'a> {
         }
         let none = fonts.width(NONE, style.chip.size * unit, Weight::SemiBold) + 22.0 * unit;
         let end = right.min(chips[2].0 + chips[2].1 - none) - 10.0 * unit;
-        let widest = phases
+        let widest = wish
+            .phases
             .iter()
             .map(|p| fonts.width(&fonts.shown(p), style.caption.size * unit, Weight::SemiBold));
         let phase = widest.fold(0.0, f64::max).min(page.size.w * 0.4);
         Self {
             style,
             fonts,
-            page,
-            name: fonts.shown(name).into_owned(),
+            page: page.clone(),
+            name: fonts.shown(&wish.title).into_owned(),
             chips,
             end,
             phase,
