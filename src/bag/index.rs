@@ -255,6 +255,27 @@ pub(super) fn hand_over(
     pass(stream, u64::from(size))
 }
 
+/// Hands over what is wanted of a message that another reader holds.
+pub(super) fn hand_over_slice(
+    whole: &[u8],
+    (connection, time): (ConnectionId, Stamp),
+    want: Want,
+    sink: &mut dyn Sink,
+) {
+    let size = u32::try_from(whole.len()).unwrap_or(u32::MAX);
+    let data = match want {
+        Want::Stamps | Want::Sizes => return,
+        Want::Head(n) => &whole[..n.min(whole.len())],
+        Want::Payload => whole,
+    };
+    sink.message(Message {
+        connection,
+        time,
+        data,
+        size,
+    });
+}
+
 /// Passes over `len` bytes, which must be there.
 pub(super) fn pass(stream: &mut Stream<'_>, len: u64) -> io::Result<()> {
     match stream.skip(len)? {
@@ -287,7 +308,7 @@ fn wanted_part<'s>(
 }
 
 /// What is said of a payload past [`MOST_PAYLOAD`].
-pub(super) const TOO_LARGE: &str = "messages larger than 16 MiB were counted and not looked into";
+const TOO_LARGE: &str = "messages larger than 16 MiB were counted and not looked into";
 
 /// A way to find the first and the last stamp: all the rest is forgotten.
 #[derive(Default)]

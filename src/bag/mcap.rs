@@ -24,6 +24,8 @@ mod forward;
 mod records;
 #[path = "mcap_summary.rs"]
 mod summary;
+#[path = "mcap_verify.rs"]
+mod verify;
 
 /// MCAP files.
 pub(super) const FORMAT: FormatRow = FormatRow {
@@ -39,6 +41,7 @@ struct Indexed {
     source: Source,
     summary: Result<Summary, Unindexed>,
     facts: Vec<(String, String)>,
+    verify: bool,
 }
 
 /// A file from a pipe.
@@ -47,7 +50,7 @@ struct Piped {
     stream: Stream<'static>,
 }
 
-fn open(place: Place, _options: &OpenOptions) -> Result<Box<dyn Reader>> {
+fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     match place {
         Place::File(source) => {
             let summary = summary::of(&source).map_err(Error::io("read", source.path()))?;
@@ -56,6 +59,7 @@ fn open(place: Place, _options: &OpenOptions) -> Result<Box<dyn Reader>> {
                 source,
                 summary,
                 facts,
+                verify: options.verify,
             }))
         }
         Place::Pipe(name, stream) => Ok(Box::new(Piped { name, stream })),
@@ -92,6 +96,7 @@ impl Reader for Indexed {
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
         let mut sink = Clip::new(range, sink);
         let report = match &self.summary {
+            _ if self.verify => by_the_crate(&self.source, &mut sink),
             Ok(summary) => by_index(&self.source, summary, range, &mut sink),
             Err(reason) => from_the_front(&self.source, reason, &mut sink),
         };
@@ -151,6 +156,17 @@ fn by_index(
     Report {
         complete: !sink.lost,
         ..report(file_name(source.path()), Tier::Index, &compression)
+    }
+}
+
+/// Everything, by the crate `mcap`.
+fn by_the_crate(source: &Source, sink: &mut Clip<'_>) -> Report {
+    let mut stream = Stream::of_file(source, 0, source.len(), FAR);
+    let stopped = verify::read(&mut stream, sink).err();
+    Report {
+        complete: stopped.is_none() && !sink.lost,
+        tier_reason: stopped.map(|why| format!("the second reader stopped: {why}")),
+        ..report(file_name(source.path()), Tier::Verify, &BTreeSet::new())
     }
 }
 

@@ -23,6 +23,8 @@ mod forward;
 mod plan;
 #[path = "rosbag1_records.rs"]
 mod records;
+#[path = "rosbag1_verify.rs"]
+mod verify;
 
 /// ROS 1 bags.
 pub(super) const FORMAT: FormatRow = FormatRow {
@@ -37,6 +39,7 @@ pub(super) const FORMAT: FormatRow = FormatRow {
 struct Indexed {
     source: Source,
     plan: Result<Plan, Unindexed>,
+    verify: bool,
 }
 
 /// A bag from a pipe.
@@ -45,7 +48,7 @@ struct Piped {
     stream: Stream<'static>,
 }
 
-fn open(place: Place, _options: &OpenOptions) -> Result<Box<dyn Reader>> {
+fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     match place {
         Place::File(source) => {
             let mut head = [0; 32];
@@ -53,7 +56,11 @@ fn open(place: Place, _options: &OpenOptions) -> Result<Box<dyn Reader>> {
             let got = got.map_err(Error::io("read", source.path()))?;
             version(source.path(), &head[..got])?;
             let plan = plan::of(&source).map_err(Error::io("read", source.path()))?;
-            Ok(Box::new(Indexed { source, plan }))
+            Ok(Box::new(Indexed {
+                source,
+                plan,
+                verify: options.verify,
+            }))
         }
         Place::Pipe(name, mut stream) => {
             let head = stream
@@ -94,6 +101,7 @@ impl Reader for Indexed {
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
         let mut sink = Clip::new(range, sink);
         match &self.plan {
+            Ok(plan) if self.verify => Ok(by_the_crate(&self.source, plan, &mut sink)),
             Ok(plan) => Ok(by_index(&self.source, plan, range, &mut sink)),
             Err(reason) => Ok(from_the_front(&self.source, reason, &mut sink)),
         }
@@ -151,6 +159,38 @@ fn by_index(source: &Source, plan: &Plan, range: Option<Span>, sink: &mut Clip<'
         bytes_read: source.bytes_read(),
         file_bytes: source.len(),
         ..report(file_name(source.path()), Tier::Index, &compression)
+    }
+}
+
+/// Everything, by the crate `rosbag`.
+fn by_the_crate(source: &Source, plan: &Plan, sink: &mut Clip<'_>) -> Report {
+    let verified = verify::read(source, plan, sink);
+    let stopped = verified.stopped.as_ref();
+    if let (true, Some(why)) = (verified.refused, stopped) {
+        // Our own way from the front is the next best: it looks at no index.
+        let mut stream = Stream::of_file(source, 0, source.len(), FAR);
+        let found = forwards(&mut stream, source.len(), sink);
+        return Report {
+            complete: found.complete,
+            tier_reason: Some(format!(
+                "the crate `rosbag` refuses ({why}); read from the front instead"
+            )),
+            bytes_read: source.bytes_read(),
+            file_bytes: source.len(),
+            ..report(file_name(source.path()), Tier::Verify, &found.compression)
+        };
+    }
+    let reason = stopped.map(|why| format!("the second reader stopped: {why}"));
+    Report {
+        complete: reason.is_none() && !sink.lost,
+        tier_reason: reason,
+        bytes_read: source.len(),
+        file_bytes: source.len(),
+        ..report(
+            file_name(source.path()),
+            Tier::Verify,
+            &verified.compression,
+        )
     }
 }
 

@@ -15,6 +15,10 @@ pub(super) struct Plan {
     pub(super) table: Table,
     /// In the order of the file, none twice.
     pub(super) chunks: Vec<Chunk>,
+    /// Where the first chunk may begin.
+    pub(super) body: u64,
+    /// Where the chunks end and the tail begins.
+    pub(super) index_pos: u64,
     encryptor: String,
 }
 
@@ -52,11 +56,13 @@ pub(super) fn of(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
     let mut plan = Plan {
         table: Table::default(),
         chunks: Vec::new(),
+        body,
+        index_pos,
         encryptor,
     };
     let told = plan.tail(source, index_pos, (connections, chunks));
     match told {
-        Ok(()) => Ok(plan.settle(body, index_pos).map(|()| plan)),
+        Ok(()) => Ok(plan.settle().map(|()| plan)),
         Err(Stop::Io(e)) => Err(e),
         Err(_) => Ok(Err(Unindexed("its index is cut or damaged".to_owned()))),
     }
@@ -121,7 +127,8 @@ impl Plan {
     }
 
     /// Orders the chunks and tells each where it ends.
-    fn settle(&mut self, body: u64, index_pos: u64) -> Result<(), Unindexed> {
+    fn settle(&mut self) -> Result<(), Unindexed> {
+        let (body, index_pos) = (self.body, self.index_pos);
         self.chunks.sort_by_key(|c| c.pos);
         self.chunks.dedup_by_key(|c| c.pos);
         let mut end = index_pos;

@@ -73,6 +73,15 @@ const LONGEST_HEADER: usize = 1 << 20;
 ///
 /// An index record's length comes from its count: writers of 2010 put a wrong one.
 pub(super) fn next(stream: &mut Stream<'_>) -> Result<(Record, u32), Stop> {
+    let (record, mut len) = next_as_stated(stream)?;
+    if let Record::Index { count, .. } = record {
+        len = count.checked_mul(ENTRY).ok_or(Stop::Broken)?;
+    }
+    Ok((record, len))
+}
+
+/// As [`next`], with the length that the record states.
+pub(super) fn next_as_stated(stream: &mut Stream<'_>) -> Result<(Record, u32), Stop> {
     let head = stream.peek(4)?;
     if head.is_empty() {
         return Err(Stop::End);
@@ -83,11 +92,8 @@ pub(super) fn next(stream: &mut Stream<'_>) -> Result<(Record, u32), Stop> {
     }
     let whole = stream.peek(header_len + 8)?;
     let header = whole.get(4..4 + header_len).ok_or(Stop::Cut)?;
-    let mut data_len = u32_at(whole, 4 + header_len).ok_or(Stop::Cut)?;
+    let data_len = u32_at(whole, 4 + header_len).ok_or(Stop::Cut)?;
     let record = parse(header).ok_or(Stop::Broken)?;
-    if let Record::Index { count, .. } = record {
-        data_len = count.checked_mul(ENTRY).ok_or(Stop::Broken)?;
-    }
     stream.advance(header_len + 8);
     Ok((record, data_len))
 }
