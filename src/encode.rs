@@ -6,14 +6,16 @@ mod dot;
 mod gif;
 mod json;
 mod mermaid;
+mod pdf;
 mod png;
 mod svg;
+mod video;
 
 use std::path::PathBuf;
 
 use crate::error::{Error, Result};
 use crate::film::{Film, Shot};
-use crate::output::Target;
+use crate::output::{self, Target};
 use crate::palette::Palette;
 use crate::pixels::Pixels;
 use crate::scene::Scene;
@@ -77,6 +79,35 @@ impl Written {
     }
 }
 
+/// What a format of single drawings does with a target.
+#[derive(Clone, Copy)]
+enum Single<'a> {
+    /// A file per window, or the only window.
+    Windows,
+    /// The strip in one file.
+    Strip(&'a Scene),
+}
+
+/// How a drawing format uses a target: with `{n}`, or for one window, a file per window; else the strip, if there
+/// is one and it may stand here.
+fn single<'a>(film: &Film<'a>, target: &Target, strip: bool) -> Result<Single<'a>> {
+    let windows = film.view.frames.len();
+    if target.is_numbered() {
+        return Ok(Single::Windows);
+    }
+    match film.strip.filter(|_| strip) {
+        Some(scene) => Ok(Single::Strip(scene)),
+        None if windows <= 1 => Ok(Single::Windows),
+        None => Err(Error::usage(
+            format!(
+                "`{}` is one file for {windows} windows",
+                target.path().display()
+            ),
+            "put `{n}` into the name for a file per window, or ask for a `--strip`",
+        )),
+    }
+}
+
 /// A format at work on one output. What it has not finished leaves no trace when it is dropped.
 pub trait Encoder: Send {
     /// What it wants of every frame.
@@ -112,6 +143,10 @@ pub struct Format {
     pub what: &'static str,
     /// Whether `--max-bytes` binds it.
     pub is_limited: bool,
+    /// Whether, without `{n}`, several windows become a film strip unless one asks for another.
+    pub is_strip: bool,
+    /// What else it needs, checked before anything is read.
+    pub check: Option<fn(&Target) -> Result<()>>,
     /// How an output begins.
     pub start: Start,
 }
@@ -122,54 +157,96 @@ pub const FORMATS: &[Format] = &[
         word: "gif",
         what: "the animation",
         is_limited: true,
+        is_strip: false,
+        check: None,
         start: gif::start,
     },
     Format {
         word: "apng",
         what: "the animation, lossless for all but antialiasing",
         is_limited: true,
+        is_strip: false,
+        check: None,
         start: apng::start,
     },
     Format {
         word: "svg",
-        what: "a drawing per window with `{n}`",
+        what: "a drawing per window with `{n}`, the only window, or the `--strip`",
         is_limited: false,
+        is_strip: false,
+        check: None,
         start: svg::start,
     },
     Format {
         word: "png",
-        what: "an image per window with `{n}`",
+        what: "an image per window with `{n}`, the only window, or a film strip",
         is_limited: false,
+        is_strip: true,
+        check: None,
         start: png::start_png,
     },
     Format {
         word: "webp",
-        what: "an image per window with `{n}`",
+        what: "an image per window with `{n}`, the only window, or a film strip",
         is_limited: false,
+        is_strip: true,
+        check: None,
         start: png::start_webp,
     },
     Format {
         word: "dot",
         what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
         is_limited: false,
+        is_strip: false,
+        check: None,
         start: dot::start,
     },
     Format {
         word: "mmd",
         what: "a Mermaid flow chart, per window with `{n}`, else the union",
         is_limited: false,
+        is_strip: false,
+        check: None,
         start: mermaid::start,
+    },
+    Format {
+        word: "pdf",
+        what: "a page per window as vectors, or the `--strip`",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: pdf::start,
+    },
+    Format {
+        word: "mp4",
+        what: "a video, through `ffmpeg`",
+        is_limited: false,
+        is_strip: false,
+        check: Some(video::check),
+        start: video::start_mp4,
+    },
+    Format {
+        word: "webm",
+        what: "a video, through `ffmpeg`",
+        is_limited: false,
+        is_strip: false,
+        check: Some(video::check),
+        start: video::start_webm,
     },
     Format {
         word: "json",
         what: "the evolution as data, which can be read again",
         is_limited: false,
+        is_strip: false,
+        check: None,
         start: json::start,
     },
     Format {
         word: "csv",
         what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
         is_limited: false,
+        is_strip: false,
+        check: None,
         start: csv::start,
     },
 ];
@@ -206,6 +283,24 @@ impl Output {
             )),
         }
     }
+}
+
+/// Checks all outputs before the inputs are read: their names, their folders, and what their formats need.
+///
+/// # Errors
+/// As [`output::check`], and [`Error::Output`] where a format lacks something.
+pub fn check(outputs: &[Output], inputs: &[PathBuf]) -> Result<()> {
+    let targets: Vec<Target> = outputs.iter().map(|o| o.target.clone()).collect();
+    output::check(&targets, inputs)?;
+    outputs
+        .iter()
+        .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
+}
+
+/// Whether a film of this many windows needs a strip for these outputs even if none was asked for.
+pub fn needs_strip(outputs: &[Output], windows: usize) -> bool {
+    let strip = |o: &Output| o.format.is_strip && !o.target.is_numbered();
+    windows > 1 && outputs.iter().any(strip)
 }
 
 #[cfg(test)]

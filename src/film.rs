@@ -5,6 +5,7 @@ use crate::evolution::Evolution;
 use crate::picture::Picture;
 use crate::pixels::Painter;
 use crate::scene::Scene;
+use crate::text::Fonts;
 use crate::view::View;
 
 /// How the sequence runs.
@@ -26,6 +27,8 @@ pub struct Options {
     pub max_bytes: Option<u64>,
     /// How DOT is written.
     pub dot_profile: Profile,
+    /// Whether the strip was asked for: then it stands in the place of a sequence of drawings too.
+    pub strip: bool,
 }
 
 impl Default for Options {
@@ -39,6 +42,7 @@ impl Default for Options {
             scale: 1.0,
             max_bytes: None,
             dot_profile: Profile::default(),
+            strip: false,
         }
     }
 }
@@ -67,6 +71,10 @@ pub struct Film<'a> {
     pub picture: &'a dyn Scenes,
     /// What turns a drawing into pixels.
     pub painter: &'a Painter,
+    /// What is written with.
+    pub fonts: &'a Fonts,
+    /// The film strip, for outputs that hold all windows in one drawing.
+    pub strip: Option<&'a Scene>,
     /// How it runs.
     pub options: Options,
 }

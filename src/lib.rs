@@ -35,6 +35,7 @@ pub mod scene;
 mod source;
 pub mod spells;
 pub mod stamps;
+pub mod strip;
 pub mod style;
 pub mod svg;
 mod table;

@@ -43,6 +43,18 @@ impl Target {
         self.path().to_string_lossy().contains(NUMBER)
     }
 
+    /// Refuses `{n}`, with the reason why this format has one file.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a name with `{n}`.
+    pub fn must_be_one(&self, reason: &str) -> Result<()> {
+        if !self.is_numbered() {
+            return Ok(());
+        }
+        let what = format!("`{}` asks for a file per window", self.path().display());
+        Err(Error::usage(what, format!("{reason}: leave `{{n}}` out")))
+    }
+
     /// The file of window `index`, zero-padded so that the names of all `windows` sort in their order.
     #[must_use]
     pub fn numbered(&self, index: usize, windows: usize) -> Self {

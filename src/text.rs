@@ -117,6 +117,19 @@ impl Fonts {
             .map(|face| &*face.data)
     }
 
+    /// The place in [`Fonts::files`] of the font that draws `c` in this weight; that of the weight where none has it.
+    pub fn file_of(&self, c: char, weight: Weight) -> usize {
+        let (place, first) = match weight {
+            Weight::Regular => (0, &self.regular),
+            Weight::SemiBold => (1, &self.semibold),
+        };
+        if first.advance(c).is_some() {
+            return place;
+        }
+        let extra = self.extra.iter().position(|f| f.advance(c).is_some());
+        extra.map_or(place, |at| at + 2)
+    }
+
     /// The width of `c` in em; `None` where no font has it.
     fn advance(&self, c: char, weight: Weight) -> Option<f32> {
         let first = match weight {

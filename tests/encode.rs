@@ -91,12 +91,15 @@ fn mission(windows: usize) -> (Evolution, View) {
 /// Shows a mission of eight windows to these outputs, all in `folder`.
 fn show(folder: &Path, names: &[&str], options: Options) -> Result<Vec<Written>> {
     let (evolution, view) = mission(8);
-    let painter = Painter::new(&Fonts::bundled());
+    let fonts = Fonts::bundled();
+    let painter = Painter::new(&fonts);
     let film = Film {
         evolution: &evolution,
         view: &view,
         picture: &Discs,
         painter: &painter,
+        fonts: &fonts,
+        strip: None,
         options,
     };
     let output = |name: &&str| Output::parse(&folder.join(name).to_string_lossy(), None);
@@ -277,13 +280,16 @@ fn a_limit_in_bytes_is_kept_and_what_was_given_up_is_said() {
 fn an_interrupted_run_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let (evolution, view) = mission(100);
-    let painter = Painter::new(&Fonts::bundled());
+    let fonts = Fonts::bundled();
+    let painter = Painter::new(&fonts);
     let options = Options::default();
     let film = Film {
         evolution: &evolution,
         view: &view,
         picture: &Discs,
         painter: &painter,
+        fonts: &fonts,
+        strip: None,
         options,
     };
     let output =

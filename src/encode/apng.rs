@@ -36,12 +36,7 @@ impl Write for Shared {
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
 pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    if target.is_numbered() {
-        return Err(Error::usage(
-            format!("`{}` asks for a file per window", target.path().display()),
-            "an animation holds all windows: leave `{n}` out, or write `.png`",
-        ));
-    }
+    target.must_be_one("an animation holds all windows")?;
     Ok(Box::new(Apng {
         target: target.clone(),
         frames: film.shots().len(),

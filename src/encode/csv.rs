@@ -63,7 +63,6 @@ struct Tables<'a> {
 /// # Errors
 /// [`Error::Usage`] for standard output and for a name with `{n}`.
 pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    let name = target.path().display();
     if *target == Target::Stdout {
         let what = "CSV is several tables, standard output is one".to_owned();
         return Err(Error::usage(
@@ -71,13 +70,7 @@ pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn E
             "name a file: `-o x.csv` writes `x.edges.csv` and others",
         ));
     }
-    if target.is_numbered() {
-        let what = format!("`{name}` asks for a file per window");
-        return Err(Error::usage(
-            what,
-            "the tables hold all windows: leave `{n}` out",
-        ));
-    }
+    target.must_be_one("the tables hold all windows")?;
     Ok(Box::new(Tables {
         evolution: film.evolution,
         target: target.clone(),

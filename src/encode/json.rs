@@ -1,7 +1,7 @@
 //! The evolution as JSON, as it is read back by every command.
 
 use super::{Encoder, Frame, Needs, Written};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::evolution::{self, Evolution};
 use crate::film::Film;
 use crate::output::{Sink, Target};
@@ -16,12 +16,7 @@ struct Data<'a> {
 /// # Errors
 /// [`Error::Usage`] for a name with `{n}`.
 pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    if target.is_numbered() {
-        return Err(Error::usage(
-            format!("`{}` asks for a file per window", target.path().display()),
-            "the data of all windows is one file: leave `{n}` out",
-        ));
-    }
+    target.must_be_one("the data of all windows is one file")?;
     Ok(Box::new(Data {
         evolution: film.evolution,
         target: target.clone(),

@@ -1,4 +1,4 @@
-//! Images as PNG and WebP: one per window.
+//! Images as PNG and WebP: one per window, or the strip.
 
 use std::io::Write;
 
@@ -6,11 +6,15 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder as _, ImageError};
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Frame, Needs, Single, Written, single};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::output::{Sink, Target};
 use crate::pixels::Pixels;
+use crate::scene::Scene;
+
+/// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
+const PAPER: f64 = 300.0 / 96.0;
 
 /// The two formats of still images.
 #[derive(Clone, Copy)]
@@ -19,8 +23,11 @@ enum Kind {
     WebP,
 }
 
-struct Images {
+struct Images<'a> {
     kind: Kind,
+    film: &'a Film<'a>,
+    /// The one drawing to write, if it is no sequence.
+    strip: Option<&'a Scene>,
     target: Target,
     windows: usize,
     written: Written,
@@ -43,38 +50,50 @@ pub(super) fn start_webp<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<
 }
 
 fn start<'a>(film: &'a Film<'a>, target: &Target, kind: Kind) -> Result<Box<dyn Encoder + 'a>> {
-    let windows = film.view.frames.len();
-    if windows > 1 && !target.is_numbered() {
-        return Err(Error::usage(
-            format!(
-                "`{}` is one file for {windows} windows",
-                target.path().display()
-            ),
-            "put `{n}` into the name for a file per window",
-        ));
-    }
+    let strip = match single(film, target, true)? {
+        Single::Windows => None,
+        Single::Strip(scene) => Some(scene),
+    };
     Ok(Box::new(Images {
         kind,
+        film,
+        strip,
         target: target.clone(),
-        windows,
+        windows: film.view.frames.len(),
         written: Written::to(target),
     }))
 }
 
-impl Encoder for Images {
+impl Images<'_> {
+    fn write(&mut self, pixels: &Pixels, target: &Target) -> Result<()> {
+        let mut sink = Sink::create(target, None)?;
+        write(self.kind, pixels, &mut sink).map_err(|e| failed(e, &sink))?;
+        self.written.add(sink.commit()?);
+        Ok(())
+    }
+}
+
+impl Encoder for Images<'_> {
     fn needs(&self) -> Needs {
-        Needs::Pixels
+        match self.strip {
+            Some(_) => Needs::Nothing,
+            None => Needs::Pixels,
+        }
     }
 
     fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
         let target = self.target.numbered(frame.index, self.windows);
-        let mut sink = Sink::create(&target, None)?;
-        write(self.kind, frame.pixels, &mut sink).map_err(|e| failed(e, &sink))?;
-        self.written.add(sink.commit()?);
-        Ok(())
+        self.write(frame.pixels, &target)
     }
 
-    fn finish(self: Box<Self>) -> Result<Written> {
+    fn finish(mut self: Box<Self>) -> Result<Written> {
+        if let Some(scene) = self.strip {
+            let paper = if scene.width_mm.is_some() { PAPER } else { 1.0 };
+            let scale = self.film.options.scale * paper;
+            let pixels = self.film.painter.paint(scene, scale)?;
+            let target = self.target.clone();
+            self.write(&pixels, &target)?;
+        }
         Ok(self.written)
     }
 }

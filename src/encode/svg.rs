@@ -1,56 +1,64 @@
-//! Drawings as SVG text: one per window.
+//! Drawings as SVG text: one per window, or the strip.
 
 use std::io::Write as _;
 
-use super::{Encoder, Frame, Needs, Written};
-use crate::error::{Error, Result};
+use super::{Encoder, Frame, Needs, Single, Written, single};
+use crate::error::Result;
 use crate::film::Film;
 use crate::output::{Sink, Target};
+use crate::scene::Scene;
 use crate::svg;
 
-struct Drawings {
+struct Drawings<'a> {
+    /// The one drawing to write, if it is no sequence.
+    strip: Option<&'a Scene>,
     target: Target,
     windows: usize,
     written: Written,
 }
 
-/// Begins a file per window; without `{n}` the single window.
+/// Begins a file per window; without `{n}` the single window or the strip.
 ///
 /// # Errors
-/// [`Error::Usage`] for several windows without `{n}`.
+/// [`Error::Usage`](crate::error::Error::Usage) for several windows without `{n}`.
 pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    let windows = film.view.frames.len();
-    if windows > 1 && !target.is_numbered() {
-        return Err(Error::usage(
-            format!(
-                "`{}` is one file for {windows} windows",
-                target.path().display()
-            ),
-            "put `{n}` into the name for a file per window",
-        ));
-    }
+    let strip = match single(film, target, film.options.strip)? {
+        Single::Windows => None,
+        Single::Strip(scene) => Some(scene),
+    };
     Ok(Box::new(Drawings {
+        strip,
         target: target.clone(),
-        windows,
+        windows: film.view.frames.len(),
         written: Written::to(target),
     }))
 }
 
-impl Encoder for Drawings {
+impl Encoder for Drawings<'_> {
     fn needs(&self) -> Needs {
-        Needs::Scene
+        match self.strip {
+            Some(_) => Needs::Nothing,
+            None => Needs::Scene,
+        }
     }
 
     fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
         let target = self.target.numbered(frame.index, self.windows);
-        let mut sink = Sink::create(&target, None)?;
-        let text = svg::write(frame.scene);
-        sink.write_all(text.as_bytes()).map_err(sink.error())?;
-        self.written.add(sink.commit()?);
+        self.written.add(write(frame.scene, &target)?);
         Ok(())
     }
 
-    fn finish(self: Box<Self>) -> Result<Written> {
+    fn finish(mut self: Box<Self>) -> Result<Written> {
+        if let Some(scene) = self.strip {
+            self.written.add(write(scene, &self.target)?);
+        }
         Ok(self.written)
     }
+}
+
+fn write(scene: &Scene, target: &Target) -> Result<u64> {
+    let mut sink = Sink::create(target, None)?;
+    let text = svg::write(scene);
+    sink.write_all(text.as_bytes()).map_err(sink.error())?;
+    sink.commit()
 }

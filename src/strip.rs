@@ -1,0 +1,390 @@
+//! The film strip: chosen windows side by side on one page, with one legend and the time under each.
+
+use crate::error::{Error, Result};
+use crate::evolution::Evolution;
+use crate::film::is_changed;
+use crate::geometry::{Point, Rect, Size};
+use crate::picture::{Picture, Sketch, Wish};
+use crate::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
+use crate::style::Style;
+use crate::text::{Fonts, Weight};
+use crate::time;
+use crate::view::{Tally, View};
+
+/// Which windows stand on the strip.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// Columns and rows: the first window and those that change most.
+    Grid(usize, usize),
+    /// The first window and all that show a change, [`MOST`] at most.
+    Changes,
+    /// These, by index.
+    Windows(Vec<usize>),
+}
+
+/// The most windows on a strip that are chosen for the user.
+pub const MOST: usize = 12;
+/// The smallest text that can be read on paper, in points.
+const SMALLEST_PT: f64 = 6.0;
+/// Points per pixel, 96 pixels to the inch.
+const PT_PER_PX: f64 = 0.75;
+/// Pixels per millimetre, 96 to the inch.
+const PX_PER_MM: f64 = 96.0 / 25.4;
+/// The smallest text that can be read on a screen, in pixels.
+const SMALLEST_PX: f64 = 9.0;
+/// The font size of times and captions, in pixels: 6.75 pt.
+const CAPTION: f64 = 9.0;
+/// Space between panels, in pixels.
+const GAP: f64 = 10.0;
+/// How many times as high as wide a strip becomes at most, if there is a choice.
+const HIGHEST: f64 = 1.3;
+
+impl Choice {
+    /// Reads `3x2`, `changes` or `0,4,9`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for anything else.
+    pub fn parse(text: &str) -> Result<Self> {
+        let number = |t: &str| t.trim().parse::<usize>().ok();
+        let grid = text.split_once('x').and_then(|(columns, rows)| {
+            let (columns, rows) = (number(columns)?, number(rows)?);
+            let sound = (1..=100).contains(&columns) && (1..=100).contains(&rows);
+            sound.then_some(Self::Grid(columns, rows))
+        });
+        let windows: Option<Vec<usize>> = text.split(',').map(number).collect();
+        match (text, grid, windows) {
+            ("changes", ..) => Ok(Self::Changes),
+            (_, Some(grid), _) => Ok(grid),
+            (_, _, Some(windows)) => Ok(Self::Windows(windows)),
+            _ => Err(Error::usage(
+                format!("`{text}` is no choice of windows"),
+                "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)",
+            )),
+        }
+    }
+
+    /// The chosen windows as places in `view`, in order; at least one if there is any.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a window that does not exist.
+    fn places(&self, view: &View) -> Result<Vec<usize>> {
+        match self {
+            Self::Grid(columns, rows) => Ok(busiest(view, columns * rows)),
+            Self::Changes => {
+                let mut changed: Vec<usize> = (0..view.frames.len()).collect();
+                changed.retain(|k| *k == 0 || is_changed(view, *k));
+                let most = changed.len().min(MOST);
+                Ok(if changed.len() > most {
+                    busiest(view, most)
+                } else {
+                    changed
+                })
+            }
+            Self::Windows(windows) => windows.iter().map(|w| place(view, *w)).collect(),
+        }
+    }
+}
+
+fn place(view: &View, index: usize) -> Result<usize> {
+    let last = view.frames.last().map_or(0, |f| f.index);
+    view.frames
+        .iter()
+        .position(|f| f.index == index)
+        .ok_or_else(|| {
+            let what = format!("there is no window {index}");
+            Error::usage(what, format!("windows are counted from 0 to {last}"))
+        })
+}
+
+/// The first window and those that change most; where too few change, others evenly spread.
+fn busiest(view: &View, most: usize) -> Vec<usize> {
+    let changes = |t: Tally| {
+        let nodes = t.nodes_added + t.nodes_removed;
+        let topics = t.topics_added + t.topics_removed;
+        8 * nodes + 4 * topics + 2 * (t.edges_added + t.edges_removed + t.others) + t.rates
+    };
+    let mut order: Vec<usize> = (0..view.frames.len()).collect();
+    order.sort_by_key(|k| {
+        (
+            *k != 0,
+            std::cmp::Reverse(changes(view.frames[*k].tally)),
+            *k,
+        )
+    });
+    order.truncate(most.max(1));
+    order.sort_unstable();
+    order
+}
+
+/// A strip and what the user should know about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strip {
+    /// The page.
+    pub scene: Scene,
+    /// What would make it more readable; lower case, no period.
+    pub remarks: Vec<String>,
+}
+
+/// What a strip is made from.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    /// For the mission's start.
+    pub evolution: &'a Evolution,
+    /// What is shown.
+    pub view: &'a View,
+    /// Where everything stands.
+    pub picture: &'a Picture<'a>,
+    /// How it looks.
+    pub style: &'a Style,
+    /// What is written with.
+    pub fonts: &'a Fonts,
+}
+
+/// The strip of `choice`. With `width_mm` the page is that wide on paper; otherwise as wide as it needs to be read on a
+/// screen, `width` pixels at least.
+///
+/// # Errors
+/// [`Error::Usage`] for a window that does not exist.
+pub fn strip(
+    source: Source<'_>,
+    choice: &Choice,
+    width_mm: Option<f64>,
+    width: f64,
+) -> Result<Strip> {
+    let windows = choice.places(source.view)?;
+    let bare = source.bare();
+    let natural = bare.scene(0).size;
+    let mut page = Page {
+        columns: columns(choice, windows.len(), natural),
+        width: width_mm.map_or(width, |mm| mm * PX_PER_MM),
+        panel: Size::default(),
+    };
+    if width_mm.is_none() {
+        let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
+        page.width = page.width.max((legible + GAP) * page.columns as f64 + GAP);
+    }
+    page.fit(natural);
+    let mut groups = Vec::new();
+    for (at, window) in windows.iter().enumerate() {
+        source.panel(&bare.scene(*window), &page, at, *window, &mut groups);
+    }
+    let rows = windows.len().div_ceil(page.columns);
+    let graphs = page.corner(rows * page.columns).y;
+    let height = graphs + source.legend(page.width, graphs, &mut groups);
+    let scale = page.panel.w / natural.w.max(1.0);
+    let remarks = width_mm
+        .map(|mm| remark(bare.text_px() * scale, mm))
+        .into_iter();
+    let scene = Scene {
+        size: Size::new(page.width, height),
+        width_mm,
+        background: source.style.background(),
+        title: format!("{} of {} windows", windows.len(), source.view.frames.len()),
+        groups,
+    };
+    Ok(Strip {
+        scene,
+        remarks: remarks.flatten().collect(),
+    })
+}
+
+/// What to say about the smallest text on paper, in pixels.
+fn remark(text_px: f64, mm: f64) -> Option<String> {
+    let points = text_px * PT_PER_PX;
+    (points < SMALLEST_PT).then(|| {
+        let wide = libm::ceil(mm * SMALLEST_PT / points);
+        format!(
+            "the smallest text on the strip is {points:.1} pt; `--width {wide}mm`, fewer columns, or fewer elements \
+             (`--ns-filter`, `--collapse`) would bring it to {SMALLEST_PT} pt"
+        )
+    })
+}
+
+/// How many panels stand side by side: as given, else as few as keep the page from being too high.
+fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
+    if let Choice::Grid(columns, _) = choice {
+        return (*columns).min(panels).max(1);
+    }
+    let high = |columns: usize| {
+        let rows = panels.div_ceil(columns) as f64;
+        rows * natural.h / natural.w.max(1.0) / columns as f64
+    };
+    (1..=panels).find(|c| high(*c) <= HIGHEST).unwrap_or(1)
+}
+
+/// The grid of panels.
+struct Page {
+    columns: usize,
+    width: f64,
+    /// The size of a graph on it.
+    panel: Size,
+}
+
+impl Page {
+    fn fit(&mut self, natural: Size) {
+        let columns = self.columns as f64;
+        let wide = ((self.width - GAP * (columns + 1.0)) / columns).max(1.0);
+        self.panel = Size::new(wide, wide * natural.h / natural.w.max(1.0));
+    }
+
+    /// The top left corner of a panel.
+    fn corner(&self, at: usize) -> Point {
+        let (row, column) = (at / self.columns, at % self.columns);
+        let high = self.panel.h + 2.0 * 1.3 * CAPTION + GAP;
+        Point::new(
+            GAP + column as f64 * (self.panel.w + GAP),
+            GAP + row as f64 * high,
+        )
+    }
+}
+
+impl<'a> Source<'a> {
+    /// The picture without furniture, at its natural size.
+    fn bare(&self) -> Picture<'a> {
+        let layout = self.picture.layout();
+        let wish = Wish {
+            size: Size::new(layout.size.w * 1.06 + 8.0, layout.size.h * 1.06 + 8.0),
+            bare: true,
+            ..Wish::default()
+        };
+        Sketch::new(self.view, self.style, self.fonts, wish).with(layout.clone())
+    }
+
+    /// One window with its frame, its time and what changed.
+    fn panel(&self, scene: &Scene, page: &Page, at: usize, window: usize, groups: &mut Vec<Group>) {
+        let corner = page.corner(at);
+        let frame = &self.view.frames[window];
+        let mut panel = Group::named(&format!("panel-{}", frame.index));
+        "panel".clone_into(&mut panel.class);
+        let border = Rect::new(corner.x, corner.y, page.panel.w, page.panel.h);
+        let line = Stroke::solid(self.style.legend.line, 0.5);
+        panel.shape(Shape::line(Form::Rect(border, 0.0), line));
+        let start = self.evolution.span.start;
+        let time = |at: time::Stamp| time::offset(at.since(start));
+        let lines = [
+            (
+                format!("{}–{}", time(frame.span.start), time(frame.span.end)),
+                Weight::SemiBold,
+            ),
+            (frame.caption.join("; "), Weight::Regular),
+        ];
+        for (row, (words, weight)) in (1_u8..).zip(lines) {
+            let most = page.panel.w;
+            panel.text(Text {
+                at: Point::new(corner.x, border.bottom() + f64::from(row) * 1.3 * CAPTION),
+                anchor: Anchor::Start,
+                size: CAPTION,
+                weight,
+                color: self.style.legend.text,
+                halo: None,
+                text: self
+                    .fonts
+                    .fit(&self.fonts.shown(&words), CAPTION, weight, most)
+                    .into_owned(),
+            });
+        }
+        groups.push(panel);
+        let by = page.panel.w / scene.size.w.max(1.0);
+        for group in &scene.groups {
+            let mut group = moved(group, by, corner);
+            group.id = format!("w{}-{}", frame.index, group.id);
+            groups.push(group);
+        }
+    }
+
+    /// The shared legend, `width` wide from `y` on; returns its height.
+    fn legend(&self, width: f64, y: f64, groups: &mut Vec<Group>) -> f64 {
+        // A page so small that its legend has the smallest type, then enlarged to that of captions.
+        let small = Size::new(width, 300.0);
+        let size_on = |size: Size| {
+            let wish = Wish {
+                size,
+                ..Wish::default()
+            };
+            let picture = Sketch::new(self.view, self.style, self.fonts, wish);
+            let scene = picture.with(self.picture.layout().clone()).scene(0);
+            scene.groups.into_iter().find(|g| g.id == "legend")
+        };
+        let text_of = |group: &Group| {
+            group.pieces.iter().find_map(|p| match p {
+                Piece::Text(text) => Some(text.size),
+                Piece::Shape(_) => None,
+            })
+        };
+        let Some(size) = size_on(small).as_ref().and_then(text_of) else {
+            return GAP;
+        };
+        let by = CAPTION / size.max(0.1);
+        let Some(legend) = size_on(Size::new(width / by, 300.0)) else {
+            return GAP;
+        };
+        let bounds = legend
+            .pieces
+            .iter()
+            .filter_map(piece_bounds)
+            .reduce(|a, b| a.union(&b));
+        let Some(bounds) = bounds else { return GAP };
+        groups.push(moved(&legend, by, Point::new(0.0, y - bounds.y * by)));
+        bounds.h * by + GAP
+    }
+}
+
+/// The upright box around a piece; of a text only its height and beginning.
+fn piece_bounds(piece: &Piece) -> Option<Rect> {
+    match piece {
+        Piece::Shape(shape) => match &shape.form {
+            Form::Rect(rect, _) | Form::Ellipse(rect) => Some(*rect),
+            Form::Path(steps) => {
+                let points = steps.iter().filter_map(|step| match step {
+                    Step::Move(p) | Step::Line(p) | Step::Curve([_, _, p]) => Some(*p),
+                    Step::Close => None,
+                });
+                let boxes = points.map(|p| Rect::new(p.x, p.y, 0.0, 0.0));
+                boxes.reduce(|a, b| a.union(&b))
+            }
+        },
+        Piece::Text(text) => Some(Rect::new(
+            text.at.x,
+            text.at.y - text.size,
+            0.0,
+            text.size * 1.3,
+        )),
+    }
+}
+
+/// A group `by` times as large, its page's corner at `to`.
+fn moved(group: &Group, by: f64, to: Point) -> Group {
+    let point = |p: Point| Point::new(to.x + p.x * by, to.y + p.y * by);
+    let rect = |r: Rect| {
+        let corner = point(Point::new(r.x, r.y));
+        Rect::new(corner.x, corner.y, r.w * by, r.h * by)
+    };
+    let step = |step: &Step| match step {
+        Step::Move(p) => Step::Move(point(*p)),
+        Step::Line(p) => Step::Line(point(*p)),
+        Step::Curve(points) => Step::Curve(points.map(point)),
+        Step::Close => Step::Close,
+    };
+    let form = |form: &Form| match form {
+        Form::Rect(r, radius) => Form::Rect(rect(*r), radius * by),
+        Form::Ellipse(r) => Form::Ellipse(rect(*r)),
+        Form::Path(steps) => Form::Path(steps.iter().map(step).collect()),
+    };
+    let piece = |piece: &Piece| match piece {
+        Piece::Shape(shape) => Piece::Shape(Shape {
+            form: form(&shape.form),
+            fill: shape.fill,
+            stroke: shape.stroke.scaled(by),
+        }),
+        Piece::Text(text) => Piece::Text(Text {
+            at: point(text.at),
+            size: text.size * by,
+            halo: text.halo.map(|(color, width)| (color, width * by)),
+            ..text.clone()
+        }),
+    };
+    Group {
+        pieces: group.pieces.iter().map(piece).collect(),
+        ..group.clone()
+    }
+}

@@ -1,0 +1,158 @@
+//! How large and how fast each format is: `cargo bench --bench encoding -- MISSION.json [FOLDER] [OUTPUT…]`.
+//!
+//! Draws the mission (an evolution as JSON) at 1280×720 once for each format and tells bytes, milliseconds per frame
+//! above drawing, and for GIF the worst PSNR of a frame. With outputs, writes those into the folder in one run.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    missing_docs,
+    reason = "a benchmark for people"
+)]
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use bagreel::encode::Output;
+use bagreel::film::{Film, Options};
+use bagreel::pixels::Painter;
+use bagreel::strip::{Choice, Source, strip};
+use bagreel::style::Style;
+use bagreel::text::Fonts;
+use bagreel::view::{ViewOptions, view};
+use bagreel::{evolution, layout, picture, reel};
+
+fn main() {
+    let mut words = std::env::args().skip(1).filter(|a| a != "--bench");
+    let Some(mission) = words.next() else {
+        println!("usage: cargo bench --bench encoding -- MISSION.json [FOLDER] [OUTPUT…]");
+        return;
+    };
+    let folder: PathBuf = words
+        .next()
+        .unwrap_or_else(|| "out/bench".to_owned())
+        .into();
+    let outputs: Vec<String> = words.collect();
+    let path = Path::new(&mission);
+    let evolution = evolution::read_json(&fs::read_to_string(path).unwrap(), path).unwrap();
+    let (view, _) = view(&evolution, &ViewOptions::default());
+    let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
+    let title = path.file_name().unwrap().to_string_lossy().into_owned();
+    let wish = picture::Wish {
+        title,
+        ..picture::Wish::default()
+    };
+    let sketch = picture::Sketch::new(&view, &style, &fonts, wish);
+    let picture = sketch.laid_out(layout::engine("layered").unwrap());
+    let painter = Painter::new(&fonts);
+    let variable = |name: &str| std::env::var(name).ok();
+    let number = |name: &str| variable(name).and_then(|v| v.parse::<u32>().ok());
+    let choice = variable("STRIP").map(|s| Choice::parse(&s).unwrap());
+    let mm = number("MM").map(f64::from);
+    let source = Source {
+        evolution: &evolution,
+        view: &view,
+        picture: &picture,
+        style: &style,
+        fonts: &fonts,
+    };
+    let page = strip(
+        source,
+        choice.as_ref().unwrap_or(&Choice::Changes),
+        mm,
+        1280.0,
+    )
+    .unwrap();
+    println!("strip: {:?}", page.remarks);
+    let options = Options {
+        tween: number("TWEEN").unwrap_or(0),
+        max_bytes: number("MOST").map(u64::from),
+        strip: choice.is_some(),
+        ..Options::default()
+    };
+    let film = Film {
+        evolution: &evolution,
+        view: &view,
+        picture: &picture,
+        painter: &painter,
+        fonts: &fonts,
+        strip: Some(&page.scene),
+        options,
+    };
+    let shots = film.shots().len();
+    let run = |names: &[&str]| {
+        let output = |n: &&str| Output::parse(&folder.join(n).to_string_lossy(), None).unwrap();
+        let outputs: Vec<Output> = names.iter().map(output).collect();
+        let begin = Instant::now();
+        let written = reel::run(&film, &outputs, &mut |_, _| ControlFlow::Continue(())).unwrap();
+        (written, begin.elapsed().as_secs_f64() * 1e3)
+    };
+    if !outputs.is_empty() {
+        let names: Vec<&str> = outputs.iter().map(String::as_str).collect();
+        let (written, ms) = run(&names);
+        println!("{written:#?}\n{ms:.0} ms");
+        return;
+    }
+    run(&["warm.svg/{n}.svg"]);
+    for name in [
+        "a.gif",
+        "a.apng",
+        "png/{n}.png",
+        "webp/{n}.webp",
+        "svg/{n}.svg",
+        "a.pdf",
+        "a.json",
+        "a.csv",
+    ] {
+        let (written, ms) = run(&[name]);
+        let (bytes, each) = (written[0].bytes, ms / shots as f64);
+        println!(
+            "{name:14} {bytes:>9} bytes in {} files, {each:6.1} ms a frame with drawing",
+            written[0].files
+        );
+    }
+    println!(
+        "a.gif: worst frame {:.1} dB",
+        worst_psnr(&film, &folder.join("a.gif"))
+    );
+}
+
+/// The lowest PSNR of a frame of the GIF against the frame as it was drawn, in dB.
+fn worst_psnr(film: &Film<'_>, path: &Path) -> f64 {
+    let mut decoder = gif::DecodeOptions::new();
+    decoder.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = decoder.read_info(fs::File::open(path).unwrap()).unwrap();
+    let width = usize::from(decoder.width());
+    let mut canvas = vec![0; width * usize::from(decoder.height()) * 4];
+    let mut worst = f64::INFINITY;
+    for shot in film.shots() {
+        let Some(frame) = decoder.read_next_frame().unwrap() else {
+            break;
+        };
+        for (i, pixel) in frame
+            .buffer
+            .chunks_exact(4)
+            .enumerate()
+            .filter(|(_, p)| p[3] > 0)
+        {
+            let columns = usize::from(frame.width);
+            let (x, y) = (
+                i % columns + usize::from(frame.left),
+                i / columns + usize::from(frame.top),
+            );
+            canvas[(y * width + x) * 4..][..4].copy_from_slice(pixel);
+        }
+        let pixels = film
+            .painter
+            .paint(&film.picture.scene(shot.window, shot.phase), 1.0)
+            .unwrap();
+        let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
+        let sum: f64 = canvas.iter().zip(&pixels.rgba).map(square).sum();
+        let channels = (canvas.len() / 4 * 3) as f64;
+        worst = worst.min(10.0 * (65_025.0 * channels / sum.max(1e-9)).log10());
+    }
+    worst
+}
