@@ -184,7 +184,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .title
         .clone()
         .unwrap_or_else(|| title(&reading.inputs));
-    let outputs = match &args.outputs[..] {
+    let mut outputs = match &args.outputs[..] {
         [] => vec![Output::parse(
             &default_output(&reading.inputs),
             args.format.as_deref(),
@@ -194,6 +194,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             .map(|o| Output::parse(o, args.format.as_deref()))
             .collect::<Result<_, _>>()?,
     };
+    outputs.extend(args.sequence.poster.as_deref().map(Output::poster));
     Ok(Render {
         drawing: Drawing {
             view: look::view(&args.view)?,
@@ -204,7 +205,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             is_fitted: args.look.fit == "auto",
             engine: crate::layout::engine(&args.look.layout)?,
         },
-        sequence: look::sequence(&args.sequence),
+        sequence: look::sequence(&args.sequence)?,
         outputs,
         captions: args.look.captions.clone(),
         is_filtered: args.view.filtered,

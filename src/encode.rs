@@ -11,7 +11,7 @@ mod png;
 mod svg;
 mod video;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::film::{Film, Shot};
@@ -251,6 +251,16 @@ pub const FORMATS: &[Format] = &[
     },
 ];
 
+/// A single image of the first window, beside an animation.
+const POSTER: &Format = &Format {
+    word: "png",
+    what: "the first window as an image",
+    is_limited: false,
+    is_strip: false,
+    check: None,
+    start: png::start_poster,
+};
+
 /// One output: what and where.
 #[derive(Clone, Debug)]
 pub struct Output {
@@ -261,6 +271,14 @@ pub struct Output {
 }
 
 impl Output {
+    /// The poster: the first window as a PNG image.
+    pub fn poster(path: &Path) -> Self {
+        Self {
+            format: POSTER,
+            target: Target::Path(path.to_owned()),
+        }
+    }
+
     /// Reads an output as the user writes it: `a.gif`, `f/{n}.svg`, `-`. The format is `word` if given, else the
     /// name's extension.
     ///

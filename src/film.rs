@@ -1,6 +1,10 @@
 //! The sequence as it is shown: which window when and for how long, and what draws it.
 
 use crate::dot::Profile;
+mod choice;
+
+pub use choice::Choice;
+
 use crate::evolution::Evolution;
 use crate::picture::Picture;
 use crate::pixels::Painter;
@@ -27,8 +31,8 @@ pub struct Options {
     pub max_bytes: Option<u64>,
     /// How DOT is written.
     pub dot_profile: Profile,
-    /// Whether the strip was asked for: then it stands in the place of a sequence of drawings too.
-    pub strip: bool,
+    /// The windows of a film strip, if one was asked for: it takes the place of a sequence of drawings too.
+    pub strip: Option<Choice>,
 }
 
 impl Default for Options {
@@ -42,7 +46,7 @@ impl Default for Options {
             scale: 1.0,
             max_bytes: None,
             dot_profile: Profile::default(),
-            strip: false,
+            strip: None,
         }
     }
 }

@@ -1,29 +1,16 @@
 //! The film strip: chosen windows side by side on one page, with one legend and the time under each.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::evolution::Evolution;
-use crate::film::is_changed;
+use crate::film::Choice;
 use crate::geometry::{Point, Rect, Size};
 use crate::picture::{Picture, Sketch, Wish};
 use crate::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
 use crate::style::Style;
 use crate::text::{Fonts, Weight};
 use crate::time;
-use crate::view::{Tally, View};
+use crate::view::View;
 
-/// Which windows stand on the strip.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Choice {
-    /// Columns and rows: the first window and those that change most.
-    Grid(usize, usize),
-    /// The first window and all that show a change, [`MOST`] at most.
-    Changes,
-    /// These, by index.
-    Windows(Vec<usize>),
-}
-
-/// The most windows on a strip that are chosen for the user.
-pub const MOST: usize = 12;
 /// The smallest text that can be read on paper, in points.
 const SMALLEST_PT: f64 = 6.0;
 /// Points per pixel, 96 pixels to the inch.
@@ -32,89 +19,12 @@ const PT_PER_PX: f64 = 0.75;
 const PX_PER_MM: f64 = 96.0 / 25.4;
 /// The smallest text that can be read on a screen, in pixels.
 const SMALLEST_PX: f64 = 9.0;
-/// The font size of times and captions, in pixels: 6.75 pt.
-const CAPTION: f64 = 9.0;
+/// The font size of times and captions in pixels: on paper (6.75 pt) and on a screen.
+const CAPTION: (f64, f64) = (9.0, 14.0);
 /// Space between panels, in pixels.
 const GAP: f64 = 10.0;
 /// How many times as high as wide a strip becomes at most, if there is a choice.
 const HIGHEST: f64 = 1.3;
-
-impl Choice {
-    /// Reads `3x2`, `changes` or `0,4,9`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for anything else.
-    pub fn parse(text: &str) -> Result<Self> {
-        let number = |t: &str| t.trim().parse::<usize>().ok();
-        let grid = text.split_once('x').and_then(|(columns, rows)| {
-            let (columns, rows) = (number(columns)?, number(rows)?);
-            let sound = (1..=100).contains(&columns) && (1..=100).contains(&rows);
-            sound.then_some(Self::Grid(columns, rows))
-        });
-        let windows: Option<Vec<usize>> = text.split(',').map(number).collect();
-        match (text, grid, windows) {
-            ("changes", ..) => Ok(Self::Changes),
-            (_, Some(grid), _) => Ok(grid),
-            (_, _, Some(windows)) => Ok(Self::Windows(windows)),
-            _ => Err(Error::usage(
-                format!("`{text}` is no choice of windows"),
-                "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)",
-            )),
-        }
-    }
-
-    /// The chosen windows as places in `view`, in order; at least one if there is any.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for a window that does not exist.
-    fn places(&self, view: &View) -> Result<Vec<usize>> {
-        match self {
-            Self::Grid(columns, rows) => Ok(busiest(view, columns * rows)),
-            Self::Changes => {
-                let mut changed: Vec<usize> = (0..view.frames.len()).collect();
-                changed.retain(|k| *k == 0 || is_changed(view, *k));
-                let most = changed.len().min(MOST);
-                Ok(if changed.len() > most {
-                    busiest(view, most)
-                } else {
-                    changed
-                })
-            }
-            Self::Windows(windows) => windows.iter().map(|w| place(view, *w)).collect(),
-        }
-    }
-}
-
-fn place(view: &View, index: usize) -> Result<usize> {
-    let last = view.frames.last().map_or(0, |f| f.index);
-    view.frames
-        .iter()
-        .position(|f| f.index == index)
-        .ok_or_else(|| {
-            let what = format!("there is no window {index}");
-            Error::usage(what, format!("windows are counted from 0 to {last}"))
-        })
-}
-
-/// The first window and those that change most; where too few change, others evenly spread.
-fn busiest(view: &View, most: usize) -> Vec<usize> {
-    let changes = |t: Tally| {
-        let nodes = t.nodes_added + t.nodes_removed;
-        let topics = t.topics_added + t.topics_removed;
-        8 * nodes + 4 * topics + 2 * (t.edges_added + t.edges_removed + t.others) + t.rates
-    };
-    let mut order: Vec<usize> = (0..view.frames.len()).collect();
-    order.sort_by_key(|k| {
-        (
-            *k != 0,
-            std::cmp::Reverse(changes(view.frames[*k].tally)),
-            *k,
-        )
-    });
-    order.truncate(most.max(1));
-    order.sort_unstable();
-    order
-}
 
 /// A strip and what the user should know about it.
 #[derive(Clone, Debug, PartialEq)]
@@ -158,6 +68,11 @@ pub fn strip(
         columns: columns(choice, windows.len(), natural),
         width: width_mm.map_or(width, |mm| mm * PX_PER_MM),
         panel: Size::default(),
+        caption: if width_mm.is_some() {
+            CAPTION.0
+        } else {
+            CAPTION.1
+        },
     };
     if width_mm.is_none() {
         let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
@@ -170,7 +85,7 @@ pub fn strip(
     }
     let rows = windows.len().div_ceil(page.columns);
     let graphs = page.corner(rows * page.columns).y;
-    let height = graphs + source.legend(page.width, graphs, &mut groups);
+    let height = graphs + source.legend(&page, graphs, &mut groups);
     let scale = page.panel.w / natural.w.max(1.0);
     let remarks = width_mm
         .map(|mm| remark(bare.text_px() * scale, mm))
@@ -218,6 +133,8 @@ struct Page {
     width: f64,
     /// The size of a graph on it.
     panel: Size,
+    /// The font size of what is not graph.
+    caption: f64,
 }
 
 impl Page {
@@ -230,7 +147,7 @@ impl Page {
     /// The top left corner of a panel.
     fn corner(&self, at: usize) -> Point {
         let (row, column) = (at / self.columns, at % self.columns);
-        let high = self.panel.h + 2.0 * 1.3 * CAPTION + GAP;
+        let high = self.panel.h + 2.0 * 1.3 * self.caption + GAP;
         Point::new(
             GAP + column as f64 * (self.panel.w + GAP),
             GAP + row as f64 * high,
@@ -271,15 +188,18 @@ impl<'a> Source<'a> {
         for (row, (words, weight)) in (1_u8..).zip(lines) {
             let most = page.panel.w;
             panel.text(Text {
-                at: Point::new(corner.x, border.bottom() + f64::from(row) * 1.3 * CAPTION),
+                at: Point::new(
+                    corner.x,
+                    border.bottom() + f64::from(row) * 1.3 * page.caption,
+                ),
                 anchor: Anchor::Start,
-                size: CAPTION,
+                size: page.caption,
                 weight,
                 color: self.style.legend.text,
                 halo: None,
                 text: self
                     .fonts
-                    .fit(&self.fonts.shown(&words), CAPTION, weight, most)
+                    .fit(&self.fonts.shown(&words), page.caption, weight, most)
                     .into_owned(),
             });
         }
@@ -292,10 +212,10 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The shared legend, `width` wide from `y` on; returns its height.
-    fn legend(&self, width: f64, y: f64, groups: &mut Vec<Group>) -> f64 {
+    /// The shared legend from `y` on; returns its height.
+    fn legend(&self, page: &Page, y: f64, groups: &mut Vec<Group>) -> f64 {
         // A page so small that its legend has the smallest type, then enlarged to that of captions.
-        let small = Size::new(width, 300.0);
+        let small = Size::new(page.width, 300.0);
         let size_on = |size: Size| {
             let wish = Wish {
                 size,
@@ -314,8 +234,8 @@ impl<'a> Source<'a> {
         let Some(size) = size_on(small).as_ref().and_then(text_of) else {
             return GAP;
         };
-        let by = CAPTION / size.max(0.1);
-        let Some(legend) = size_on(Size::new(width / by, 300.0)) else {
+        let by = page.caption / size.max(0.1);
+        let Some(legend) = size_on(Size::new(page.width / by, 300.0)) else {
             return GAP;
         };
         let bounds = legend

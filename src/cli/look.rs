@@ -87,12 +87,14 @@ pub(super) fn wish(args: &LookArgs, title: String, rate_change: f64) -> Wish {
     }
 }
 
-pub(super) fn sequence(args: &SequenceArgs) -> film::Options {
-    film::Options {
+pub(super) fn sequence(args: &SequenceArgs) -> Result<film::Options> {
+    let strip = args.strip.as_deref().map(film::Choice::parse);
+    Ok(film::Options {
         frame_ms: args.frame_ms,
         tween: args.tween,
         hold_changes: args.hold_changes,
         max_bytes: args.max_bytes,
+        strip: strip.transpose()?,
         ..film::Options::default()
-    }
+    })
 }

@@ -61,7 +61,7 @@ pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn E
     let fonts = film.fonts.clone();
     Ok(Box::new(Book {
         film,
-        strip: film.strip.filter(|_| film.options.strip),
+        strip: film.strip.filter(|_| film.options.strip.is_some()),
         target: target.clone(),
         sheets,
         press: thread::spawn(move || press(&waiting, &fonts)),

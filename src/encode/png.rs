@@ -28,6 +28,8 @@ struct Images<'a> {
     film: &'a Film<'a>,
     /// The one drawing to write, if it is no sequence.
     strip: Option<&'a Scene>,
+    /// Whether the first window is enough.
+    is_poster: bool,
     target: Target,
     windows: usize,
     written: Written,
@@ -49,6 +51,26 @@ pub(super) fn start_webp<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<
     start(film, target, Kind::WebP)
 }
 
+/// Begins the PNG image of the first window.
+///
+/// # Errors
+/// [`Error::Usage`] for a name with `{n}`.
+pub(super) fn start_poster<'a>(
+    film: &'a Film<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    target.must_be_one("a poster is one image")?;
+    Ok(Box::new(Images {
+        kind: Kind::Png,
+        film,
+        strip: None,
+        is_poster: true,
+        target: target.clone(),
+        windows: 1,
+        written: Written::to(target),
+    }))
+}
+
 fn start<'a>(film: &'a Film<'a>, target: &Target, kind: Kind) -> Result<Box<dyn Encoder + 'a>> {
     let strip = match single(film, target, true)? {
         Single::Windows => None,
@@ -58,6 +80,7 @@ fn start<'a>(film: &'a Film<'a>, target: &Target, kind: Kind) -> Result<Box<dyn 
         kind,
         film,
         strip,
+        is_poster: false,
         target: target.clone(),
         windows: film.view.frames.len(),
         written: Written::to(target),
@@ -82,6 +105,9 @@ impl Encoder for Images<'_> {
     }
 
     fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
+        if self.is_poster && self.written.files > 0 {
+            return Ok(());
+        }
         let target = self.target.numbered(frame.index, self.windows);
         self.write(frame.pixels, &target)
     }

@@ -22,7 +22,7 @@ struct Drawings<'a> {
 /// # Errors
 /// [`Error::Usage`](crate::error::Error::Usage) for several windows without `{n}`.
 pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    let strip = match single(film, target, film.options.strip)? {
+    let strip = match single(film, target, film.options.strip.is_some())? {
         Single::Windows => None,
         Single::Strip(scene) => Some(scene),
     };

@@ -6,15 +6,16 @@ use std::path::PathBuf;
 use super::draw::{Composed, compose, places};
 use super::{Drawing, Reading, Stage, Watch, captions, read};
 use crate::bag::Input;
-use crate::encode::{Output, Written};
+use crate::encode::{self, Output, Written};
 use crate::error::Result;
 use crate::evolution::Evolution;
-use crate::film::{self, Film};
-use crate::output;
-use crate::picture::Sketch;
+use crate::film::{self, Choice, Film};
+use crate::notice::{Notice, NoticeKind};
+use crate::picture::{Picture, Sketch};
 use crate::pixels::Painter;
 use crate::reel;
-use crate::view::filtered;
+use crate::strip::{Source, Strip, strip};
+use crate::view::{View, filtered};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -55,14 +56,13 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 /// Checks every output before anything is read.
 ///
 /// # Errors
-/// As [`output::check`].
+/// As [`encode::check`].
 pub fn check(job: &Render) -> Result<()> {
-    let targets: Vec<_> = job.outputs.iter().map(|o| o.target.clone()).collect();
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path.clone()),
         Input::Stdin => None,
     });
-    output::check(&targets, &inputs.collect::<Vec<PathBuf>>())
+    encode::check(&job.outputs, &inputs.collect::<Vec<PathBuf>>())
 }
 
 /// Draws and writes a mission that was read.
@@ -89,11 +89,18 @@ pub fn show(job: &Render, mut evolution: Evolution, watch: &mut dyn Watch) -> Re
         evolution.clone()
     };
     let picture = Sketch::new(&view, &drawing.style, &drawing.fonts, wish).with(layout);
+    let strip = side_by_side(job, &data, &view, &picture)?;
+    for remark in strip.iter().flat_map(|s| &s.remarks) {
+        let notice = Notice::new(NoticeKind::Note, remark.clone());
+        evolution.notices.add(notice);
+    }
     let film = Film {
         evolution: &data,
         view: &view,
         picture: &picture,
         painter: &Painter::new(&drawing.fonts),
+        fonts: &drawing.fonts,
+        strip: strip.as_ref().map(|s| &s.scene),
         options: job.sequence.clone(),
     };
     watch.stage(Stage::Draw);
@@ -107,4 +114,27 @@ pub fn show(job: &Render, mut evolution: Evolution, watch: &mut dyn Watch) -> Re
     };
     let written = reel::run(&film, &job.outputs, &mut progress)?;
     Ok(Rendered { evolution, written })
+}
+
+/// The film strip, if it was asked for or an output needs one.
+fn side_by_side(
+    job: &Render,
+    evolution: &Evolution,
+    view: &View,
+    picture: &Picture<'_>,
+) -> Result<Option<Strip>> {
+    let asked = job.sequence.strip.as_ref();
+    if asked.is_none() && !encode::needs_strip(&job.outputs, view.frames.len()) {
+        return Ok(None);
+    }
+    let wish = &job.drawing.wish;
+    let source = Source {
+        evolution,
+        view,
+        picture,
+        style: &job.drawing.style,
+        fonts: &job.drawing.fonts,
+    };
+    let choice = asked.unwrap_or(&Choice::Changes);
+    strip(source, choice, wish.width_mm, wish.size.w).map(Some)
 }

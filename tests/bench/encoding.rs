@@ -17,9 +17,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use bagreel::encode::Output;
-use bagreel::film::{Film, Options};
+use bagreel::film::{Choice, Film, Options};
 use bagreel::pixels::Painter;
-use bagreel::strip::{Choice, Source, strip};
+use bagreel::strip::{Source, strip};
 use bagreel::style::Style;
 use bagreel::text::Fonts;
 use bagreel::view::{ViewOptions, view};
@@ -61,7 +61,7 @@ fn main() {
     };
     let page = strip(
         source,
-        choice.as_ref().unwrap_or(&Choice::Changes),
+        &choice.clone().unwrap_or(Choice::Changes),
         mm,
         1280.0,
     )
@@ -70,7 +70,7 @@ fn main() {
     let options = Options {
         tween: number("TWEEN").unwrap_or(0),
         max_bytes: number("MOST").map(u64::from),
-        strip: choice.is_some(),
+        strip: choice,
         ..Options::default()
     };
     let film = Film {
