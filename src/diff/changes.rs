@@ -92,44 +92,51 @@ impl<'a> Changes<'a> {
     }
 
     fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
-        let secs = spans.0.nanos().min(spans.1.nanos()) as f64 / 1e9;
         let mut steady = BTreeSet::new();
         for (old, new) in &diff.topics.changed {
-            if !(is_steady(old) && is_steady(new)) {
-                continue;
-            }
-            steady.insert(new.id);
-            if let Some((from_hz, to_hz)) = self.rate(old.hz, new.hz, secs) {
-                let what = Element::Topic(new.id);
-                changes.push(Change::Rate {
-                    what,
-                    from_hz,
-                    to_hz,
-                });
+            if is_steady(old) && is_steady(new) {
+                steady.insert(new.id);
+                changes.extend(self.rate(Element::Topic(new.id), (old.hz, new.hz), spans));
             }
         }
         let crowded = self.crowded(graph);
         for (old, new) in &diff.publishes.changed {
             let topic = self.elements.publishes[new.id as usize].topic;
             // With one publisher the topic's own change says it all.
-            if !crowded.contains(&topic) || !steady.contains(&topic) {
-                continue;
-            }
-            if let Some((from_hz, to_hz)) = self.rate(old.hz, new.hz, secs) {
-                let what = Element::Publish(new.id);
-                changes.push(Change::Rate {
-                    what,
-                    from_hz,
-                    to_hz,
-                });
+            if crowded.contains(&topic) && steady.contains(&topic) {
+                changes.extend(self.rate(Element::Publish(new.id), (old.hz, new.hz), spans));
             }
         }
     }
 
-    /// Both rates, if they are known and differ.
-    fn rate(&self, from: Option<f64>, to: Option<f64>, secs: f64) -> Option<(f64, f64)> {
-        let both = from.zip(to);
-        both.filter(|(from, to)| rate_differs(*from, *to, secs, self.threshold))
+    /// The change of a rate, if it is one. What came or went within a window is measured over the part it was there,
+    /// so that coming and going are not told twice.
+    fn rate(
+        &self,
+        what: Element,
+        hz: (Option<f64>, Option<f64>),
+        spans: (Span, Span),
+    ) -> Option<Change> {
+        let (from_hz, to_hz) = (hz.0?, hz.1?);
+        let (before, after) = (self.present(what, spans.0), self.present(what, spans.1));
+        let secs = before.min(after);
+        let over = |hz: f64, span: Span, part: f64| {
+            hz * (span.nanos() as f64 / 1e9) / part.max(f64::MIN_POSITIVE)
+        };
+        let (from, to) = (over(from_hz, spans.0, before), over(to_hz, spans.1, after));
+        rate_differs(from, to, secs, self.threshold).then_some(Change::Rate {
+            what,
+            from_hz,
+            to_hz,
+        })
+    }
+
+    /// How many seconds of a window lie between an element's first and last sign of life.
+    fn present(&self, what: Element, span: Span) -> f64 {
+        let (first, last) = self.elements.life(what);
+        let start = first.map_or(span.start, |at| at.max(span.start));
+        let end = last.map_or(span.end, |at| at.plus(1).min(span.end));
+        end.since(start).max(0) as f64 / 1e9
     }
 
     /// Topics with more than one publisher in this graph.
