@@ -7,4 +7,7 @@
     reason = "tests say what went wrong by panicking"
 )]
 
+mod cli;
 mod encode;
+mod properties;
+mod warehouse;

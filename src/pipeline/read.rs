@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{Stage, Watch};
 use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
 use crate::collect::{self, Collected, Collector};
+use crate::diff::RATE_CHANGE;
 use crate::error::{Error, Result};
 use crate::evolution::{Evolution, Window, read_json};
 use crate::graph;
@@ -31,6 +32,21 @@ pub struct Reading {
     pub graph: graph::Options,
     /// The share by which a rate must change to count, 0...
     pub rate_change: f64,
+}
+
+impl Default for Reading {
+    /// Nothing yet, with every option as the command line has it.
+    fn default() -> Self {
+        Self {
+            inputs: Vec::new(),
+            verify: false,
+            division: Division::default(),
+            skip_unchanged: false,
+            collect: collect::Options::default(),
+            graph: graph::Options::default(),
+            rate_change: RATE_CHANGE,
+        }
+    }
 }
 
 /// Reads the inputs into an evolution.

@@ -1,0 +1,262 @@
+//! The command as a process: what it answers, where it writes, and what it leaves behind.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+
+/// Runs the command in a folder of its own.
+fn bagreel(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn code(output: &Output) -> Option<i32> {
+    output.status.code()
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// A file with these bytes, in `folder`.
+fn file(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.join(name);
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+#[track_caller]
+fn refused(folder: &Path, args: &[&str], with: i32, says: &str, hint: &str) {
+    let output = bagreel(folder, args);
+    let said = errors(&output);
+    assert_eq!(code(&output), Some(with), "{said}");
+    assert!(said.contains(says), "no `{says}` in: {said}");
+    assert!(said.contains(hint), "no `{hint}` in: {said}");
+}
+
+#[test]
+fn what_is_no_bag_is_refused_with_a_way_out() {
+    let dir = folder();
+    file(dir.path(), "empty.bag", b"");
+    file(dir.path(), "text.bag", b"hello, this is a note\n");
+    file(
+        dir.path(),
+        "lfs.bag",
+        b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n",
+    );
+    file(dir.path(), "old.bag", b"#ROSRECORD V1.2\n0\n");
+    refused(
+        dir.path(),
+        &["render", "gone.bag"],
+        1,
+        "`gone.bag`",
+        "hint: check the spelling",
+    );
+    refused(dir.path(), &["render", "empty.bag"], 1, "is empty", "hint:");
+    refused(dir.path(), &["render", "text.bag"], 1, "is no bag", "hint:");
+    refused(dir.path(), &["render", "lfs.bag"], 1, "LFS", "git lfs pull");
+    refused(dir.path(), &["render", "old.bag"], 1, "1.2", "hint:");
+}
+
+#[test]
+fn what_makes_no_sense_is_a_usage_error() {
+    let dir = folder();
+    refused(dir.path(), &[], 2, "Usage", "");
+    refused(
+        dir.path(),
+        &["render", WAREHOUSE, "-o", "x.gfi"],
+        2,
+        "unknown format `gfi`",
+        "gif, ",
+    );
+    refused(
+        dir.path(),
+        &["render", WAREHOUSE, "--period", "never"],
+        2,
+        "never",
+        "30s",
+    );
+    refused(
+        dir.path(),
+        &["render", WAREHOUSE, "--period", "1ms"],
+        2,
+        "more than 100000",
+        "--period 100ms",
+    );
+    refused(
+        dir.path(),
+        &["render", WAREHOUSE, "--start", "1h"],
+        2,
+        "leave nothing",
+        "the bag covers",
+    );
+    refused(
+        dir.path(),
+        &["render", WAREHOUSE, "--style", "neon"],
+        2,
+        "neon",
+        "light",
+    );
+    refused(
+        dir.path(),
+        &["render", WAREHOUSE, "--layout", "magic"],
+        2,
+        "magic",
+        "layered",
+    );
+    assert_eq!(
+        fs::read_dir(dir.path()).unwrap().count(),
+        0,
+        "nothing was written"
+    );
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_found_before_the_bag_is_read() {
+    let dir = folder();
+    file(dir.path(), "wall", b"");
+    let output = bagreel(dir.path(), &["render", "gone.bag", "-o", "wall/x.json"]);
+    assert_eq!(code(&output), Some(1));
+    assert!(errors(&output).contains("wall"), "{}", errors(&output));
+}
+
+#[test]
+fn an_output_never_replaces_its_own_bag() {
+    let dir = folder();
+    let bag = dir.path().join("x.json");
+    fs::copy(WAREHOUSE, &bag).unwrap();
+    let before = fs::read(&bag).unwrap();
+    assert_eq!(
+        code(&bagreel(dir.path(), &["render", "x.json", "-o", "x.json"])),
+        Some(2)
+    );
+    assert_eq!(fs::read(&bag).unwrap(), before);
+}
+
+#[test]
+fn a_cut_bag_yields_what_can_be_read_and_exits_3() {
+    let dir = folder();
+    let whole = fs::read(WAREHOUSE).unwrap();
+    file(dir.path(), "cut.bag", &whole[..whole.len() / 2]);
+    let output = bagreel(dir.path(), &["render", "cut.bag", "-o", "x.json"]);
+    assert_eq!(code(&output), Some(3), "{}", errors(&output));
+    assert!(errors(&output).contains("warning:"), "{}", errors(&output));
+    let text = fs::read_to_string(dir.path().join("x.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["bags"][0]["complete"], false);
+    assert!(
+        json["messages"].as_u64().unwrap() > 10_000,
+        "half of 26,719 messages"
+    );
+}
+
+#[test]
+fn standard_input_counts_as_the_file_does() {
+    let dir = folder();
+    let from_file = bagreel(
+        dir.path(),
+        &[
+            "render", WAREHOUSE, "--period", "30", "-o", "-", "--format", "json",
+        ],
+    );
+    let mut child = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args([
+            "render", "-", "--period", "30", "-o", "-", "--format", "json",
+        ])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    std::thread::spawn(move || stdin.write_all(&fs::read(WAREHOUSE).unwrap()));
+    let piped = child.wait_with_output().unwrap();
+    assert!(counts(&piped.stdout) == counts(&from_file.stdout));
+}
+
+/// The count of every topic in every window; payload sizes are known only where payloads pass by.
+fn counts(json: &[u8]) -> Vec<(String, u64)> {
+    let json: serde_json::Value = serde_json::from_slice(json).unwrap();
+    let windows = json["windows"].as_array().unwrap();
+    assert!(!windows.is_empty());
+    let topics = windows.iter().flat_map(|w| w["topics"].as_array().unwrap());
+    topics
+        .map(|t| (t["name"].to_string(), t["count"].as_u64().unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args([
+            "render", WAREHOUSE, "--period", "10", "-o", "-", "--format", "json",
+        ])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn two_runs_write_the_same_bytes() {
+    let dir = folder();
+    let run = |name: &str| {
+        let outputs = ["gif", "json", "dot"].map(|e| format!("{name}.{e}"));
+        let mut args = vec!["render", WAREHOUSE, "--size", "640x360", "--fit", "none"];
+        outputs.iter().for_each(|o| args.extend(["-o", o]));
+        let output = bagreel(dir.path(), &args);
+        assert_eq!(code(&output), Some(0), "{}", errors(&output));
+        outputs.map(|o| fs::read(dir.path().join(o)).unwrap())
+    };
+    assert_eq!(run("a"), run("b"));
+}
+
+#[test]
+fn nothing_appears_beside_the_bag() {
+    let (beside, away) = (folder(), folder());
+    let bag = beside.path().join("w.bag");
+    fs::copy(WAREHOUSE, &bag).unwrap();
+    let output = bagreel(
+        away.path(),
+        &["render", bag.to_str().unwrap(), "-o", "x.json"],
+    );
+    assert_eq!(code(&output), Some(0), "{}", errors(&output));
+    assert_eq!(fs::read_dir(beside.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn quiet_says_nothing_and_results_go_to_standard_output() {
+    let dir = folder();
+    let output = bagreel(dir.path(), &["-q", "info", WAREHOUSE]);
+    assert_eq!((code(&output), errors(&output).as_str()), (Some(0), ""));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("/robot1/cmd_vel") && text.contains("26719 messages"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_folder_of_bags_is_surveyed_with_the_broken_ones() {
+    let dir = folder();
+    fs::copy(WAREHOUSE, dir.path().join("w.bag")).unwrap();
+    file(dir.path(), "broken.bag", b"");
+    let output = bagreel(dir.path(), &["info", ".", "--format", "csv"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let rows: Vec<&str> = text.lines().collect();
+    assert_eq!(rows.len(), 3, "{text}");
+    assert!(rows[1].starts_with("broken.bag,") && rows[1].contains("empty"));
+    assert!(rows[2].starts_with("w.bag,rosbag1,none,index,true,"));
+}

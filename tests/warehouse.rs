@@ -1,0 +1,96 @@
+//! The example mission against what an independent reader counts in it, and against what really happened.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use bagreel::bag::Input;
+use bagreel::evolution::Evolution;
+use bagreel::pipeline::{Reading, Unwatched, read};
+use bagreel::time::Period;
+use bagreel::window::{Division, Length};
+
+/// The mission in 10-second windows.
+fn mission() -> Evolution {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+    let length = Period::parse("10").map_or(Length::Auto, Length::Fixed);
+    let reading = Reading {
+        inputs: vec![Input::Path(path)],
+        division: Division {
+            length,
+            ..Division::default()
+        },
+        ..Reading::default()
+    };
+    read(&reading, &mut Unwatched).unwrap()
+}
+
+/// The counts that Python's `rosbags` finds: topics by name, windows in order.
+fn counted_by_others() -> serde_json::Value {
+    serde_json::from_str(include_str!("data/warehouse.counts.json")).unwrap()
+}
+
+#[test]
+fn every_count_equals_that_of_an_independent_reader() {
+    let (mission, expected) = (mission(), counted_by_others());
+    assert_eq!(mission.span.start.0, expected["start_ns"].as_i64().unwrap());
+    assert_eq!(mission.messages, expected["messages"].as_u64().unwrap());
+    for (window, expected) in mission
+        .windows
+        .iter()
+        .zip(expected["windows"].as_array().unwrap())
+    {
+        let counted = window.graph.topics.iter().filter(|t| t.count > 0);
+        let counted: BTreeMap<&str, u64> = counted
+            .map(|t| {
+                (
+                    mission.elements.topics[t.id as usize].name.as_str(),
+                    t.count,
+                )
+            })
+            .collect();
+        let expected: BTreeMap<&str, u64> = expected
+            .as_object()
+            .unwrap()
+            .iter()
+            .map(|(k, v)| (k.as_str(), v.as_u64().unwrap()))
+            .collect();
+        assert_eq!(counted, expected, "window {}", window.index);
+    }
+    assert_eq!(
+        mission.windows.len(),
+        expected["windows"].as_array().unwrap().len()
+    );
+}
+
+/// Whether a node is there in the window that begins at this second of the mission.
+fn alive(mission: &Evolution, node: &str, second: usize) -> bool {
+    let graph = &mission.windows[second / 10].graph;
+    graph.nodes.iter().any(|n| {
+        mission.elements.nodes[n.id as usize]
+            .name
+            .as_str()
+            .starts_with(node)
+    })
+}
+
+#[test]
+fn nodes_come_and_go_when_they_did() {
+    let mission = mission();
+    let life = |node: &str| -> Vec<usize> {
+        (0..330)
+            .step_by(10)
+            .filter(|s| alive(&mission, node, *s))
+            .collect()
+    };
+    let seconds = |from: usize, to: usize| -> Vec<usize> { (from..=to).step_by(10).collect() };
+    assert_eq!(life("/robot1/base_driver"), seconds(0, 320));
+    assert_eq!(life("/robot1/planner"), seconds(30, 170));
+    assert_eq!(life("/robot1/emergency_stop"), seconds(90, 150));
+    assert_eq!(life("/robot2/base_driver"), seconds(160, 320));
+    // Killed at 4:26 and back at 4:41 under another anonymous name: alive in every window of ten seconds but one.
+    assert_eq!(
+        life("/robot1/object_detector_"),
+        [seconds(170, 260), seconds(280, 290)].concat()
+    );
+    assert_eq!(life("/robot1/dock_controller"), seconds(290, 320));
+}
