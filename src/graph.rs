@@ -7,6 +7,7 @@ mod assemble;
 mod build;
 mod lives;
 mod rates;
+mod restarts;
 mod settle;
 mod windows;
 

@@ -6,6 +6,7 @@ use std::io;
 use super::assemble::{Traffic, assemble};
 use super::lives::Track;
 use super::rates::{Rates, rates};
+use super::restarts::{Restarts, restarts};
 use super::settle::{Frame, settle};
 use super::windows::Windows;
 use super::{Elements, Graph, NodeId};
@@ -57,6 +58,7 @@ struct Builder<'a> {
     tracks: BTreeMap<What, Track>,
     /// Per topic: its streams and their messages.
     rates: Traffic,
+    restarts: Restarts,
 }
 
 impl<'a> Builder<'a> {
@@ -87,12 +89,14 @@ impl<'a> Builder<'a> {
             proofs,
             tracks: BTreeMap::new(),
             rates: BTreeMap::new(),
+            restarts: Restarts::new(),
         })
     }
 
     fn run(mut self, collected: &mut Collected, options: &Options) -> io::Result<Built> {
         self.count(collected)?;
-        self.track(collected);
+        self.restarts = restarts(collected, &self.proofs)?;
+        self.track(collected)?;
         settle(
             &mut self.tracks,
             &self.proofs,
@@ -119,42 +123,78 @@ impl<'a> Builder<'a> {
     }
 
     /// Puts the signs of every proof on the track of its element.
-    fn track(&mut self, collected: &Collected) {
+    fn track(&mut self, collected: &mut Collected) -> io::Result<()> {
         for proof in &self.proofs {
+            let node = match proof.what {
+                What::Node(node) | What::Publish(node, _) | What::Subscribe(_, node) => Some(node),
+                What::Topic(_) => None,
+            };
+            let restarts = node.and_then(|node| self.restarts.get(&node));
+            let deaths: Vec<Stamp> = restarts.into_iter().flatten().map(|r| r.death).collect();
             let track = self.tracks.entry(proof.what).or_default();
             track.evidence = track.evidence.and(Evidence::row(proof.source));
             if proof.degree != Degree::Measured {
                 track.quiet = track.quiet.min(proof.degree);
             }
             match &proof.when {
-                When::Messages(stream) => {
-                    let latched = collected.streams[*stream].latched;
-                    let rates = self.rates.get(&collected.streams[*stream].topic);
-                    if let Some((streams, rates)) = rates {
-                        let place = streams.iter().position(|s| s == stream).unwrap_or(0);
-                        follow(track, rates, place, latched, self.mission.1);
+                When::Messages(at) => {
+                    let stream = &collected.streams[*at];
+                    let Some((streams, rates)) = self.rates.get(&stream.topic) else {
+                        continue;
+                    };
+                    let place = streams.iter().position(|s| s == at).unwrap_or(0);
+                    follow(track, rates, place, stream.latched, self.mission.1);
+                    if !deaths.is_empty() {
+                        let times = collected.messages.times(stream.times)?;
+                        track.bound_all(&times, &deaths);
                     }
                 }
-                When::First(stream) => {
-                    let rates = self.rates.get(&collected.streams[*stream].topic);
-                    let place = |streams: &[usize]| streams.iter().position(|s| s == stream);
-                    let trace = rates.and_then(|(streams, rates)| rates.traces[place(streams)?]);
-                    if let Some(trace) = trace {
+                When::First(at) => {
+                    let stream = &collected.streams[*at];
+                    if let Some((streams, rates)) = self.rates.get(&stream.topic)
+                        && let Some(place) = streams.iter().position(|s| s == at)
+                        && let Some(trace) = rates.traces[place]
+                    {
                         track.sign_all(&[trace.first], &[], proof.degree, &self.windows);
                     }
                 }
                 When::Signs { signs, ends, held } => {
-                    track.sign_all(signs, ends, proof.degree, &self.windows);
+                    let mut ends = ends.clone();
+                    ends.extend(&deaths);
+                    ends.sort_unstable();
+                    track.sign_all(signs, &ends, proof.degree, &self.windows);
                     track.held |= held;
                 }
                 When::Like(_) => {}
                 When::Whole => track.whole = true,
             }
         }
+        for (node, restarts) in &self.restarts {
+            let track = self.tracks.entry(What::Node(*node)).or_default();
+            for restart in restarts {
+                track.signs.extend([restart.death, restart.birth]);
+                track.ends.push(restart.death);
+            }
+        }
+        Ok(())
     }
 
     fn assemble(self, collected: &Collected) -> Built {
-        assemble(&self.tracks, &self.rates, &self.windows, collected)
+        let mut built = assemble(&self.tracks, &self.rates, &self.windows, collected);
+        for (node, restarts) in &self.restarts {
+            let name = collected.facts.text(*node);
+            let id = built
+                .elements
+                .nodes
+                .binary_search_by(|n| n.name.as_str().cmp(&name));
+            if let Ok(id) = id.map(|id| NodeId::try_from(id).unwrap_or(NodeId::MAX)) {
+                built
+                    .restarts
+                    .extend(restarts.iter().map(|r| (id, r.birth)));
+            }
+        }
+        built.restarts.sort_by_key(|(node, time)| (*time, *node));
+        built
     }
 }
 

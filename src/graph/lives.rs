@@ -76,6 +76,11 @@ impl Track {
                 self.mark(window, degree);
             }
         }
+        self.bound_all(signs, ends);
+    }
+
+    /// Adds signs, sorted, that mark nothing; of those with no end between them only the outer two are kept.
+    pub(super) fn bound_all(&mut self, signs: &[Stamp], ends: &[Stamp]) {
         let before = |time: &Stamp| ends.partition_point(|end| end < time);
         for run in signs.chunk_by(|a, b| before(a) == before(b)) {
             self.signs.extend(run.first());
