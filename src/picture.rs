@@ -10,6 +10,7 @@ mod page;
 mod timeline;
 mod title;
 mod tween;
+mod union;
 mod words;
 
 use std::fmt::Write as _;
@@ -20,6 +21,7 @@ use self::draft::Draft;
 use self::page::{Fit, Page};
 use self::timeline::Timeline;
 use self::title::Title;
+pub use self::union::{Part, Union, sign};
 use crate::geometry::Size;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
 use crate::scene::{Group, Scene};

@@ -118,7 +118,7 @@ impl Class {
         }
         if let Some(mark) = self.mark {
             words.push(mark.class().to_owned());
-            words.extend(manner(mark).map(str::to_owned));
+            words.extend((mark.class() == "changed").then(|| word(mark).to_owned()));
         }
         if self.step > 0 {
             words.push(format!("w{}", self.step));
@@ -127,15 +127,17 @@ impl Class {
     }
 }
 
-/// A second word for marks that share their class `changed`.
-fn manner(mark: Mark) -> Option<&'static str> {
+/// The class word that tells a mark from all others: the class of its badge.
+pub fn word(mark: Mark) -> &'static str {
     match mark {
-        Mark::Added | Mark::Removed | Mark::Changed => None,
-        Mark::Faster => Some("faster"),
-        Mark::Slower => Some("slower"),
-        Mark::HandedOver => Some("handed"),
-        Mark::Restarted => Some("restarted"),
-        Mark::Inside => Some("inside"),
+        Mark::Added => "added",
+        Mark::Removed => "removed",
+        Mark::Faster => "faster",
+        Mark::Slower => "slower",
+        Mark::HandedOver => "handed-over",
+        Mark::Restarted => "restarted",
+        Mark::Changed => "other",
+        Mark::Inside => "inside",
     }
 }
 

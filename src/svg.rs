@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::hash::base64;
 use crate::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
 use crate::style::Color;
 use crate::text::{Fonts, Weight};
@@ -301,22 +302,6 @@ pub(crate) fn escape(out: &mut String, text: &str) {
     }
 }
 
-fn base64(out: &mut String, data: &[u8]) {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for chunk in data.chunks(3) {
-        let byte = |at: usize| u32::from(chunk.get(at).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for at in 0..4 {
-            let digit = DIGITS[(bits >> (18 - 6 * at) & 63) as usize];
-            out.push(if at <= chunk.len() {
-                char::from(digit)
-            } else {
-                '='
-            });
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -396,10 +381,6 @@ mod tests {
 
     #[test]
     fn the_font_can_travel_with_the_picture() {
-        let mut out = String::new();
-        base64(&mut out, b"Ma");
-        base64(&mut out, b"Man");
-        assert_eq!(out, "TWE=TWFu");
         let scene = Scene {
             size: Size::new(1.0, 1.0),
             width_mm: None,

@@ -197,6 +197,22 @@ impl Fonts {
     }
 }
 
+/// `text` with control characters, invisible and direction marks written as `\u{…}`, so that it cannot hide or turn
+/// round what stands beside it; for pages, where the reader's own fonts show the rest.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_invisible) {
+        return Cow::Borrowed(text);
+    }
+    let spelled = |c: char| {
+        if is_invisible(c) {
+            c.escape_unicode().to_string()
+        } else {
+            c.to_string()
+        }
+    };
+    Cow::Owned(text.chars().map(spelled).collect())
+}
+
 /// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
 fn is_invisible(c: char) -> bool {
     c.is_control()

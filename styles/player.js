@@ -46,7 +46,7 @@ function seek(w, quiet) {
 		const k = at(lives[i][0], w), text = e.lastChild;
 		if (k != cur[i]) { cur[i] = k; dress(i); moved.push(i); }
 		if (mark[k] >= 0) news.push(i);
-		if (!k || text.localName != 'text') return;
+		if (!k || !text.classList.contains('r')) return;
 		const told = (/er/.test(classes[k]) ? hz(i, w - 1).replace('Hz', '→ ') : '') + hz(i, w);
 		if (text.told != told) text.textContent = text.told = told;
 	});
@@ -114,9 +114,9 @@ function load() {
 }
 
 // A gesture moves the drawn picture by X, Y and scale S; its end draws it anew.
-const [, , width, height] = svg.getAttribute('viewBox').split(' ');
+const home = svg.getAttribute('viewBox').split(' ');
 let X = 0, Y = 0, S = 1, idle, far, old;
-const fit = (...box) => svg.setAttribute('viewBox', box.join(' ')), whole = () => fit(0, 0, width, height);
+const fit = (...box) => svg.setAttribute('viewBox', box.join(' ')), whole = () => fit(...home);
 function settle() {
 	svg.style.cssText = '';
 	const { a, e, f } = svg.getCTM();

@@ -30,7 +30,7 @@ pub(super) struct Track {
     /// The middle of its label.
     label: Option<Point>,
     /// The middle of its badge.
-    badge: Point,
+    pub(super) badge: Point,
     /// Its length in pixels, about.
     pub(super) length: f64,
 }

@@ -196,7 +196,7 @@ impl Boxes<'_> {
 }
 
 /// Where the badge of a box stands: at its top right, on its outline.
-fn corner(kind: ItemKind, place: Rect, scale: f64) -> Point {
+pub(super) fn corner(kind: ItemKind, place: Rect, scale: f64) -> Point {
     match kind {
         ItemKind::Node => {
             let middle = place.centre();

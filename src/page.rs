@@ -1,0 +1,258 @@
+//! The mission as one self-contained page: the graph drawn once, its history as spells, and the player that shows them.
+
+mod data;
+mod table;
+
+use std::fmt::Write as _;
+
+use crate::evolution::Evolution;
+use crate::hash;
+use crate::picture::Union;
+use crate::spells::{Life, Spells, at};
+use crate::stage::{self, Detail, Dress, Stage};
+use crate::style::Style;
+use crate::svg::escape;
+use crate::text::{self, visible};
+use crate::time;
+use crate::view::{Frame, Mark, View};
+
+const PAGE: &str = include_str!("../styles/player.html");
+const SCRIPT: &str = include_str!("../styles/player.js");
+const LOOK: &str = include_str!("../styles/player.css");
+
+/// What a page is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Page<'a> {
+    /// The whole sequence.
+    pub evolution: &'a Evolution,
+    /// What is shown of it.
+    pub view: &'a View,
+    /// The graph, drawn once.
+    pub union: &'a Union,
+    /// How it looks.
+    pub style: &'a Style,
+    /// How it looks where the reader prefers dark pages; `None` for always the same.
+    pub dark: Option<&'a Style>,
+    /// The title, such as the bag's name.
+    pub title: &'a str,
+}
+
+impl Page<'_> {
+    /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
+    pub fn write(&self) -> String {
+        let spells = Spells::of(self.view, crate::view::hertz);
+        let still = busiest(self.view);
+        let fonts = fonts();
+        let look = self.look();
+        let script = squeezed(SCRIPT);
+        let (data, data_type) = data::packed(&data::json(self, &spells));
+        let policy = format!(
+            "default-src 'none';script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
+            hash::policy(&script),
+            hash::policy(&fonts),
+            hash::policy(&look),
+        );
+        let schemes = if self.dark.is_some() {
+            "light dark"
+        } else {
+            "normal"
+        };
+        let mut title = String::new();
+        escape(&mut title, &visible(self.title));
+        fill(PAGE, |key| match key {
+            "policy" => policy.clone(),
+            "schemes" => schemes.to_owned(),
+            "title" => title.clone(),
+            "fonts" => fonts.clone(),
+            "css" => look.clone(),
+            "graph" => self.graph(&spells, still),
+            "where" => self.place(still),
+            "ticks" => self.ticks(),
+            "summary" => table::summary(self.view),
+            "rows" => table::rows(self.view),
+            "data_type" => data_type.to_owned(),
+            "data" => data.clone(),
+            "script" => script.clone(),
+            _ => String::new(),
+        })
+    }
+
+    fn look(&self) -> String {
+        let mut out = stage::variables(self.style) + &stage::rules(self.style);
+        if let Some(dark) = self.dark {
+            // Paper is white.
+            let dark = stage::variables(dark) + &stage::rules(dark);
+            let _ = write!(
+                out,
+                "@media screen and (prefers-color-scheme:dark){{{dark}}}"
+            );
+        }
+        out + &squeezed(LOOK)
+    }
+
+    /// The graph as it is in the window at place `still`, which is what a reader without scripts sees.
+    fn graph(&self, spells: &Spells, still: usize) -> String {
+        let detail = Detail {
+            is_fine: true,
+            has_names: true,
+        };
+        let stage = Stage::new(self.view, self.union, self.style, detail);
+        let window = u32::try_from(still).unwrap_or(0);
+        // A margin, and room around a small graph: three boxes as large as the screen are no pleasure.
+        let size = self.union.size;
+        let (w, h) = ((size.w + 24.0).max(860.0), (size.h + 24.0).max(480.0));
+        let mut out = format!(
+            "<svg id=\"graph\" viewBox=\"{:.0} {:.0} {w:.0} {h:.0}\" role=\"img\" aria-label=\"Graph; every element is in the search\">{}",
+            (size.w - w) / 2.0,
+            (size.h - h) / 2.0,
+            stage.signs()
+        );
+        stage.spaces(&mut out);
+        out.push_str("<g id=\"arrows\">");
+        for &arrow in &self.union.order {
+            let life = &spells.arrows[arrow];
+            stage.arrow(
+                &mut out,
+                arrow,
+                &Still {
+                    spells,
+                    life,
+                    window,
+                },
+            );
+        }
+        out.push_str("</g><g id=\"items\">");
+        for (item, life) in spells.items.iter().enumerate() {
+            stage.item(
+                &mut out,
+                item,
+                &Still {
+                    spells,
+                    life,
+                    window,
+                },
+            );
+        }
+        out.push_str("</g></svg>");
+        out
+    }
+
+    fn place(&self, still: usize) -> String {
+        let count = self.view.frames.len();
+        let at = self.view.frames.get(still).map_or(0, |f| self.offset(f));
+        format!("window {} of {count} · {}", still + 1, time::offset(at))
+    }
+
+    /// Nanoseconds from the start of the first window to that of `frame`.
+    fn offset(&self, frame: &Frame) -> i64 {
+        let first = self.view.frames.first().unwrap_or(frame);
+        frame.span.start.since(first.span.start)
+    }
+
+    fn ticks(&self) -> String {
+        let (Some(first), Some(last)) = (self.view.frames.first(), self.view.frames.last()) else {
+            return String::new();
+        };
+        let whole = last.span.end.since(first.span.start);
+        let tick = |quarter: i64| {
+            let second = whole / 4_000_000_000 * quarter;
+            format!("<span>{}</span>", time::offset(second * 1_000_000_000))
+        };
+        (0..=4).map(tick).collect()
+    }
+}
+
+/// An element as it is in one window.
+struct Still<'a> {
+    spells: &'a Spells,
+    life: &'a Life,
+    window: u32,
+}
+
+impl Dress for Still<'_> {
+    fn class(&self) -> String {
+        self.spells.classes[at(&self.life.classes, self.window) as usize].clone()
+    }
+
+    fn text(&self) -> String {
+        let label = |list| self.spells.labels[at(list, self.window) as usize].clone();
+        if !self.life.lifecycles.is_empty() {
+            return label(&self.life.lifecycles);
+        }
+        match label(&self.life.rates) {
+            hz if hz.is_empty() => hz,
+            hz => hz + " Hz",
+        }
+    }
+}
+
+/// The place of the window that shows most; the first of several.
+pub(crate) fn busiest(view: &View) -> usize {
+    let shown = |frame: &Frame| {
+        let there = |s: &&crate::view::Shown| s.mark != Some(Mark::Removed);
+        frame.items.iter().filter(there).count() + frame.arrows.iter().filter(there).count()
+    };
+    let windows = view.frames.iter().map(shown).enumerate();
+    windows
+        .fold(
+            (0, 0),
+            |best, (at, n)| if n > best.1 { (at, n) } else { best },
+        )
+        .0
+}
+
+fn fonts() -> String {
+    let mut css = String::new();
+    for (weight, data) in [(400, text::REGULAR), (600, text::SEMIBOLD)] {
+        let _ = write!(
+            css,
+            "@font-face{{font-family:Inter;font-weight:{weight};src:url(data:font/ttf;base64,"
+        );
+        hash::base64(&mut css, data);
+        css.push_str(")}");
+    }
+    css
+}
+
+/// Without indentation, which readers of the files need and browsers do not.
+fn squeezed(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// The template with every `{{key}}` replaced; what is put in is never looked at again.
+fn fill(template: &str, value: impl Fn(&str) -> String) -> String {
+    let mut out = String::with_capacity(1 << 18);
+    let mut parts = template.split("{{");
+    out.push_str(parts.next().unwrap_or_default());
+    for part in parts {
+        let (key, rest) = part.split_once("}}").unwrap_or(("", part));
+        out.push_str(&value(key));
+        out.push_str(rest);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_filled_in_is_not_a_template() {
+        let page = fill("<{{a}}|{{b}}>", |key| {
+            if key == "a" {
+                "{{b}}".to_owned()
+            } else {
+                "x".to_owned()
+            }
+        });
+        assert_eq!(page, "<{{b}}|x>");
+    }
+
+    #[test]
+    fn the_players_files_stay_small() {
+        let kib = |text: &str| text.len() as f64 / 1024.0;
+        assert!(kib(SCRIPT) <= 8.0, "player.js has {:.2} KiB", kib(SCRIPT));
+        assert!(kib(LOOK) <= 4.0, "player.css has {:.2} KiB", kib(LOOK));
+    }
+}
