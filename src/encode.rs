@@ -4,6 +4,7 @@ mod apng;
 mod csv;
 mod dot;
 mod gif;
+mod html;
 mod json;
 mod mermaid;
 mod pdf;
@@ -11,11 +12,12 @@ mod png;
 mod svg;
 mod video;
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::film::{Film, Shot};
-use crate::output::{self, Target};
+use crate::output::{self, Sink, Target};
 use crate::palette::Palette;
 use crate::pixels::Pixels;
 use crate::scene::Scene;
@@ -131,6 +133,50 @@ pub trait Encoder: Send {
     fn finish(self: Box<Self>) -> Result<Written>;
 }
 
+/// An output of one file that is written when the film is over.
+struct AtOnce<W> {
+    target: Target,
+    /// The text, and what the user should know of it.
+    write: W,
+}
+
+impl<'a, W: FnOnce() -> (String, Vec<String>) + Send + 'a> AtOnce<W> {
+    /// # Errors
+    /// [`Error::Usage`] for a name with `{n}`.
+    fn start(target: &Target, write: W) -> Result<Box<dyn Encoder + 'a>> {
+        if target.is_numbered() {
+            return Err(Error::usage(
+                format!("`{}` asks for a file per window", target.path().display()),
+                "all windows are in one file: leave `{n}` out",
+            ));
+        }
+        Ok(Box::new(Self {
+            target: target.clone(),
+            write,
+        }))
+    }
+}
+
+impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
+    fn needs(&self) -> Needs {
+        Needs::Nothing
+    }
+
+    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<Written> {
+        let mut written = Written::to(&self.target);
+        let mut sink = Sink::create(&self.target, None)?;
+        let (text, remarks) = (self.write)();
+        sink.write_all(text.as_bytes()).map_err(sink.error())?;
+        written.remarks = remarks;
+        written.add(sink.commit()?);
+        Ok(written)
+    }
+}
+
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
 pub type Start = for<'a> fn(&'a Film<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
 
@@ -232,6 +278,14 @@ pub const FORMATS: &[Format] = &[
         is_strip: false,
         check: Some(video::check),
         start: video::start_webm,
+    },
+    Format {
+        word: "html",
+        what: "one page that plays the mission, with everything in it",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: html::start,
     },
     Format {
         word: "json",

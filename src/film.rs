@@ -6,9 +6,10 @@ mod choice;
 pub use choice::Choice;
 
 use crate::evolution::Evolution;
-use crate::picture::Picture;
+use crate::picture::{Picture, Union};
 use crate::pixels::Painter;
 use crate::scene::Scene;
+use crate::style::Style;
 use crate::text::Fonts;
 use crate::view::View;
 
@@ -56,11 +57,35 @@ pub trait Scenes: Sync {
     /// The drawing of a window, a place in [`View::frames`]; all drawings have one size. `phase` is how far the change
     /// into it has come: 1 is the window itself.
     fn scene(&self, window: usize, phase: f64) -> Scene;
+
+    /// What all windows have in common, for outputs that draw the graph once; `None` where there is no such thing.
+    fn graph(&self) -> Option<Whole<'_>> {
+        None
+    }
+}
+
+/// The graph of all windows, drawn once.
+#[derive(Clone, Debug)]
+pub struct Whole<'a> {
+    /// Every element.
+    pub union: Union,
+    /// How it looks.
+    pub style: &'a Style,
+    /// The title of the picture.
+    pub title: &'a str,
 }
 
 impl Scenes for Picture<'_> {
     fn scene(&self, window: usize, phase: f64) -> Scene {
         self.between(window, phase)
+    }
+
+    fn graph(&self) -> Option<Whole<'_>> {
+        Some(Whole {
+            union: self.union(),
+            style: self.style(),
+            title: self.title_text(),
+        })
     }
 }
 

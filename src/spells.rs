@@ -91,6 +91,26 @@ impl Spells {
     }
 }
 
+impl Spells {
+    /// How many elements have a mark of this class in each window in which there are any.
+    pub fn counts(&self, class: &str) -> BTreeMap<u32, usize> {
+        let has = |words: &String| words.split(' ').any(|word| word == class);
+        let marked: Vec<bool> = self.classes.iter().map(has).collect();
+        let mut counts = BTreeMap::new();
+        for spell in self
+            .items
+            .iter()
+            .chain(&self.arrows)
+            .flat_map(|life| &life.classes)
+        {
+            if marked[spell.value as usize] {
+                *counts.entry(spell.from).or_default() += 1;
+            }
+        }
+        counts
+    }
+}
+
 /// What decides the look of an element in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Class {
@@ -273,17 +293,11 @@ pub fn flat(list: &[Spell]) -> Vec<u32> {
 }
 
 impl Serialize for Life {
-    /// `[classes, rates, lifecycles]`, each [`flat`]; empty lists at the end are left out.
+    /// `[classes, rates, lifecycles]`, each [`flat`].
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let mut lists = vec![
-            flat(&self.classes),
-            flat(&self.rates),
-            flat(&self.lifecycles),
-        ];
-        while lists.last().is_some_and(Vec::is_empty) {
-            lists.pop();
-        }
-        lists.serialize(to)
+        [&self.classes, &self.rates, &self.lifecycles]
+            .map(|list| flat(list))
+            .serialize(to)
     }
 }
 
@@ -372,7 +386,7 @@ mod tests {
         let spells = spells(&[Some((None, 9.8)); 50]);
         assert_eq!(
             serde_json::to_string(&spells.arrows).unwrap(),
-            "[[[0,1],[0,1]]]"
+            "[[[0,1],[0,1],[]]]"
         );
         assert_eq!(told(&spells, 50)[49], ("active w2", "10"));
     }

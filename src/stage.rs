@@ -136,7 +136,8 @@ impl<'a> Stage<'a> {
         out.push('>');
         out.push_str(&dress.more());
         let text = dress.text();
-        self.pieces(out, &part.group, part.is_live.then_some(&text));
+        let class = if part.tells_changes { "r c" } else { "r" };
+        self.pieces(out, &part.group, part.is_live.then_some((class, &text)));
         for mark in &part.marks {
             let word = word(*mark);
             let Point { x, y } = part.badge;
@@ -156,7 +157,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Shapes and texts. `live` is what the last text says in place of its own words.
-    fn pieces(&self, out: &mut String, group: &Group, live: Option<&String>) {
+    fn pieces(&self, out: &mut String, group: &Group, live: Option<(&str, &String)>) {
         let texts = group
             .pieces
             .iter()
@@ -170,13 +171,13 @@ impl<'a> Stage<'a> {
                     seen += 1;
                     let live = live.filter(|_| seen == texts);
                     let class = match (live, seen) {
-                        (Some(_), _) => " class=\"r\"",
-                        (None, 2..) => " class=\"m\"",
-                        _ => "",
+                        (Some((class, _)), _) => format!(" class=\"{class}\""),
+                        (None, 2..) => " class=\"m\"".to_owned(),
+                        _ => String::new(),
                     };
                     let Point { x, y } = text.at;
                     let _ = write!(out, "<text{class} x=\"{}\" y=\"{}\">", whole(x), whole(y));
-                    escape(out, live.unwrap_or(&text.text));
+                    escape(out, live.map_or(&text.text, |(_, words)| words));
                     out.push_str("</text>");
                 }
             }

@@ -1,65 +1,53 @@
-'use strict';
-// Plays the mission in #data. Elements are numbered: items (boxes) first, then arrows.
-(async () => {
+// Plays #data. Elements are numbered: items, then arrows.
 const $ = new Proxy({}, { get: (_, id) => document.getElementById(id) }), say = (id, text) => $[id].textContent = text;
 let raw = $.data.textContent;
 if ($.data.type == 'deflated') raw = await new Response(new Blob([Uint8Array.from(atob(raw), c => c.charCodeAt())]).stream().pipeThrough(new DecompressionStream('deflate-raw'))).text();
 const { names, arrows, facts, words, classes, labels, lives, starts, end, epoch, boxes } = JSON.parse(raw);
-raw = say('data', '');
+say('data', raw = '');
 const N = names.length, W = starts.length, last = W - 1, svg = $.graph, stage = $.stage, els = [...$.items.children, ...$.arrows.children];
-
-// A life is three lists of spells [windows since the spell before, value, …]: class, rate, lifecycle.
-for (const life of lives) for (let k = 0; k < 3; k++) {
-	const list = life[k] = Int32Array.from(life[k] || []);
-	for (let i = 2; i < list.length; i += 2) list[i] += list[i - 2];
-}
-const at = (list, w) => {
-	let lo = 0, hi = list.length / 2;
-	while (lo < hi) { const mid = lo + hi >> 1; if (list[2 * mid] <= w) lo = mid + 1; else hi = mid; }
-	return lo && list[2 * lo - 1];
-};
-const KINDS = ['added', 'removed', 'changed'], mark = classes.map(c => KINDS.findIndex(k => c.includes(k)));
-const counts = KINDS.map(() => starts.map(() => 0)), each = f => KINDS.map((k, m) => f(k, counts[m], '+−◆'[m], m)).join('');
-for (const [list] of lives) list.forEach((k, i) => i % 2 && mark[k] >= 0 && counts[mark[k]][list[i - 1]]++);
-const hz = (i, w) => { const text = labels[at(lives[i][1], w)]; return text && text + ' Hz'; };
+const name = names.concat(arrows.map(ends => ends.map(i => names[i]).join(' → '))), about = facts.map(list => list.map(f => words[f]).join('\n'));
 const ends = i => i < N ? arrows.flatMap((a, k) => a.includes(i) ? N + k : []) : arrows[i - N];
-const name = i => names[i] ?? ends(i).map(name).join(' → ');
-const clock = s => new Date(s * 1e3).toISOString().slice(s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
-const list = (id, all) => $[id].replaceChildren(...all.slice(0, 99).map(i => {
-	const b = document.createElement('button');
-	b.append(name(i));
-	b.className = classes[cur[i]];
-	b.onclick = () => pick(i, 1);
-	return b;
-}));
 
-// One window.
+// Spells: windows since the last one, value, …
+for (const list of lives.flat()) for (let i = 2; i < list.length; i += 2) list[i] += list[i - 2];
+const at = (list, w, lo = 0, hi = list.length) => {
+	while (lo < hi) { const mid = (lo + hi >> 2) * 2; list[mid] <= w ? lo = mid + 2 : hi = mid; }
+	return lo && list[lo - 1];
+};
+const hz = (i, w) => labels[at(lives[i][1], w)].replace(/.$/, '$& Hz');
+const KINDS = ['added', 'removed', 'changed'], mark = classes.map(c => KINDS.findIndex(k => c.includes(k)));
+const counts = KINDS.map(() => starts.map(() => 0)), each = f => KINDS.map((k, m) => f(k, counts[m], m)).join('');
+for (const [list] of lives) list.forEach((k, i) => i % 2 && mark[k] >= 0 && counts[mark[k]][list[i - 1]]++);
+const iso = (s, from, to) => new Date(s * 1e3).toISOString().slice(from, to), clock = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
+const list = (id, all) => $[id].replaceChildren(...all.slice(0, 99).map(i => Object.assign(document.createElement('button'), { textContent: name[i], className: classes[cur[i]], onclick: () => pick(i, 1) })));
+
+// A window.
 let now = 0, sel = -1, near = new Set(), timer = 0, hits = [], news = [];
 const cur = els.map(() => -1), base = els.map(e => e.classList[0] + ' ');
-const dress = i => els[i].setAttribute('class', base[i] + classes[cur[i]] + (near.has(i) ? ' near' : ''));
+const dress = i => els[i]?.setAttribute('class', base[i] + classes[cur[i]] + (near.has(i) ? ' near' : ''));
 function seek(w, quiet) {
 	w = Math.max(0, Math.min(last, w));
-	const step = Math.abs(w - now) == 1, moved = [], time = clock(starts[w]), place = `window ${w + 1} of ${W}`;
-	now = w;
+	const moved = [], time = clock(starts[w]), place = `window ${w + 1} of ${W}`;
 	news = [];
 	els.forEach((e, i) => {
-		const k = at(lives[i][0], w), text = e.lastChild;
+		const k = at(lives[i][0], w), text = e.r ??= e.querySelector('.r') || 0;
 		if (k != cur[i]) { cur[i] = k; dress(i); moved.push(i); }
 		if (mark[k] >= 0) news.push(i);
-		if (!k || !text.classList.contains('r')) return;
-		const told = (/er/.test(classes[k]) ? hz(i, w - 1).replace('Hz', '→ ') : '') + hz(i, w);
+		if (!k || !text) return;
+		const told = labels[at(lives[i][2], w)] || (/ster|wer/.test(classes[k]) ? hz(i, w - 1).replace('Hz', '→ ') : '') + hz(i, w);
 		if (text.told != told) text.textContent = text.told = told;
 	});
-	if (step && moved.length < 41 && !matchMedia('(prefers-reduced-motion:reduce)').matches) moved.forEach(i => els[i].animate({ opacity: [.2, 1] }, 250));
-	$.seek.value = w;
-	$.seek.setAttribute('aria-valuetext', `${time}, ${place}` + each((k, n, sign) => n[w] ? `, ${sign}${n[w]}` : ''));
+	if ((w - now) ** 2 == 1 && moved.length < 41 && !matchMedia('(prefers-reduced-motion)').matches) moved.forEach(i => els[i].animate({ opacity: [.2, 1] }, 250));
+	now = w;
 	say('where', `${place} · ${time} – ${clock(starts[w + 1] ?? end)} of ${clock(end)}`);
-	say('clock', new Date(epoch + starts[w] * 1e3).toISOString().slice(11, 19));
-	$.chips.innerHTML = each((k, n, sign) => n[w] ? `<span class=${k}>${sign}${n[w]} ${k}</span>` : '');
+	say('clock', iso(epoch / 1e3 + starts[w], 11, 19));
+	$.chips.innerHTML = each((k, n, m) => n[w] ? `<span class=${k}>${'+−◆'[m]}${n[w]} ${k}</span> ` : '');
+	$.seek.value = w;
+	$.seek.ariaValueText = [time, place, $.chips.textContent].join(', ');
 	list('news', news);
 	card();
 	if (quiet) return;
-	say('live', [time, place, ...news.slice(0, 5).map(i => name(i) + ' ' + KINDS[mark[cur[i]]])].join(', '));
+	say('live', [time, place, ...news.slice(0, 5).map(i => name[i] + ' ' + KINDS[mark[cur[i]]])].join(', '));
 	save();
 }
 function play(on) {
@@ -70,86 +58,84 @@ function play(on) {
 	save();
 }
 const go = w => { play(0); seek(w); };
-const jump = by => { let w = now + by; while (w > 0 && w < last && !counts.some(n => n[w])) w += by; go(w); };
+const jump = by => { let w = now; do w += by; while (counts[0][w] + counts[1][w] + counts[2][w] === 0); go(w); };
 
-// The selected element, its neighbours, its card.
+// The selection and its card.
 function pick(i, look) {
 	const old = near;
 	sel = i;
-	near = new Set(i < 0 ? [] : [i, ...ends(i).flatMap(k => k < N ? k : [k, ...ends(k)])]);
+	near = new Set([i, ...ends(i).flatMap(k => k < N ? k : [k, ...ends(k)])]);
 	[...old, ...near].forEach(dress);
 	svg.classList.toggle('pinned', i >= 0);
 	card();
-	if (look && i >= 0) bring([i], Math.max(svg.getCTM().a, .8));
+	if (look) bring([i], Math.max(svg.getCTM().a, .8));
 	save();
 }
 function card() {
 	if ($.card.hidden = sel < 0) return;
 	const [life, , cycle] = lives[sel], bit = (c, x, to = W) => `<rect class="${c}" x=${x} width=${to - x} height=9 />`;
-	say('name', name(sel));
-	$.life.setAttribute('viewBox', `0 0 ${W} 9`);
-	$.life.innerHTML = [...life].map((k, i) => i % 2 && k ? bit(classes[k], life[i - 1], life[i + 1]) : '').join('') + bit('head', now, now + 1 + W / 200);
-	say('facts', [[classes[cur[sel]].replace(/ w\d/, ''), hz(sel, now), labels[at(cycle, now)]].join(' '), ...facts[sel].map(f => words[f])].join('\n'));
+	say('name', name[sel]);
+	$.life.innerHTML = life.map((k, i) => i % 2 && k ? bit(classes[k], life[i - 1], life[i + 1]) : '').join('') + bit('head', now, now + 1 + W / 200);
+	say('facts', `${classes[cur[sel]].replace(/ w\d/, '')} ${hz(sel, now)} ${labels[at(cycle, now)]}\n` + about[sel]);
 	list('ends', ends(sel));
 }
 function search() {
 	const q = $.q.value.toLowerCase();
-	hits = q ? els.flatMap((_, i) => [name(i), ...facts[i].map(f => words[f])].join().toLowerCase().includes(q) ? i : []) : [];
+	hits = q ? els.flatMap((_, i) => (name[i] + about[i]).toLowerCase().includes(q) ? i : []) : [];
 	say('count', q && hits.length + ' of ' + els.length);
 	list('hits', hits);
 	save();
 }
 
-// The link to here.
+// The link.
 function save() {
-	const add = (k, v) => v && `&${k}=` + encodeURIComponent(v).replace(/%2F/g, '/');
-	if (!timer) try { history.replaceState(0, '', '#t=' + starts[now] + add('sel', sel < 0 ? '' : name(sel)) + add('q', $.q.value)); } catch { /* a sandbox */ }
+	const add = (k, v = '') => v && `&${k}=` + encodeURIComponent(v).replace(/%2F/g, '/');
+	if (!timer) try { history.replaceState(0, '', '#t=' + starts[now] + add('sel', name[sel]) + add('q', $.q.value)); } catch {}
 }
 function load() {
-	const link = new URLSearchParams(location.hash.slice(1)), want = link.get('sel');
+	const link = new URLSearchParams(location.hash.slice(1));
 	$.q.value = link.get('q');
 	seek(starts.findLastIndex(s => s <= +link.get('t') + 1e-6));
-	pick(want ? els.findIndex((_, i) => name(i) == want) : -1, 1);
+	pick(name.indexOf(link.get('sel')), 1);
 	search();
 }
 
-// A gesture moves the drawn picture by X, Y and scale S; its end draws it anew.
-const home = svg.getAttribute('viewBox').split(' ');
+// A gesture moves the picture by X, Y and scale S; its end draws it anew.
 let X = 0, Y = 0, S = 1, idle, far, old;
-const fit = (...box) => svg.setAttribute('viewBox', box.join(' ')), whole = () => fit(...home);
-function settle() {
-	svg.style.cssText = '';
-	const { a, e, f } = svg.getCTM();
-	fit((-X / S - e) / a, (-Y / S - f) / a, stage.clientWidth / a / S, stage.clientHeight / a / S);
-	X = Y = 0;
-	S = 1;
-}
+const home = svg.getAttribute('viewBox'), fit = box => svg.setAttribute('viewBox', box);
 function zoom(by, dx = 0, dy = 0, x = stage.clientWidth / 2, y = stage.clientHeight / 2) {
 	X = x + (X - x) * by + dx;
 	Y = y + (Y - y) * by + dy;
 	S *= by;
 	svg.style.cssText = `will-change:transform;transform:translate(${X}px,${Y}px) scale(${S})`;
 	clearTimeout(idle);
-	idle = setTimeout(settle, 160);
+	idle = setTimeout(() => {
+		svg.style.cssText = '';
+		const { a, e, f } = svg.getCTM();
+		fit([(-X / S - e) / a, (-Y / S - f) / a, stage.clientWidth / a / S, stage.clientHeight / a / S]);
+		X = Y = 0;
+		S = 1;
+	}, 160);
 }
 function bring(all, k) {
 	const b = all.flatMap(i => i < N ? [boxes[i]] : ends(i).map(k => boxes[k])), low = k => Math.min(...b.map(b => b[k])), size = k => Math.max(...b.map(b => b[k] + b[k + 2])) - low(k);
+	if (!b[0]) return;
 	const w = k ? stage.clientWidth / k : size(0) + 60, h = k ? stage.clientHeight / k : size(1) + 60;
-	if (b[0]) fit(low(0) + (size(0) - w) / 2, low(1) + (size(1) - h) / 2, w, h);
+	fit([low(0) + (size(0) - w) / 2, low(1) + (size(1) - h) / 2, w, h]);
 }
-stage.onwheel = e => { e.preventDefault(); zoom(Math.exp(e.deltaY * (e.deltaMode ? -.05 : -.002)), 0, 0, e.pageX - stage.offsetLeft, e.pageY - stage.offsetTop); };
+stage.onwheel = e => { e.preventDefault(); zoom(Math.exp(e.deltaY * -.002), 0, 0, e.pageX - stage.offsetLeft, e.pageY - stage.offsetTop); };
 stage.onpointerdown = e => { old = e; far = 0; };
 stage.onpointermove = e => {
 	if (!old || !e.buttons || !e.isPrimary) return;
-	far += Math.abs(e.x - old.x) + Math.abs(e.y - old.y);
+	far++;
 	zoom(1, e.x - old.x, e.y - old.y);
 	old = e;
 };
-svg.onclick = e => far < 5 && pick(els.indexOf(e.target.closest('#items>g,#arrows>g')));
+svg.onclick = e => far < 5 && pick(els.indexOf(e.target.closest('g g')));
 
 const tenth = Math.ceil(W / 10), MOVES = { ',': -1, '.': 1, ArrowLeft: -1, ArrowRight: 1, PageUp: -tenth, PageDown: tenth, Home: -W, End: W };
 const KEYS = {
-	' ': () => play(!timer), '[': () => jump(-1), ']': () => jump(1), '+': () => zoom(1.25), '-': () => zoom(.8), f: whole,
+	' ': () => play(!timer), '[': () => jump(-1), ']': () => jump(1), '+': () => zoom(1.25), '-': () => zoom(.8), f: () => fit(home),
 	z: () => bring([...near]), c: () => bring(news), '/': () => $.q.focus(), '?': () => $.help.showModal(), Escape: () => pick(-1),
 };
 const press = (key, far) => KEYS[key] ? KEYS[key]() : go(MOVES[key] ? now + MOVES[key] * far : Math.round(last * key / 10));
@@ -157,7 +143,7 @@ onkeydown = e => {
 	const { key, target, shiftKey } = e;
 	if (e.ctrlKey || e.altKey || e.metaKey || $.help.open || target == $.speed) return;
 	if (target == $.q) {
-		if (key == 'Enter' && hits[0] >= 0) pick(hits[(hits.indexOf(sel) + (shiftKey ? hits.length - 1 : 1)) % hits.length], 1);
+		if (key == 'Enter' && hits[0] >= 0) pick(hits.at((hits.indexOf(sel) + (shiftKey ? -1 : 1)) % hits.length), 1);
 		if (key == 'Escape') target.blur();
 	} else if (!(/ |Enter/.test(key) && target.matches('button,summary,a')) && (KEYS[key] || MOVES[key] || /^\d$/.test(key))) {
 		e.preventDefault();
@@ -169,11 +155,4 @@ $.seek.oninput = () => go(+$.seek.value);
 $.speed.onchange = () => timer && play(1);
 $.q.oninput = search;
 onhashchange = load;
-
-// How much changed, window by window.
-$.bars.setAttribute('viewBox', `0 0 ${W} 60`);
-$.bars.innerHTML = each((k, list, _, m) => `<path class=${k} d="${list.map((n, w) => n ? `M${w} ${m == 2 ? 60 : 30}h1v${(m == 1 ? 1 : -1) * (5 + 22 * Math.log(n) / Math.log(9 + els.length))}h-1z` : '').join('')}"/>`);
-$.seek.max = last;
-document.body.className = 'js';
 load();
-})();

@@ -187,7 +187,7 @@ impl Arrows<'_> {
 }
 
 /// Whether a changed arrow carries a badge: not where one of its ends tells the same, and not where its rate does.
-fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
+pub(super) fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
     let rate = matches!(mark, Mark::Faster | Mark::Slower);
     let mut marks = ends.into_iter().flatten().filter_map(|end| end.mark);
     !rate && !marks.any(|m| m.class() == mark.class())

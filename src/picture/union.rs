@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::arrows::{Arrows, Track};
+use super::arrows::{Arrows, is_badged};
 use super::boxes::{Boxes, corner};
-use super::draft;
+use super::draft::{self, Tells};
 use super::page::Fit;
-use super::{Picture, badge, encoded, is_badged};
+use super::{Picture, badge, cards, encoded, tracks};
 use crate::evidence::Degree;
 use crate::geometry::{Point, Rect, Size};
 use crate::graph::State;
@@ -15,7 +15,7 @@ use crate::style::Style;
 use crate::view::{Mark, Shown};
 
 /// The whole graph, every element once and as if it were active; a painter leaves out the colours.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Union {
     /// The size of the whole.
     pub size: Size,
@@ -36,6 +36,8 @@ pub struct Part {
     pub group: Group,
     /// Whether its last text is another in other windows: a rate or a lifecycle state.
     pub is_live: bool,
+    /// Whether that text is shown only in windows in which its rate changed.
+    pub tells_changes: bool,
     /// Where an item stands; empty for an arrow.
     pub rect: Rect,
     /// Where its badge stands.
@@ -52,11 +54,22 @@ pub fn sign(style: &Style, mark: Mark) -> Group {
 }
 
 impl Picture<'_> {
+    /// How it looks.
+    pub fn style(&self) -> &Style {
+        self.sketch.style
+    }
+
+    /// Its title, such as the bag's name.
+    pub fn title_text(&self) -> &str {
+        &self.sketch.wish.title
+    }
+
     /// Everything that is ever in the picture.
     pub fn union(&self) -> Union {
         let (sketch, layout) = (&self.sketch, &self.layout);
         let fit = Fit {
             scale: 1.0,
+            pen: 1.0,
             origin: Point::default(),
         };
         let boxes = Boxes {
@@ -71,11 +84,11 @@ impl Picture<'_> {
                 .collect(),
             order: self.order.clone(),
             arrows: self.union_arrows(fit),
-            items: self.union_items(&boxes),
+            items: self.union_items(&boxes, fit),
         }
     }
 
-    fn union_items(&self, boxes: &Boxes<'_>) -> Vec<Part> {
+    fn union_items(&self, boxes: &Boxes<'_>, fit: Fit) -> Vec<Part> {
         let view = self.sketch.view;
         let mut marks = vec![BTreeSet::new(); view.items.len()];
         for shown in view.frames.iter().flat_map(|f| &f.items) {
@@ -83,18 +96,21 @@ impl Picture<'_> {
                 marks.insert(mark);
             }
         }
-        let items = view.items.iter().zip(&self.sketch.draft.labels);
-        let parts = items.zip(&self.layout.boxes).zip(marks).enumerate();
-        parts
-            .map(|(at, (((item, label), place), marks))| {
+        let cards = cards(&self.sketch, &self.layout, fit);
+        let items = view.items.iter().zip(cards).zip(marks);
+        items
+            .map(|((item, card), marks)| {
+                let label = &card.label;
                 let is_live = label.second && label.fixed.is_empty();
-                let shown = plain(is_live.then_some(1.0));
-                let id = self.item_ids[at].clone();
+                let mut shown = plain(is_live.then_some(1.0));
+                // Whatever it tells, it is a line to be filled.
+                shown.lifecycle = is_live.then(|| "-".into());
                 Part {
-                    group: boxes.item(item, label, *place, &shown, is_live, id),
+                    group: boxes.item(item, &card, &shown),
                     is_live,
-                    rect: *place,
-                    badge: corner(item.kind, *place, 1.0),
+                    tells_changes: card.tells == Tells::Changes,
+                    rect: card.place,
+                    badge: corner(item.kind, card.place, 1.0),
                     marks,
                 }
             })
@@ -116,25 +132,20 @@ impl Picture<'_> {
                     continue;
                 };
                 let ends = [arrow.from, arrow.to].map(|id| draft::find(&frame.items, id as usize));
-                if is_badged(shown, ends) {
+                if is_badged(mark, ends) {
                     marks[at].insert(mark);
                 }
             }
         }
-        let empty = crate::layout::Route::default();
-        let parts = view.arrows.iter().zip(marks).enumerate();
+        let tracks = tracks(&self.sketch, &self.layout, fit);
+        let parts = view.arrows.iter().zip(tracks).zip(&plan.links).zip(marks);
         parts
-            .map(|(at, (arrow, marks))| {
-                let room = plan.links.get(at).and_then(|link| link.label);
-                let track = Track::new(self.layout.routes.get(at).unwrap_or(&empty), room, fit);
-                let ends = [arrow.from, arrow.to].map(|id| &view.items[id as usize]);
-                let shown = plain(room.map(|_| 1.0));
-                let id = self.arrow_ids[at].clone();
-                let ends = (ends[0], ends[1]);
-                let group = arrows.arrow(arrow, ends, &track, &shown, None, false, id);
+            .map(|(((arrow, track), link), marks)| {
+                let shown = plain(link.label.map(|_| 1.0));
                 Part {
-                    group,
-                    is_live: room.is_some(),
+                    group: arrows.arrow(arrow, &track, &shown, [None; 2]),
+                    is_live: link.label.is_some(),
+                    tells_changes: false,
                     rect: Rect::default(),
                     badge: track.badge,
                     marks,

@@ -9,7 +9,9 @@ use crate::style::{Body, Change, Color, Quiet, Style};
 /// The rules of the graph: base, then how well known, how alive, what changed; a later one counts more.
 pub fn rules(style: &Style) -> String {
     let mut out = String::new();
-    out.push_str("text{text-anchor:middle}use,.off{visibility:hidden}");
+    out.push_str(
+        "text{text-anchor:middle}use,.off,.c{visibility:hidden}:is(.faster,.slower)>.c{visibility:inherit}",
+    );
     let cluster = &style.cluster;
     let _ = write!(
         out,
@@ -96,6 +98,7 @@ fn change(out: &mut String, kind: &str, change: &Change) {
         text,
         width,
         dash,
+        ..
     } = change;
     let _ = write!(
         out,
@@ -123,8 +126,8 @@ fn badges(out: &mut String, style: &Style) {
     let seen: Vec<String> = words.iter().map(|w| format!(".{w}>use.{w}")).collect();
     let _ = write!(
         out,
-        "{}{{visibility:inherit}}use .b{{stroke:{};stroke-width:1.2}}use .p{{fill:none;stroke:{s};stroke-width:2}}\
-         use .f{{fill:{s};stroke:none}}use{{fill:{}}}use.added{{fill:{}}}use.removed{{fill:{}}}",
+        "{}{{visibility:inherit}}defs .b{{stroke:{};stroke-width:1.2}}defs .p{{fill:none;stroke:{s};stroke-width:2}}\
+         defs .f{{fill:{s};stroke:none}}use{{fill:{}}}use.added{{fill:{}}}use.removed{{fill:{}}}",
         seen.join(","),
         style.badge.halo,
         style.changed.color,
