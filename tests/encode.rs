@@ -324,3 +324,105 @@ fn formats_that_hold_all_windows_refuse_a_number() {
         assert!(result.is_err_and(|e| e.is_usage()), "{name}");
     }
 }
+
+/// Whether a program of another project is there to check with; says so if not.
+fn has(program: &str) -> bool {
+    let run = Command::new(program).arg("-version").output();
+    let run = run.or_else(|_| Command::new(program).arg("-v").output());
+    if run.is_err() {
+        println!("skipped: `{program}` is not installed");
+    }
+    run.is_ok()
+}
+
+fn output_of(program: &str, arguments: &[&str]) -> String {
+    let run = Command::new(program).args(arguments).output().unwrap();
+    assert!(
+        run.status.success(),
+        "{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    String::from_utf8(run.stdout).unwrap()
+}
+
+#[test]
+fn a_pdf_has_a_page_per_window_that_looks_like_the_image() {
+    if !has("pdftoppm") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    show(folder.path(), &["a.pdf", "p{n}.png"], Options::default()).unwrap();
+    let at = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    output_of("pdftoppm", &["-r", "96", "-png", &at("a.pdf"), &at("page")]);
+    for k in 0..8 {
+        let page = png(Path::new(&at(&format!("page-{}.png", k + 1))));
+        let still = png(Path::new(&at(&format!("p{k}.png"))));
+        assert!(psnr(&still, &page) > 25.0, "page {k}");
+    }
+    assert!(!folder.path().join("page-9.png").exists());
+}
+
+#[test]
+fn a_video_shows_every_window_as_long_as_it_lasts() {
+    if !has("ffmpeg") || !has("ffprobe") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    show(
+        folder.path(),
+        &["a.mp4", "b.webm"],
+        Options {
+            tween: 2,
+            ..Options::default()
+        },
+    )
+    .unwrap();
+    for name in ["a.mp4", "b.webm"] {
+        let path = folder.path().join(name).to_string_lossy().into_owned();
+        let entries = "stream=width,height:format=duration";
+        let told = output_of(
+            "ffprobe",
+            &[
+                "-v",
+                "error",
+                "-show_entries",
+                entries,
+                "-of",
+                "csv=p=0",
+                &path,
+            ],
+        );
+        assert_eq!(
+            told.split_whitespace().collect::<Vec<_>>(),
+            ["240,100", "8.000000"],
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_poster_is_the_first_image_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    show(folder.path(), &["p{n}.png"], Options::default()).unwrap();
+    let poster = Output::poster(&folder.path().join("poster.png"));
+    let written = shown(&[poster], Options::default()).unwrap();
+    assert_eq!(written[0].files, 1);
+    assert_eq!(
+        png(&folder.path().join("poster.png")),
+        png(&folder.path().join("p0.png"))
+    );
+}
+
+#[test]
+fn a_folder_that_vanishes_is_told_and_nothing_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = folder.path().join("gone");
+    let outputs = [Output::parse(&inside.join("a.gif").to_string_lossy(), None).unwrap()];
+    let vanish = &mut |_: usize, _: usize| {
+        let _ = fs::remove_dir_all(&inside);
+        ControlFlow::Continue(())
+    };
+    let error = run(&outputs, Options::default(), vanish).unwrap_err();
+    assert!(error.to_string().contains("a.gif"), "{error}");
+    assert_eq!(names(folder.path()), Vec::<String>::new());
+}

@@ -147,7 +147,9 @@ impl Video<'_> {
         // Most players want even sides: the picture goes on in the colour of its corner.
         let [r, g, b] = pixels.rgba.first_chunk().copied().unwrap_or([255; 3]);
         let pad = format!("pad=ceil(iw/2)*2:ceil(ih/2)*2:color=0x{r:02x}{g:02x}{b:02x}");
-        command.args(["-vf", &pad, "-r", &rate.max(FEWEST_PER_SECOND).to_string()]);
+        // The filter, unlike `-r`, shows the last frame as long as the others.
+        let fps = rate.max(FEWEST_PER_SECOND);
+        command.args(["-vf", &format!("fps={fps},{pad}")]);
         // No version and no time in the file: the same film gives the same bytes.
         command.args([
             "-fflags",
@@ -253,6 +255,5 @@ fn step(shots: &[Shot]) -> u32 {
         if b == 0 { a } else { common(b, a % b) }
     }
     let step = shots.iter().map(|s| s.ms).fold(0, common);
-    // A window may stand for a second and more; a step so long would leave players waiting.
-    if step < FINEST_MS { FINEST_MS } else { step }
+    step.max(FINEST_MS)
 }
