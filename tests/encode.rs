@@ -3,6 +3,7 @@
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use bagreel::encode::{Output, Written};
 use bagreel::error::{Error, Result};
@@ -90,21 +91,34 @@ fn mission(windows: usize) -> (Evolution, View) {
 
 /// Shows a mission of eight windows to these outputs, all in `folder`.
 fn show(folder: &Path, names: &[&str], options: Options) -> Result<Vec<Written>> {
+    let output = |name: &&str| Output::parse(&folder.join(name).to_string_lossy(), None);
+    shown(
+        &names.iter().map(output).collect::<Result<Vec<_>>>()?,
+        options,
+    )
+}
+
+fn shown(outputs: &[Output], options: Options) -> Result<Vec<Written>> {
+    run(outputs, options, &mut |_, _| ControlFlow::Continue(()))
+}
+
+fn run(
+    outputs: &[Output],
+    options: Options,
+    progress: &mut reel::Progress<'_>,
+) -> Result<Vec<Written>> {
     let (evolution, view) = mission(8);
     let fonts = Fonts::bundled();
-    let painter = Painter::new(&fonts);
     let film = Film {
         evolution: &evolution,
         view: &view,
         picture: &Discs,
-        painter: &painter,
+        painter: &Painter::new(&fonts),
         fonts: &fonts,
         strip: None,
         options,
     };
-    let output = |name: &&str| Output::parse(&folder.join(name).to_string_lossy(), None);
-    let outputs: Vec<Output> = names.iter().map(output).collect::<Result<_>>()?;
-    reel::run(&film, &outputs, &mut |_, _| ControlFlow::Continue(()))
+    reel::run(&film, outputs, progress)
 }
 
 fn png(path: &Path) -> image::RgbImage {
@@ -216,12 +230,13 @@ fn two_runs_write_the_same_bytes() {
         "s{n}.svg",
         "d.json",
         "t.csv",
+        "e.pdf",
     ];
     for folder in &folders {
         show(folder.path(), &outputs, Options::default()).unwrap();
     }
     let files = names(folders[0].path());
-    assert_eq!(files.len(), 2 + 3 * 8 + 1 + 5);
+    assert_eq!(files.len(), 3 + 3 * 8 + 1 + 5);
     assert_eq!(files, names(folders[1].path()));
     for file in files {
         let [a, b] = folders
@@ -279,27 +294,11 @@ fn a_limit_in_bytes_is_kept_and_what_was_given_up_is_said() {
 #[test]
 fn an_interrupted_run_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
-    let (evolution, view) = mission(100);
-    let fonts = Fonts::bundled();
-    let painter = Painter::new(&fonts);
-    let options = Options::default();
-    let film = Film {
-        evolution: &evolution,
-        view: &view,
-        picture: &Discs,
-        painter: &painter,
-        fonts: &fonts,
-        strip: None,
-        options,
-    };
     let output =
         |name: &str| Output::parse(&folder.path().join(name).to_string_lossy(), None).unwrap();
     let outputs = [output("a.gif"), output("b.apng"), output("d.json")];
-    let after_some = &mut |done, _| match done {
-        0..10 => ControlFlow::Continue(()),
-        _ => ControlFlow::Break(()),
-    };
-    let result = reel::run(&film, &outputs, after_some);
+    let at_once = &mut |_: usize, _: usize| ControlFlow::Break(());
+    let result = run(&outputs, Options::default(), at_once);
     assert!(matches!(result, Err(Error::Interrupted)));
     assert_eq!(names(folder.path()), Vec::<String>::new());
 }
