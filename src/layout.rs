@@ -3,11 +3,14 @@
 //! An engine sees sizes and connections only, never colours, rates or changes.
 
 mod acyclic;
+mod cut;
 mod layered;
 mod order;
 mod pack;
+mod parts;
 mod place;
 mod rank;
+mod room;
 mod route;
 
 use crate::error::{Error, Result};
@@ -187,6 +190,47 @@ impl Plan {
     }
 }
 
+impl Layout {
+    /// Nothing at all.
+    fn empty() -> Self {
+        Self {
+            orientation: Orientation::LeftRight,
+            size: Size::default(),
+            boxes: Vec::new(),
+            routes: Vec::new(),
+            clusters: Vec::new(),
+            remarks: Vec::new(),
+        }
+    }
+}
+
+impl Route {
+    /// Every point that shapes it, from its start on.
+    fn points(&self) -> impl DoubleEndedIterator<Item = Point> {
+        std::iter::once(self.start).chain(self.curves.iter().flatten().copied())
+    }
+
+    /// This route with every point moved.
+    fn mapped(&self, f: impl Fn(Point) -> Point) -> Self {
+        Self {
+            start: f(self.start),
+            curves: self.curves.iter().map(|curve| curve.map(&f)).collect(),
+            label: self.label.map(&f),
+        }
+    }
+
+    /// This route from its end to its start.
+    fn backwards(&self) -> Self {
+        let points: Vec<Point> = self.points().rev().collect();
+        let pieces = points[1..].chunks_exact(3);
+        Self {
+            start: points[0],
+            curves: pieces.map(|piece| [piece[0], piece[1], piece[2]]).collect(),
+            label: self.label,
+        }
+    }
+}
+
 impl Wish {
     fn sane(&self) -> Self {
         let page = sane_size(self.page);
@@ -209,6 +253,26 @@ fn sane_size(size: Size) -> Size {
     Size::new(sane(size.w), sane(size.h))
 }
 
+/// Vertices that belong together, by links or by a shared namespace. Everything in it is told by places in `vertices`;
+/// cluster `i + 1` is `clusters[i]` of the plan, and 0 is the outside.
+#[derive(Clone, Debug, Default)]
+struct Part {
+    /// The places of its vertices in the plan, growing.
+    vertices: Vec<usize>,
+    /// The places of its links in the plan, growing.
+    links: Vec<usize>,
+    /// The places of its clusters in the plan, growing.
+    clusters: Vec<usize>,
+    /// The ends of each link.
+    ends: Vec<(usize, usize)>,
+    /// The innermost cluster of each vertex.
+    home: Vec<usize>,
+    /// The cluster around each cluster; the outside is its own.
+    parent: Vec<usize>,
+    /// The first vertex that links join with each vertex.
+    pieces: Vec<usize>,
+}
+
 /// What an item of a layer stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -225,8 +289,8 @@ enum Kind {
 /// The items of each layer, in order across.
 type Rows = Vec<Vec<usize>>;
 
-/// One component cut into layers: what the steps of the layered engine hand on. `along` is the way the edges run,
-/// `across` the way along a layer. Items `0..vertices` are the vertices; bends and borders follow.
+/// One part cut into layers: what the steps of the layered engine hand on. `along` is the way the edges run, `across`
+/// the way along a layer. Items `0..vertices` are the vertices; bends and borders follow.
 #[derive(Clone, Debug, Default)]
 struct Layers {
     /// How many items are vertices.
@@ -247,13 +311,32 @@ struct Layers {
     parent: Vec<usize>,
     /// The first and last layer of each cluster.
     span: Vec<(usize, usize)>,
-    /// The top and bottom border of each cluster in its first layer; the next layers' follow.
+    /// The top and bottom border of each cluster in its first layer; those in its next layers follow, two by two.
     borders: Vec<(usize, usize)>,
     /// How many layers.
     ranks: usize,
 }
 
 impl Layers {
+    /// The same layers without borders and as if no cluster were there.
+    fn without_clusters(&self) -> Self {
+        let border = |kind: &Kind| matches!(kind, Kind::Top | Kind::Bottom);
+        let n = self.kind.iter().position(border).unwrap_or(self.kind.len());
+        Self {
+            vertices: self.vertices,
+            kind: self.kind[..n].to_vec(),
+            rank: self.rank[..n].to_vec(),
+            home: vec![0; n],
+            up: self.up[..n].to_vec(),
+            down: self.down[..n].to_vec(),
+            chains: Vec::new(),
+            parent: vec![0],
+            span: Vec::new(),
+            borders: Vec::new(),
+            ranks: self.ranks,
+        }
+    }
+
     /// The cluster of `item` that is a child of `around`; `None` if the item stands directly in it.
     fn child(&self, around: usize, item: usize) -> Option<usize> {
         let mut cluster = self.home[item];
@@ -264,5 +347,63 @@ impl Layers {
             cluster = self.parent[cluster];
         }
         Some(cluster)
+    }
+}
+
+/// The growing sequence nearest to the goals in weighted squares, by pooling adjacent violators.
+fn monotone(goal: &[f64], weight: &[f64]) -> Vec<f64> {
+    let mut pools: Vec<(f64, f64, usize)> = Vec::with_capacity(goal.len());
+    for (&g, &w) in goal.iter().zip(weight) {
+        let mut pool = (g * w, w, 1);
+        while let Some(&(sum, weight, count)) = pools.last() {
+            if sum / weight <= pool.0 / pool.1 {
+                break;
+            }
+            pools.pop();
+            pool = (pool.0 + sum, pool.1 + weight, pool.2 + count);
+        }
+        pools.push(pool);
+    }
+    pools
+        .into_iter()
+        .flat_map(|(sum, weight, count)| std::iter::repeat_n(sum / weight, count))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn vertex(cluster: Option<usize>) -> Vertex {
+        Vertex {
+            size: Size::new(80.0, 30.0),
+            outline: Outline::Box,
+            cluster,
+        }
+    }
+
+    pub(super) fn link(from: usize, to: usize) -> Link {
+        Link {
+            from,
+            to,
+            label: None,
+        }
+    }
+
+    pub(super) fn cluster(parent: Option<usize>) -> Cluster {
+        Cluster {
+            parent,
+            title: Size::new(40.0, 14.0),
+        }
+    }
+
+    #[test]
+    fn a_sequence_that_grows_stays() {
+        assert_eq!(monotone(&[1.0, 2.0, 4.0], &[1.0; 3]), [1.0, 2.0, 4.0]);
+    }
+
+    #[test]
+    fn violators_meet_at_their_weighted_mean() {
+        assert_eq!(monotone(&[4.0, 1.0], &[1.0, 2.0]), [2.0, 2.0]);
     }
 }

@@ -1,5 +1,8 @@
 //! Which edges to turn around so that no cycle is left.
 
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+
 /// The edges to reverse when each edge in turn is reversed if and only if it closes a cycle with those before it.
 pub(super) fn in_order(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     let mut after: Vec<Vec<usize>> = vec![Vec::new(); n];
@@ -40,6 +43,40 @@ fn reaches(
     false
 }
 
+/// The edges to reverse when all edges between two clusters must run one way; pairs with more edges choose first.
+/// `home` is the innermost cluster of each item, `parent` the cluster around each, with 0 for the outside.
+pub(super) fn by_cluster(edges: &[(usize, usize)], home: &[usize], parent: &[usize]) -> Vec<bool> {
+    let sides: Vec<(usize, usize)> = edges
+        .iter()
+        .map(|&ends| parting(ends, home, parent))
+        .collect();
+    let mut pairs: BTreeMap<(usize, usize), (Reverse<usize>, usize)> = BTreeMap::new();
+    for (i, &pair) in sides.iter().enumerate() {
+        pairs.entry(pair).or_insert((Reverse(0), i)).0.0 += 1;
+    }
+    let mut order: Vec<_> = pairs.into_iter().collect();
+    order.sort_by_key(|&(_, rank)| rank);
+    let pairs: Vec<(usize, usize)> = order.into_iter().map(|(pair, _)| pair).collect();
+    let turns = in_order(home.len() + parent.len(), &pairs);
+    let turn: BTreeMap<_, _> = pairs.into_iter().zip(turns).collect();
+    sides
+        .iter()
+        .map(|pair| turn.get(pair).copied().unwrap_or(false))
+        .collect()
+}
+
+/// What an edge leaves and enters inside the innermost cluster around both of its ends: a vertex `v` or a cluster `c`,
+/// told as `home.len() + c`.
+fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usize, usize) {
+    let (mut a, mut b) = ((from, home[from]), (to, home[to]));
+    while a.1 != b.1 {
+        // Parents have smaller numbers than their children.
+        let deeper = if a.1 > b.1 { &mut a } else { &mut b };
+        *deeper = (home.len() + deeper.1, parent[deeper.1]);
+    }
+    (a.0, b.0)
+}
+
 /// The edges to reverse by the greedy order of Eades, Lin and Smyth (1993): sinks last, sources first, then whatever
 /// has the most outgoing edges to spare.
 pub(super) fn greedy(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
@@ -58,16 +95,14 @@ fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     }
     let mut outgoing: Vec<usize> = after.iter().map(Vec::len).collect();
     let mut incoming: Vec<usize> = before.iter().map(Vec::len).collect();
-    let mut left: std::collections::BTreeSet<usize> = (0..n).collect();
+    let mut left: BTreeSet<usize> = (0..n).collect();
     let (mut first, mut last) = (Vec::new(), Vec::new());
     while !left.is_empty() {
         let sink = left.iter().find(|&&v| outgoing[v] == 0).copied();
         let source = || left.iter().find(|&&v| incoming[v] == 0).copied();
         let busiest = || {
             let spare = |v: usize| (outgoing[v] + n) - incoming[v].min(outgoing[v] + n);
-            left.iter()
-                .copied()
-                .max_by_key(|&v| (spare(v), std::cmp::Reverse(v)))
+            left.iter().copied().max_by_key(|&v| (spare(v), Reverse(v)))
         };
         let Some(v) = sink.or_else(source).or_else(busiest) else {
             break;

@@ -1,69 +1,165 @@
 //! The order of the items in each layer: barycentre and median sweeps with transposition, fewest crossings kept.
 //!
-//! Members of a cluster stay side by side between its borders, and two clusters keep their order in all layers that
-//! they share, so that their boxes can be drawn apart.
+//! Members of a cluster stay side by side between its borders, like words in brackets, and two clusters keep their
+//! order in all layers that they share, so that their boxes can be drawn apart.
 
-use super::place::monotone;
-use super::{Kind, Layers, Rows};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 
-/// The best order found from several starts, and its number of crossings. `effort` is the number of sweeps per start.
+use super::{Kind, Layers, Rows, monotone};
+
+/// How often one order is swept at most, and after how many sweeps without gain it is given up.
+const SWEEPS: usize = 24;
+const PATIENCE: usize = 6;
+
+/// The best order found and its number of crossings, borders of clusters included. `effort` counts edges swept: the
+/// search begins anew, then shakes the best order, until it is spent.
 pub(super) fn order(layers: &Layers, effort: usize) -> (Rows, u64) {
-    (0..2)
-        .map(|start| from_start(layers, start, effort))
-        .reduce(|best, next| if next.1 < best.1 { next } else { best })
-        .unwrap_or_default()
+    let mut search = Search {
+        layers,
+        effort,
+        best: (Rows::new(), u64::MAX),
+    };
+    search.improve(&depth_first(layers, true), true);
+    if search.effort > 0 {
+        search.improve_flat();
+    }
+    if search.effort > 0 {
+        search.improve(&depth_first(layers, false), false);
+    }
+    let mut dice = Dice(1);
+    while search.effort > 0 && search.best.1 > 0 {
+        let shaken = search.shaken(&mut dice);
+        search.improve(&shaken, dice.throw() > 0.0);
+    }
+    search.best
 }
 
-fn from_start(layers: &Layers, start: usize, effort: usize) -> (Rows, u64) {
-    let mut sorter = Sorter::new(layers, &depth_first(layers, start == 0));
-    let mut best = (sorter.rows.clone(), sorter.crossings());
-    let mut stalled = 0;
-    for sweep in 0..effort {
-        sorter.sweep(sweep % 2 == 0, sweep % 4 >= 2);
-        sorter.transpose();
-        let crossings = sorter.crossings();
-        if crossings < best.1 {
-            best = (sorter.rows.clone(), crossings);
-            stalled = 0;
-        } else {
+/// A search for an order with few crossings.
+struct Search<'a> {
+    layers: &'a Layers,
+    effort: usize,
+    best: (Rows, u64),
+}
+
+impl Search<'_> {
+    /// Sorts by these keys and sweeps while that gains something.
+    fn improve(&mut self, key: &[f64], downwards: bool) {
+        let edges = self.layers.rank.len();
+        let mut sorter = Sorter::new(self.layers, key);
+        let mut found = (sorter.rows.clone(), sorter.crossings());
+        let mut stalled = 0;
+        for sweep in 0..SWEEPS {
+            sorter.sweep((sweep % 2 == 0) == downwards, sweep % 4 >= 2);
+            sorter.transpose();
+            self.effort = self.effort.saturating_sub(edges);
+            let crossings = sorter.crossings();
             stalled += 1;
+            if crossings < found.1 {
+                found = (sorter.rows.clone(), crossings);
+                stalled = 0;
+            }
+            if stalled > PATIENCE || found.1 == 0 {
+                break;
+            }
         }
-        if stalled > 8 || best.1 == 0 {
-            break;
+        if found.1 <= self.best.1 {
+            self.best = found;
         }
     }
-    best
+
+    /// Begins with the best order that disregards clusters.
+    fn improve_flat(&mut self) {
+        if self.layers.parent.len() < 2 {
+            return;
+        }
+        let flat = self.layers.without_clusters();
+        let mut search = Search {
+            layers: &flat,
+            effort: self.effort,
+            best: (Rows::new(), u64::MAX),
+        };
+        search.improve(&depth_first(&flat, false), true);
+        self.effort = search.effort;
+        let mut key = vec![f64::NAN; self.layers.rank.len()];
+        for row in &search.best.0 {
+            for (i, &v) in row.iter().enumerate() {
+                key[v] = i as f64 - row.len() as f64 / 2.0;
+            }
+        }
+        self.improve(&key, true);
+    }
+
+    /// Keys near the places of the best rows, with some clusters and a few items thrown elsewhere.
+    fn shaken(&self, dice: &mut Dice) -> Vec<f64> {
+        let rows = &self.best.0;
+        let widest = rows.iter().map(Vec::len).max().unwrap_or(0) as f64;
+        let mut throw = |odds: f64| {
+            if dice.throw() + 0.5 < odds {
+                dice.throw() * widest
+            } else {
+                0.0
+            }
+        };
+        let shift: Vec<f64> = self.layers.parent.iter().map(|_| throw(0.3)).collect();
+        let mut key = vec![0.0; self.layers.rank.len()];
+        for row in rows {
+            for (i, &v) in row.iter().enumerate() {
+                key[v] = i as f64 - row.len() as f64 / 2.0 + throw(0.05);
+                let mut cluster = self.layers.home[v];
+                while cluster != 0 {
+                    key[v] += shift[cluster];
+                    cluster = self.layers.parent[cluster];
+                }
+            }
+        }
+        key
+    }
 }
 
-/// When a walk through the graph meets each item; it starts from the sources or from the sinks.
+/// The same throws on every machine: Knuth's linear congruence.
+struct Dice(u64);
+
+impl Dice {
+    /// A number from -0.5 to 0.5.
+    fn throw(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+    }
+}
+
+/// When a walk through the graph meets each item; it begins at the sources, or at the sinks.
 fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
     let n = layers.rank.len();
     let ends = if sources { &layers.up } else { &layers.down };
-    let mut met = vec![None; n];
+    let mut met = vec![f64::NAN; n];
     let mut clock = 0.0;
-    let starts = (0..n).filter(|&v| ends[v].is_empty()).chain(0..n);
-    for start in starts {
-        let mut stack = vec![start];
+    for begin in (0..n).filter(|&v| ends[v].is_empty()).chain(0..n) {
+        let mut stack = vec![begin];
         while let Some(v) = stack.pop() {
-            if met[v].is_some() {
-                continue;
+            if met[v].is_nan() {
+                met[v] = clock;
+                clock += 1.0;
+                stack.extend(
+                    layers.down[v]
+                        .iter()
+                        .chain(&layers.up[v])
+                        .filter(|&&u| met[u].is_nan()),
+                );
             }
-            met[v] = Some(clock);
-            clock += 1.0;
-            stack.extend(
-                layers.down[v]
-                    .iter()
-                    .chain(&layers.up[v])
-                    .filter(|&&u| met[u].is_none()),
-            );
         }
     }
-    met.into_iter().map(Option::unwrap_or_default).collect()
+    met
 }
 
-/// What moves as one within a cluster in a layer: an item, or a whole cluster inside.
+/// What moves as one inside its cluster: an item, or a whole cluster from its top to its bottom border.
+#[derive(Clone, Copy)]
 struct Unit {
-    items: Vec<usize>,
+    start: usize,
+    end: usize,
     cluster: Option<usize>,
 }
 
@@ -73,179 +169,155 @@ struct Sorter<'a> {
     rows: Rows,
     /// The place of each item in its row.
     place: Vec<usize>,
-    /// The order of the clusters met in this sweep; those that share a layer keep it.
+    /// Where each item wants to be; NaN for anywhere.
+    key: Vec<f64>,
+    /// The sorted places of the neighbours of each item, before and after; filled where needed.
+    near: Vec<[Vec<usize>; 2]>,
+    /// The clusters met in this sweep, in their order; and where each stands in it.
     clusters: Vec<usize>,
+    turn: Vec<Option<usize>>,
 }
 
 impl<'a> Sorter<'a> {
     fn new(layers: &'a Layers, key: &[f64]) -> Self {
-        let mut rows = vec![Vec::new(); layers.ranks];
-        for v in 0..layers.rank.len() {
-            rows[layers.rank[v]].push(v);
+        let n = layers.rank.len();
+        let mut flat = vec![Vec::new(); layers.ranks];
+        for v in 0..n {
+            flat[layers.rank[v]].push(v);
         }
         let mut sorter = Self {
             layers,
-            rows,
-            place: vec![0; layers.rank.len()],
+            rows: flat
+                .into_iter()
+                .map(|row| bracketed(layers, 0, row))
+                .collect(),
+            place: vec![0; n],
+            key: key.to_vec(),
+            near: vec![Default::default(); n],
             clusters: Vec::new(),
+            turn: vec![None; layers.parent.len()],
         };
         for rank in 0..layers.ranks {
-            let keys: Vec<Option<f64>> = sorter.rows[rank].iter().map(|&v| Some(key[v])).collect();
-            sorter.sort_row(rank, &keys);
+            sorter.sort_row(rank);
         }
         sorter
     }
 
-    /// Sorts every row by its neighbours in the row before (or after).
+    /// Sorts every row by its neighbours in the row before it, in the direction of the sweep.
     fn sweep(&mut self, downwards: bool, median: bool) {
         self.clusters.clear();
-        let neighbours = if downwards {
-            &self.layers.up
-        } else {
-            &self.layers.down
-        };
+        self.turn.fill(None);
+        let side = usize::from(!downwards);
         for step in 0..self.layers.ranks {
             let rank = if downwards {
                 step
             } else {
                 self.layers.ranks - 1 - step
             };
-            let keys: Vec<Option<f64>> = self.rows[rank]
-                .iter()
-                .map(|&v| centre(self.places(&neighbours[v]), median))
-                .collect();
-            self.sort_row(rank, &keys);
+            self.look(rank, side);
+            for &v in &self.rows[rank] {
+                self.key[v] = centre(&self.near[v][side], median);
+            }
+            self.sort_row(rank);
         }
     }
 
-    /// The sorted places of these items.
-    fn places(&self, items: &[usize]) -> Vec<usize> {
-        let mut places: Vec<usize> = items.iter().map(|&u| self.place[u]).collect();
-        places.sort_unstable();
-        places
+    /// Fills in the places of the neighbours of a row on one side.
+    fn look(&mut self, rank: usize, side: usize) {
+        let neighbours = if side == 0 {
+            &self.layers.up
+        } else {
+            &self.layers.down
+        };
+        for &v in &self.rows[rank] {
+            let near = &mut self.near[v][side];
+            near.clear();
+            near.extend(neighbours[v].iter().map(|&u| self.place[u]));
+            near.sort_unstable();
+        }
     }
 
-    /// Sorts one row by a key per item of the row; items without a key stay behind the one before them.
-    fn sort_row(&mut self, rank: usize, keys: &[Option<f64>]) {
-        let row = std::mem::take(&mut self.rows[rank]);
-        let mut key = std::collections::BTreeMap::new();
-        for (&v, k) in row.iter().zip(keys) {
-            key.insert(v, *k);
-        }
-        let sorted = self.sorted(0, row, &key);
-        for (i, &v) in sorted.iter().enumerate() {
+    fn sort_row(&mut self, rank: usize) {
+        let mut row = std::mem::take(&mut self.rows[rank]);
+        self.sort(&mut row);
+        for (i, &v) in row.iter().enumerate() {
             self.place[v] = i;
         }
-        self.rows[rank] = sorted;
+        self.rows[rank] = row;
     }
 
-    fn sorted(&mut self, around: usize, items: Vec<usize>, key: &Keys) -> Vec<usize> {
-        let units = units(self.layers, around, items);
+    /// Sorts what stands directly in one cluster by key, and inside what is a cluster itself.
+    fn sort(&mut self, items: &mut [usize]) {
+        let units = units(self.layers, items);
+        let mut keys = Vec::with_capacity(units.len());
         let mut last = -1.0;
-        let mut keyed: Vec<(f64, Unit)> = Vec::with_capacity(units.len());
-        for unit in units {
-            last = mean(unit.items.iter().filter_map(|v| key[v])).unwrap_or(last);
-            keyed.push((last, unit));
-        }
-        self.respect_clusters(&mut keyed);
-        let mut result = Vec::new();
-        for (_, unit) in keyed {
-            match unit.cluster {
-                Some(cluster) => result.extend(self.sorted_cluster(cluster, unit.items, key)),
-                None => result.extend(unit.items),
+        for unit in &units {
+            if unit.cluster.is_some() {
+                self.sort(&mut items[unit.start + 1..unit.end - 1]);
             }
+            // Without a wish, a unit stays behind the one before it.
+            let wishes = items[unit.start..unit.end].iter().map(|&v| self.key[v]);
+            last = mean(wishes.filter(|key| !key.is_nan())).unwrap_or(last);
+            keys.push(last);
         }
-        result
+        let old = items.to_vec();
+        let mut at = 0;
+        for i in self.sorted(&units, &mut keys) {
+            let unit = &old[units[i].start..units[i].end];
+            items[at..at + unit.len()].copy_from_slice(unit);
+            at += unit.len();
+        }
     }
 
-    /// The items of one cluster in a row: its top border, what is inside, its bottom border.
-    fn sorted_cluster(&mut self, cluster: usize, items: Vec<usize>, key: &Keys) -> Vec<usize> {
-        let kind = |v: usize, kind| self.layers.home[v] == cluster && self.layers.kind[v] == kind;
-        let (mut top, mut bottom, mut inside) = (Vec::new(), Vec::new(), Vec::new());
-        for v in items {
-            if kind(v, Kind::Top) {
-                top.push(v);
-            } else if kind(v, Kind::Bottom) {
-                bottom.push(v);
-            } else {
-                inside.push(v);
-            }
-        }
-        top.extend(self.sorted(cluster, inside, key));
-        top.extend(bottom);
-        top
-    }
-
-    /// Sorts units by key, after the keys of clusters have been made to grow in their order.
-    fn respect_clusters(&mut self, units: &mut [(f64, Unit)]) {
-        let place = |clusters: &[usize], c: usize| clusters.iter().position(|&other| other == c);
-        let mut known: Vec<(usize, usize)> = units
+    /// The units by key, after the keys of clusters met before have been made to grow in their order.
+    fn sorted(&mut self, units: &[Unit], keys: &mut [f64]) -> Vec<usize> {
+        let turn = |i: usize| units[i].cluster.and_then(|c| self.turn[c]);
+        let mut known: Vec<usize> = (0..units.len()).filter(|&i| turn(i).is_some()).collect();
+        known.sort_unstable_by_key(|&i| turn(i));
+        let wishes: Vec<f64> = known.iter().map(|&i| keys[i]).collect();
+        for (&i, key) in known
             .iter()
-            .enumerate()
-            .filter_map(|(i, (_, unit))| Some((place(&self.clusters, unit.cluster?)?, i)))
-            .collect();
-        known.sort_unstable();
-        let keys: Vec<f64> = known.iter().map(|&(_, i)| units[i].0).collect();
-        for (&(_, i), key) in known.iter().zip(monotone(&keys, &vec![1.0; keys.len()])) {
-            units[i].0 = key;
+            .zip(monotone(&wishes, &vec![1.0; wishes.len()]))
+        {
+            keys[i] = key;
         }
-        let mut tie: Vec<usize> = vec![0; units.len()];
-        for (order, &(_, i)) in known.iter().enumerate() {
-            tie[i] = 2 * order;
+        // Ties: items first, then known clusters in their order, each new cluster behind those that it does not precede.
+        let mut tie: Vec<usize> = (0..units.len()).map(|_| 0).collect();
+        for (order, &i) in known.iter().enumerate() {
+            tie[i] = 2 * order + 2;
         }
-        // A new cluster goes behind the known ones that its key does not precede.
-        for (i, (key, unit)) in units.iter().enumerate() {
-            if unit.cluster.is_none() || known.iter().any(|&(_, k)| k == i) {
-                continue;
-            }
-            let before = known.iter().filter(|&&(_, k)| units[k].0 <= *key).count();
-            tie[i] = (2 * before).saturating_sub(1);
+        for i in (0..units.len()).filter(|&i| units[i].cluster.is_some() && turn(i).is_none()) {
+            tie[i] = 1 + 2 * known.partition_point(|&k| keys[k] <= keys[i]);
         }
         let mut order: Vec<usize> = (0..units.len()).collect();
         order.sort_by(|&a, &b| {
-            let class = |i: usize| (units[i].1.cluster.is_some(), tie[i], i);
-            units[a]
-                .0
-                .total_cmp(&units[b].0)
-                .then(class(a).cmp(&class(b)))
+            keys[a]
+                .total_cmp(&keys[b])
+                .then(tie[a].cmp(&tie[b]))
+                .then(a.cmp(&b))
         });
-        self.learn(order.iter().filter_map(|&i| units[i].1.cluster));
-        let mut slots: Vec<Option<(f64, Unit)>> = Vec::new();
-        for unit in units.iter_mut() {
-            slots.push(Some((
-                unit.0,
-                std::mem::replace(
-                    &mut unit.1,
-                    Unit {
-                        items: Vec::new(),
-                        cluster: None,
-                    },
-                ),
-            )));
-        }
-        for (slot, from) in units.iter_mut().zip(order) {
-            if let Some(unit) = slots[from].take() {
-                *slot = unit;
-            }
-        }
+        self.learn(order.iter().filter_map(|&i| units[i].cluster).collect());
+        order
     }
 
     /// Enters clusters that are new into the order, each behind the one before it.
-    fn learn(&mut self, row: impl Iterator<Item = usize>) {
-        let mut at = None;
-        let mut waiting = Vec::new();
+    fn learn(&mut self, row: Vec<usize>) {
+        if row.iter().all(|&c| self.turn[c].is_some()) {
+            return;
+        }
+        let first = row.iter().find_map(|&c| self.turn[c]);
+        let mut at = first.unwrap_or(self.clusters.len());
         for cluster in row {
-            if let Some(place) = self.clusters.iter().position(|&c| c == cluster) {
-                self.clusters.splice(place..place, waiting.drain(..));
-                at = self.clusters.iter().position(|&c| c == cluster);
-            } else if let Some(place) = at {
-                self.clusters.insert(place + 1, cluster);
-                at = Some(place + 1);
-            } else {
-                waiting.push(cluster);
+            if let Some(turn) = self.turn[cluster] {
+                at = turn + 1;
+                continue;
+            }
+            self.clusters.insert(at, cluster);
+            at += 1;
+            for (turn, &c) in self.clusters.iter().enumerate() {
+                self.turn[c] = Some(turn);
             }
         }
-        self.clusters.extend(waiting);
     }
 
     /// Swaps neighbours in a row while that saves crossings.
@@ -253,9 +325,16 @@ impl<'a> Sorter<'a> {
         for _ in 0..3 {
             let mut better = false;
             for rank in 0..self.layers.ranks {
-                let row = self.rows[rank].clone();
-                let mut at = 0;
-                better |= self.transpose_in(rank, 0, row, &mut at);
+                self.look(rank, 0);
+                self.look(rank, 1);
+                let mut row = std::mem::take(&mut self.rows[rank]);
+                if self.transpose_in(&mut row) {
+                    better = true;
+                    for (i, &v) in row.iter().enumerate() {
+                        self.place[v] = i;
+                    }
+                }
+                self.rows[rank] = row;
             }
             if !better {
                 break;
@@ -263,65 +342,62 @@ impl<'a> Sorter<'a> {
         }
     }
 
-    /// Swaps neighbours that stand directly in one cluster; two clusters are never swapped.
-    fn transpose_in(
-        &mut self,
-        rank: usize,
-        around: usize,
-        items: Vec<usize>,
-        at: &mut usize,
-    ) -> bool {
-        let mut units = units(self.layers, around, items);
-        let mut sides: Vec<[Vec<usize>; 2]> =
-            units.iter().map(|unit| self.sides(&unit.items)).collect();
+    /// Swaps neighbours that stand directly in one cluster, and inside clusters; two clusters are never swapped.
+    fn transpose_in(&self, items: &mut [usize]) -> bool {
         let mut better = false;
-        for i in 1..units.len() {
-            let fixed = |unit: &Unit| unit.cluster.is_none() && self.is_border(unit.items[0]);
-            let swappable = match (&units[i - 1], &units[i]) {
-                (a, b) if a.cluster.is_some() && b.cluster.is_some() => false,
-                (a, b) => !fixed(a) && !fixed(b),
-            };
-            if swappable && saves(&sides[i - 1], &sides[i]) {
-                units.swap(i - 1, i);
-                sides.swap(i - 1, i);
-                better = true;
+        let mut before: Option<Unit> = None;
+        for unit in units(self.layers, items) {
+            if unit.cluster.is_some() {
+                better |= self.transpose_in(&mut items[unit.start + 1..unit.end - 1]);
             }
-        }
-        for unit in units {
-            match unit.cluster {
-                Some(cluster) => better |= self.transpose_in(rank, cluster, unit.items, at),
-                None => {
-                    for v in unit.items {
-                        self.rows[rank][*at] = v;
-                        self.place[v] = *at;
-                        *at += 1;
-                    }
-                }
+            let left = before.filter(|left| left.cluster.is_none() || unit.cluster.is_none());
+            if let Some(left) = left.filter(|left| {
+                self.saves(&items[left.start..left.end], &items[unit.start..unit.end])
+            }) {
+                items[left.start..unit.end].rotate_left(left.end - left.start);
+                // The left unit now stands behind this one and may move on.
+                let start = left.start + unit.end - unit.start;
+                before = Some(Unit {
+                    start,
+                    end: unit.end,
+                    ..left
+                });
+                better = true;
+            } else {
+                before = Some(unit);
             }
         }
         better
     }
 
-    fn is_border(&self, item: usize) -> bool {
-        matches!(self.layers.kind[item], Kind::Top | Kind::Bottom)
+    /// Whether swapping two neighbours saves crossings.
+    fn saves(&self, first: &[usize], second: &[usize]) -> bool {
+        let (mut now, mut then) = (0, 0);
+        for side in 0..2 {
+            let (first, second) = (self.places(first, side), self.places(second, side));
+            now += inversions(&first, &second);
+            then += inversions(&second, &first);
+        }
+        then < now
     }
 
-    /// The sorted places of all neighbours of these items, before and after.
-    fn sides(&self, items: &[usize]) -> [Vec<usize>; 2] {
-        let side = |neighbours: &[Vec<usize>]| {
-            let mut places: Vec<usize> = items
-                .iter()
-                .flat_map(|&v| neighbours[v].iter().map(|&u| self.place[u]))
-                .collect();
-            places.sort_unstable();
-            places
-        };
-        [side(&self.layers.up), side(&self.layers.down)]
+    /// The sorted places of all neighbours of these items on one side.
+    fn places(&self, items: &[usize], side: usize) -> Cow<'_, [usize]> {
+        if let [item] = items {
+            return Cow::Borrowed(&self.near[*item][side]);
+        }
+        let mut places: Vec<usize> = items
+            .iter()
+            .flat_map(|&v| self.near[v][side].iter().copied())
+            .collect();
+        places.sort_unstable();
+        Cow::Owned(places)
     }
 
-    fn crossings(&self) -> u64 {
+    fn crossings(&mut self) -> u64 {
         let mut sum = 0;
         for rank in 1..self.layers.ranks {
+            self.look(rank - 1, 1);
             sum += self.crossings_before(rank);
         }
         sum
@@ -333,8 +409,7 @@ impl<'a> Sorter<'a> {
         let mut tree = vec![0_u64; width + 1];
         let (mut total, mut sum) = (0, 0);
         for &v in &self.rows[rank - 1] {
-            let places = self.places(&self.layers.down[v]);
-            for &place in &places {
+            for &place in &self.near[v][1] {
                 let (mut at, mut before) = (place + 1, 0);
                 while at > 0 {
                     before += tree[at];
@@ -342,7 +417,7 @@ impl<'a> Sorter<'a> {
                 }
                 sum += total - before;
             }
-            for &place in &places {
+            for &place in &self.near[v][1] {
                 let mut at = place + 1;
                 while at <= width {
                     tree[at] += 1;
@@ -355,40 +430,48 @@ impl<'a> Sorter<'a> {
     }
 }
 
-type Keys = std::collections::BTreeMap<usize, Option<f64>>;
-
-/// These items, grouped into what moves as one inside `around`, in order of first appearance.
-fn units(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<Unit> {
-    let mut units: Vec<Unit> = Vec::new();
-    let mut at = std::collections::BTreeMap::new();
+/// A row in which each cluster is one stretch, from its top border to its bottom border.
+fn bracketed(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<usize> {
+    let mut row = Vec::with_capacity(items.len());
+    let mut inside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for v in items {
-        let cluster = layers.child(around, v);
-        let known = cluster.and_then(|c| at.get(&c).copied());
-        if let Some(unit) = known {
-            let unit: &mut Unit = &mut units[unit];
-            unit.items.push(v);
-        } else {
-            if let Some(c) = cluster {
-                at.insert(c, units.len());
-            }
-            units.push(Unit {
-                items: vec![v],
-                cluster,
-            });
+        match layers.child(around, v) {
+            Some(cluster) => inside.entry(cluster).or_default().push(v),
+            None => row.push(v),
         }
     }
-    units
+    for (cluster, members) in inside {
+        let border = |v: &usize, kind| layers.home[*v] == cluster && layers.kind[*v] == kind;
+        row.extend(members.iter().copied().filter(|v| border(v, Kind::Top)));
+        let (borders, rest): (Vec<usize>, _) = members
+            .into_iter()
+            .partition(|v| border(v, Kind::Top) || border(v, Kind::Bottom));
+        row.extend(bracketed(layers, cluster, rest));
+        row.extend(borders.into_iter().filter(|v| border(v, Kind::Bottom)));
+    }
+    row
 }
 
-/// Whether swapping two neighbours saves crossings, by the sorted places of their neighbours.
-fn saves(first: &[Vec<usize>; 2], second: &[Vec<usize>; 2]) -> bool {
-    let now: u64 = (0..2)
-        .map(|side| inversions(&first[side], &second[side]))
-        .sum();
-    let then: u64 = (0..2)
-        .map(|side| inversions(&second[side], &first[side]))
-        .sum();
-    then < now
+/// What moves as one in a stretch of a row.
+fn units(layers: &Layers, items: &[usize]) -> Vec<Unit> {
+    let mut units = Vec::new();
+    let mut start = 0;
+    while start < items.len() {
+        let cluster = (layers.kind[items[start]] == Kind::Top).then(|| layers.home[items[start]]);
+        let closes =
+            |v: &usize| layers.kind[*v] == Kind::Bottom && Some(layers.home[*v]) == cluster;
+        let length = cluster
+            .and_then(|_| items[start..].iter().position(closes))
+            .unwrap_or(0)
+            + 1;
+        units.push(Unit {
+            start,
+            end: start + length,
+            cluster,
+        });
+        start += length;
+    }
+    units
 }
 
 /// The pairs of which the first is greater than the second; both sorted.
@@ -408,14 +491,15 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// The barycentre or the weighted median (Gansner and others 1993) of sorted places.
-fn centre(places: Vec<usize>, median: bool) -> Option<f64> {
+/// The barycentre or the weighted median (Gansner and others 1993) of sorted places; NaN for none.
+fn centre(places: &[usize], median: bool) -> f64 {
     let n = places.len();
-    if !median || n == 0 {
-        return mean(places.into_iter().map(|place| place as f64));
-    }
     let at = |i: usize| places[i] as f64;
-    Some(if n % 2 == 1 {
+    if n == 0 {
+        f64::NAN
+    } else if !median {
+        places.iter().sum::<usize>() as f64 / n as f64
+    } else if n % 2 == 1 {
         at(n / 2)
     } else if n == 2 {
         f64::midpoint(at(0), at(1))
@@ -426,5 +510,5 @@ fn centre(places: Vec<usize>, median: bool) -> Option<f64> {
         } else {
             at(n / 2)
         }
-    })
+    }
 }

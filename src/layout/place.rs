@@ -1,6 +1,6 @@
 //! Where the items of each layer stand across: as near to their neighbours as order and gaps allow.
 
-use super::{Kind, Layers, Rows};
+use super::{Kind, Layers, Rows, monotone};
 
 /// How often all layers are placed.
 const SWEEPS: usize = 40;
@@ -45,7 +45,7 @@ fn packed(layers: &Layers, rows: &Rows, apart: &[Vec<f64>]) -> Vec<f64> {
 fn goals(layers: &Layers, row: &[usize], y: &[f64], sweep: usize) -> (Vec<f64>, Vec<f64>) {
     let (mut goal, mut weight) = (Vec::new(), Vec::new());
     for &v in row {
-        let both = sweep >= 6;
+        let both = sweep >= 6 && (sweep < 100 || layers.kind[v] != Kind::Bend);
         let before = layers.up[v]
             .iter()
             .filter(|_| both || sweep.is_multiple_of(2));
@@ -132,7 +132,7 @@ fn pushed(n: usize, edges: impl Iterator<Item = (usize, usize, f64)>, goal: &[f6
 /// Places the items anew between the borders, which stay.
 fn inside_borders(layers: &Layers, rows: &Rows, apart: &[Vec<f64>], mut y: Vec<f64>) -> Vec<f64> {
     let border = |v: usize| matches!(layers.kind[v], Kind::Top | Kind::Bottom);
-    for sweep in 6..14 {
+    for sweep in (6..14).chain([100, 102, 104]) {
         for step in 0..rows.len() {
             let rank = if sweep % 2 == 0 {
                 step
@@ -184,39 +184,9 @@ fn separated(goal: &[f64], weight: &[f64], apart: &[f64]) -> Vec<f64> {
     placed
 }
 
-/// The growing sequence nearest to the goals in weighted squares, by pooling adjacent violators.
-pub(super) fn monotone(goal: &[f64], weight: &[f64]) -> Vec<f64> {
-    let mut pools: Vec<(f64, f64, usize)> = Vec::with_capacity(goal.len());
-    for (&g, &w) in goal.iter().zip(weight) {
-        let mut pool = (g * w, w, 1);
-        while let Some(&(sum, weight, count)) = pools.last() {
-            if sum / weight <= pool.0 / pool.1 {
-                break;
-            }
-            pools.pop();
-            pool = (pool.0 + sum, pool.1 + weight, pool.2 + count);
-        }
-        pools.push(pool);
-    }
-    pools
-        .into_iter()
-        .flat_map(|(sum, weight, count)| std::iter::repeat_n(sum / weight, count))
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_sequence_that_grows_stays() {
-        assert_eq!(monotone(&[1.0, 2.0, 4.0], &[1.0; 3]), [1.0, 2.0, 4.0]);
-    }
-
-    #[test]
-    fn violators_meet_at_their_weighted_mean() {
-        assert_eq!(monotone(&[4.0, 1.0], &[1.0, 2.0]), [2.0, 2.0]);
-    }
 
     #[test]
     fn gaps_are_kept() {

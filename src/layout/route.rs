@@ -28,13 +28,55 @@ impl Sheet<'_> {
         Point::new(f64::midpoint(start, end), self.across[v])
     }
 
-    /// A route per chain, from its first item to its last.
-    pub(super) fn routes(&self) -> Vec<Route> {
+    /// A route per edge, from its first end to its second.
+    pub(super) fn routes(&self, ends: &[(usize, usize)]) -> Vec<Route> {
         let ports = self.ports();
-        let chains = self.layers.chains.iter().zip(ports);
-        chains
-            .map(|(chain, ports)| self.route(chain, ports))
-            .collect()
+        let mut loops = vec![0; self.layers.vertices];
+        let mut routes = Vec::with_capacity(ends.len());
+        for (i, (chain, &(from, _))) in self.layers.chains.iter().zip(ends).enumerate() {
+            routes.push(match chain.first() {
+                None => {
+                    loops[from] += 1;
+                    self.self_loop(from, loops[from] - 1)
+                }
+                Some(&first) if first == from => self.route(chain, ports[i]),
+                Some(_) => self.route(chain, ports[i]).backwards(),
+            });
+        }
+        routes
+    }
+
+    /// A small arc at the side of a vertex, the later ones around the earlier.
+    fn self_loop(&self, v: usize, before: usize) -> Route {
+        let (centre, size) = (self.centre(v), self.size[v]);
+        let half = (size.w / 6.0).min(7.0) + 3.0 * (before.min(4)) as f64;
+        let half = half.min(size.w / 2.5);
+        let foot = centre.y + self.rise(v, half);
+        // A cubic reaches three quarters of the way to its controls.
+        let top = centre.y + size.h / 2.0 + (10.0 + 6.0 * before as f64) / 0.75;
+        let end = Point::new(centre.x + half, foot);
+        let curve = [
+            Point::new(centre.x - half, top),
+            Point::new(centre.x + half, top),
+            end,
+        ];
+        Route {
+            start: Point::new(centre.x - half, foot),
+            curves: vec![curve],
+            label: None,
+        }
+    }
+
+    /// How far the outline of a vertex reaches across from its middle, at a distance along.
+    fn rise(&self, v: usize, along: f64) -> f64 {
+        let half = self.size[v].h / 2.0;
+        match self.outline[v] {
+            Outline::Box => half,
+            Outline::Ellipse => {
+                let off = along / (self.size[v].w / 2.0).max(1e-9);
+                half * (1.0 - off * off).max(0.0).sqrt()
+            }
+        }
     }
 
     /// Where each chain leaves its first vertex and enters its last, across.

@@ -1,0 +1,110 @@
+//! The test graphs: the union of all windows of an evolution, with sizes as labels would give them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use bagreel::geometry::Size;
+use bagreel::layout::{Cluster, Link, Outline, Plan, Vertex};
+
+/// A graph with its names.
+pub(crate) struct Graph {
+    pub(crate) plan: Plan,
+    /// The name of each vertex; nodes first, then topics.
+    pub(crate) names: Vec<String>,
+    pub(crate) nodes: usize,
+    /// The name of each cluster.
+    pub(crate) clusters: Vec<String>,
+}
+
+/// The union of all windows of an evolution.
+pub(crate) fn read(path: &Path) -> Graph {
+    let text = std::fs::read_to_string(path).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let (mut nodes, mut topics) = (BTreeSet::new(), BTreeSet::new());
+    let (mut publishes, mut subscribes) = (BTreeMap::new(), BTreeSet::new());
+    let word =
+        |value: &serde_json::Value, key: &str| value[key].as_str().unwrap_or_default().to_owned();
+    let list =
+        |value: &serde_json::Value, key: &str| value[key].as_array().cloned().unwrap_or_default();
+    for window in list(&json, "windows") {
+        nodes.extend(list(&window, "nodes").iter().map(|x| word(x, "name")));
+        topics.extend(list(&window, "topics").iter().map(|x| word(x, "name")));
+        for x in list(&window, "publishes") {
+            let hz = publishes
+                .entry((word(&x, "node"), word(&x, "topic")))
+                .or_insert(0.0_f64);
+            *hz = hz.max(x["hz"].as_f64().unwrap_or(0.0));
+        }
+        subscribes.extend(
+            list(&window, "subscribes")
+                .iter()
+                .map(|x| (word(x, "topic"), word(x, "node"))),
+        );
+    }
+    let mut clusters: BTreeSet<String> = BTreeSet::new();
+    for name in nodes.iter().chain(&topics) {
+        for (at, _) in name.match_indices('/').filter(|(at, _)| *at > 0) {
+            clusters.insert(name[..at].to_owned());
+        }
+    }
+    let clusters: Vec<String> = clusters.into_iter().collect();
+    let cluster = |name: &str| {
+        let (space, _) = name.rsplit_once('/').unwrap_or_default();
+        clusters.iter().position(|c| c == space)
+    };
+    let vertex = |name: &String, per_char: f64, pad: f64, h: f64, outline| Vertex {
+        size: Size::new(
+            per_char * name.rsplit('/').next().unwrap_or("").len() as f64 + pad,
+            h,
+        ),
+        outline,
+        cluster: cluster(name),
+    };
+    let place_of =
+        |set: &BTreeSet<String>, name: &String| set.iter().position(|n| n == name).unwrap();
+    let mut plan = Plan::default();
+    plan.vertices.extend(
+        nodes
+            .iter()
+            .map(|n| vertex(n, 0.56 * 14.0, 24.0, 30.0, Outline::Ellipse)),
+    );
+    plan.vertices.extend(
+        topics
+            .iter()
+            .map(|n| vertex(n, 0.5 * 12.5, 16.0, 22.0, Outline::Box)),
+    );
+    for ((node, topic), hz) in &publishes {
+        let label = format!("{hz:.1} Hz");
+        plan.links.push(Link {
+            from: place_of(&nodes, node),
+            to: nodes.len() + place_of(&topics, topic),
+            label: Some(Size::new(label.len() as f64 * 5.5 + 2.0, 13.0)),
+        });
+    }
+    for (topic, node) in &subscribes {
+        plan.links.push(Link {
+            from: nodes.len() + place_of(&topics, topic),
+            to: place_of(&nodes, node),
+            label: None,
+        });
+    }
+    plan.clusters = clusters
+        .iter()
+        .map(|name| Cluster {
+            parent: name
+                .rsplit_once('/')
+                .and_then(|(up, _)| clusters.iter().position(|c| c == up)),
+            title: Size::new(
+                (1 + name.rsplit('/').next().unwrap_or("").len()) as f64 * 6.0,
+                14.0,
+            ),
+        })
+        .collect();
+    let count = nodes.len();
+    Graph {
+        plan,
+        names: nodes.into_iter().chain(topics).collect(),
+        nodes: count,
+        clusters,
+    }
+}
