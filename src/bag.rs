@@ -14,7 +14,12 @@ use crate::notice::{Notice, NoticeKind};
 use crate::source::{Source, Stream};
 use crate::time::{Span, Stamp};
 
+use index::{
+    Ask, Body, Index, LONGEST_INDEX, Tally, hand_over, hand_over_slice, nameless, pass, span_of,
+    threads,
+};
 use relay::{Clip, Gather, in_order};
+use unknown::explain;
 
 mod index;
 mod mcap;
@@ -206,16 +211,31 @@ pub struct FormatRow {
     pub what: &'static str,
     /// The names that such bags usually end in. Only told, never asked: the first bytes decide.
     pub extensions: &'static [&'static str],
+    /// What it is read from.
+    medium: Medium,
     /// Whether a bag begins so.
     sniff: fn(&Place, &[u8]) -> bool,
     /// Makes a reader.
     open: fn(Place, &OpenOptions) -> Result<Box<dyn Reader>>,
 }
 
+/// What a format is read from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Medium {
+    /// A file, or a pipe.
+    Stream,
+    /// A file.
+    File,
+    /// A folder.
+    Folder,
+    /// A file or a pipe with a bag of another format in it.
+    Wrapping,
+}
+
 /// Every format that can be read.
 pub const FORMATS: &[FormatRow] = &[
     rosbag1::FORMAT,
-    mcap::FORMAT,
+    self::mcap::FORMAT,
     sqlite3::FORMAT,
     rosbag2::FORMAT,
     zstd_file::FORMAT,
@@ -260,7 +280,7 @@ pub fn sniff(input: &Input) -> Result<Kind> {
     match FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
         Some(row) => Ok(Kind::Bag(row)),
         None if json => Ok(Kind::Json),
-        None => Err(unknown::explain(path, &head, path.is_dir())),
+        None => Err(explain(path, &head, path.is_dir())),
     }
 }
 
@@ -280,7 +300,7 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         Input::Stdin => PathBuf::from(input.name()),
     };
     let folder = matches!(place, Place::Folder(_));
-    Err(unknown::explain(&path, &head, folder))
+    Err(explain(&path, &head, folder))
 }
 
 fn place(input: &Input) -> Result<Place> {

@@ -1,6 +1,6 @@
 //! YAML text as plain data, bounded against documents that unfold to more than they are.
 
-use serde_json::Value;
+pub(crate) use serde_json::Value;
 
 /// What is wrong with a YAML document.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -116,7 +116,7 @@ impl Ask<'_> {
         };
         for (raw, entries) in &index.runs {
             let Some(id) = (self.resolve)(*raw) else {
-                unknown(sink, entries.len() as u64);
+                nameless(sink, entries.len() as u64);
                 continue;
             };
             let known = self.wants[id.0 as usize] > Want::Stamps && self.range.is_none();
@@ -229,7 +229,7 @@ struct Wanted {
 }
 
 /// Messages of a connection that the bag does not describe.
-pub(super) fn unknown(sink: &mut dyn Sink, count: u64) {
+pub(super) fn nameless(sink: &mut dyn Sink, count: u64) {
     sink.notice(Notice {
         kind: NoticeKind::Damaged,
         count,
@@ -344,7 +344,7 @@ impl Sink for Extremes {
 
 /// The span of a bag from the claimed spans of its chunks: `read` looks into the chunks that are said to be first and
 /// last, or into all if they are few.
-pub(super) fn span(
+pub(super) fn span_of(
     claims: impl Iterator<Item = (usize, Stamp, Stamp)>,
     read: impl Fn(usize, &mut dyn Sink),
 ) -> Option<Span> {

@@ -5,8 +5,10 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::index::threads;
-use super::{Clip, FormatRow, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order};
+use super::{
+    Clip, FormatRow, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order,
+    threads,
+};
 use crate::decompress::Compression;
 use crate::error::{Error, Result};
 use crate::notice::{Notice, NoticeKind};
@@ -32,6 +34,7 @@ pub(super) const FORMAT: FormatRow = FormatRow {
     name: "mcap",
     what: "MCAP file (ROS 1 or ROS 2)",
     extensions: &["mcap"],
+    medium: Medium::Stream,
     sniff: |_, head| head.starts_with(MAGIC),
     open,
 };
@@ -63,7 +66,7 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             }))
         }
         Place::Pipe(name, stream) => Ok(Box::new(Piped { name, stream })),
-        Place::Folder(path) => Err(super::unknown::explain(&path, &[], true)),
+        Place::Folder(path) => Err(super::explain(&path, &[], true)),
     }
 }
 

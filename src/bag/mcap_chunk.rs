@@ -3,8 +3,9 @@
 use std::io;
 
 use super::records::{self, Cursor, HEAD, op};
-use crate::bag::index::{Ask, Body, Index, LONGEST_INDEX, Tally, hand_over, pass, unknown};
-use crate::bag::{Gather, Sink, lost};
+use crate::bag::{
+    Ask, Body, Gather, Index, LONGEST_INDEX, Sink, Tally, hand_over, lost, nameless, pass,
+};
 use crate::decompress::Compression;
 use crate::notice::{Notice, NoticeKind};
 use crate::source::{FAR, NEAR, Source, Stream};
@@ -121,7 +122,7 @@ impl Chunks<'_> {
                 continue;
             };
             let Some(id) = (self.ask.resolve)(u32::from(channel)) else {
-                unknown(sink, 1);
+                nameless(sink, 1);
                 pass(stream, u64::from(size))?;
                 continue;
             };

@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 use std::io;
 
 use super::records::{self, Table, op};
-use crate::bag::index::{hand_over, pass, unknown};
-use crate::bag::{Gather, Sink, Want};
+use crate::bag::{Gather, Sink, Want, hand_over, nameless, pass};
 use crate::decompress::Compression;
 use crate::notice::{Notice, NoticeKind};
 use crate::source::Stream;
@@ -167,7 +166,7 @@ impl Walk<'_> {
         };
         let Some(id) = self.table.get(channel) else {
             self.found.complete = false;
-            unknown(self.sink, 1);
+            nameless(self.sink, 1);
             return pass(stream, u64::from(size));
         };
         let want = self.wants[id.0 as usize];

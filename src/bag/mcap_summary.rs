@@ -4,8 +4,7 @@ use std::io;
 
 use super::chunk::{self, Chunk, Chunks};
 use super::records::{self, Cursor, HEAD, MAGIC, Table, op};
-use crate::bag::index::{self, Ask, Tally, pass};
-use crate::bag::{ConnectionId, Want};
+use crate::bag::{Ask, ConnectionId, Tally, Want, pass, span_of};
 use crate::source::{FAR, Source, Stream};
 use crate::time::{Span, Stamp};
 
@@ -144,7 +143,7 @@ impl Summary {
         let full = self.chunks.iter().enumerate();
         let full = full.filter(|(_, c)| c.tally.is_some_and(|t| t.messages > 0));
         let claims = full.map(|(at, c)| (at, c.first, c.last));
-        index::span(claims, |at, sink| reader.read(&self.chunks[at], sink))
+        span_of(claims, |at, sink| reader.read(&self.chunks[at], sink))
     }
 
     /// The connection of a channel.

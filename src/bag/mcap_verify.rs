@@ -7,8 +7,7 @@ use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::records::{Table, op};
-use crate::bag::index::{hand_over_slice, unknown};
-use crate::bag::{Gather, Sink, Want};
+use crate::bag::{Gather, Sink, Want, hand_over_slice, nameless};
 use crate::time::Stamp;
 
 /// Longer records are not looked into, in bytes.
@@ -82,7 +81,7 @@ impl Crate<'_> {
 
     fn message(&mut self, channel: u16, time: Stamp, data: &[u8]) {
         let Some(id) = self.table.get(channel) else {
-            return unknown(self.sink, 1);
+            return nameless(self.sink, 1);
         };
         hand_over_slice(data, (id, time), self.wants[id.0 as usize], self.sink);
         let size = u32::try_from(data.len()).unwrap_or(u32::MAX);

@@ -5,8 +5,10 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::index::threads;
-use super::{Clip, FormatRow, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order};
+use super::{
+    Clip, FormatRow, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order,
+    threads,
+};
 use crate::decompress::Compression;
 use crate::error::{Error, Result};
 use crate::notice::{Notice, NoticeKind};
@@ -31,6 +33,7 @@ pub(super) const FORMAT: FormatRow = FormatRow {
     name: "rosbag1",
     what: "ROS 1 bag",
     extensions: &["bag", "bag.active"],
+    medium: Medium::Stream,
     sniff: |_, head| head.starts_with(b"#ROSBAG V2.") || head.starts_with(b"#ROSRECORD V"),
     open,
 };
@@ -69,7 +72,7 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             version(Path::new(&name), head)?;
             Ok(Box::new(Piped { name, stream }))
         }
-        Place::Folder(path) => Err(super::unknown::explain(&path, &[], true)),
+        Place::Folder(path) => Err(super::explain(&path, &[], true)),
     }
 }
 

@@ -3,8 +3,9 @@
 use std::io;
 
 use super::records::{self, ENTRY, Record, Stop, Table};
-use crate::bag::index::{Ask, Body, Index, LONGEST_INDEX, Tally, hand_over, pass, unknown};
-use crate::bag::{Gather, Sink, lost};
+use crate::bag::{
+    Ask, Body, Gather, Index, LONGEST_INDEX, Sink, Tally, hand_over, lost, nameless, pass,
+};
 use crate::decompress::Compression;
 use crate::notice::{Notice, NoticeKind};
 use crate::source::{FAR, NEAR, Source, Stream};
@@ -149,7 +150,7 @@ impl Chunks<'_> {
         sink: &mut dyn Sink,
     ) -> io::Result<()> {
         let Some(id) = self.table.get(raw) else {
-            unknown(sink, 1);
+            nameless(sink, 1);
             return pass(stream, u64::from(len));
         };
         hand_over(stream, (id, time, len), self.ask.wants[id.0 as usize], sink)?;

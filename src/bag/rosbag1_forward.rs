@@ -3,8 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::records::{self, Record, Stop, Table};
-use crate::bag::index::{hand_over, pass, unknown};
-use crate::bag::{Gather, MOST_PAYLOAD, Sink, Want};
+use crate::bag::{Gather, MOST_PAYLOAD, Sink, Want, hand_over, nameless, pass};
 use crate::decompress::Compression;
 use crate::notice::{Notice, NoticeKind};
 use crate::source::Stream;
@@ -211,7 +210,7 @@ impl Walk<'_> {
         let homeless = early.sum::<u64>() + self.early.dropped;
         if homeless > 0 {
             self.found.complete = false;
-            unknown(self.sink, homeless);
+            nameless(self.sink, homeless);
         }
         let (kind, text) = match stop {
             Stop::End => return self.found,

@@ -4,8 +4,7 @@ use std::io;
 
 use super::chunk::{self, Chunk, Chunks};
 use super::records::{self, Record, Stop, Table};
-use crate::bag::index::{self, Ask, Tally};
-use crate::bag::{ConnectionId, MOST_PAYLOAD, Sink, Want};
+use crate::bag::{Ask, ConnectionId, MOST_PAYLOAD, Sink, Tally, Want, span_of};
 use crate::notice::{Notice, NoticeKind};
 use crate::source::{FAR, NEAR, Source, Stream};
 use crate::time::Span;
@@ -169,7 +168,7 @@ impl Plan {
         let full = self.chunks.iter().enumerate();
         let full = full.filter(|(_, c)| c.tally.messages > 0);
         let claims = full.map(|(at, c)| (at, c.first, c.last));
-        index::span(claims, |at, sink| reader.read(&self.chunks[at], sink))
+        span_of(claims, |at, sink| reader.read(&self.chunks[at], sink))
     }
 
     /// What reads its chunks.

@@ -7,8 +7,7 @@ use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
 
 use super::plan::Plan;
 use super::records::{self, Record, Stop, Table};
-use crate::bag::index::{Body, hand_over_slice, pass, unknown};
-use crate::bag::{Gather, Sink, Want};
+use crate::bag::{Body, Gather, Sink, Want, hand_over_slice, nameless, pass};
 use crate::decompress::Compression;
 use crate::source::{FAR, Source, Stream};
 use crate::time::Stamp;
@@ -150,7 +149,7 @@ impl Crate<'_> {
 
     fn message(&mut self, found: &rosbag::record_types::MessageData<'_>) {
         let Some(id) = self.table.get(found.conn_id) else {
-            return unknown(self.sink, 1);
+            return nameless(self.sink, 1);
         };
         let time = Stamp::from_nanos(found.time);
         hand_over_slice(found.data, (id, time), self.wants[id.0 as usize], self.sink);

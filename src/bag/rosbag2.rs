@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{
-    Connection, ConnectionId, Encoding, FormatRow, Input, Message, OpenOptions, Place, Reader,
-    Report, Sink, Want, file_name, unknown,
+    Connection, ConnectionId, Encoding, FormatRow, Input, Medium, Message, OpenOptions, Place,
+    Reader, Report, Sink, Want, explain, file_name,
 };
 use crate::error::{Error, Result};
 use crate::name::NodeName;
@@ -22,6 +22,7 @@ pub(super) const FORMAT: FormatRow = FormatRow {
     name: "rosbag2",
     what: "ROS 2 recording: a folder with metadata.yaml or storage files",
     extensions: &[],
+    medium: Medium::Folder,
     sniff: |place, _| match place {
         Place::Folder(path) => path.join("metadata.yaml").is_file() || !storage(path).is_empty(),
         _ => false,
@@ -144,7 +145,7 @@ impl Folder {
     fn nothing(&self, path: &Path) -> Error {
         let said: Vec<&str> = self.notices.iter().map(|n| n.text.as_str()).collect();
         if said.is_empty() {
-            return unknown::explain(path, &[], true);
+            return explain(path, &[], true);
         }
         Error::UnknownBag {
             path: path.to_owned(),

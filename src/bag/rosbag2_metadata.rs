@@ -6,9 +6,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use serde_json::Value;
-
-use crate::yaml;
+use crate::yaml::{self, Value};
 
 /// What `metadata.yaml` says.
 #[derive(Default)]

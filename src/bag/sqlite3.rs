@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{
-    Clip, Connection, ConnectionId, Encoding, FormatRow, MOST_PAYLOAD, OpenOptions, Place, Reader,
-    Report, Sink, Tier, Want, file_name, in_order,
+    Clip, Connection, ConnectionId, Encoding, FormatRow, MOST_PAYLOAD, Medium, OpenOptions, Place,
+    Reader, Report, Sink, Tier, Want, file_name, in_order,
 };
 use crate::error::{Error, Result};
 use crate::notice::{Notice, NoticeKind};
@@ -30,6 +30,7 @@ pub(super) const FORMAT: FormatRow = FormatRow {
     name: "sqlite3",
     what: "ROS 2 bag in SQLite",
     extensions: &["db3"],
+    medium: Medium::File,
     sniff: |_, head| head.starts_with(b"SQLite format 3\0"),
     open,
 };
@@ -50,7 +51,7 @@ struct Bag {
 fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let source = match place {
         Place::File(source) => source,
-        Place::Folder(path) => return Err(super::unknown::explain(&path, &[], true)),
+        Place::Folder(path) => return Err(super::explain(&path, &[], true)),
         Place::Pipe(name, _) => {
             return Err(Error::Unsupported {
                 path: name.into(),

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use super::{
-    FORMATS, FormatRow, HEAD, OpenOptions, Place, Reader, Report, Sink, file_name, sqlite3, unknown,
+    FORMATS, FormatRow, HEAD, Medium, OpenOptions, Place, Reader, Report, Sink, explain, file_name,
 };
 use crate::decompress::Compression;
 use crate::error::{Error, Result};
@@ -17,6 +17,7 @@ pub(super) const FORMAT: FormatRow = FormatRow {
     name: "zstd",
     what: "any of these, compressed as a whole",
     extensions: &["db3.zstd", "mcap.zstd"],
+    medium: Medium::Wrapping,
     sniff: |_, head| head.starts_with(b"\x28\xb5\x2f\xfd"),
     open,
 };
@@ -45,7 +46,7 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
             )
         }
         Place::Pipe(name, stream) => (name, 0, Box::new(stream)),
-        Place::Folder(path) => return Err(unknown::explain(&path, &[], true)),
+        Place::Folder(path) => return Err(explain(&path, &[], true)),
     };
     let path = Path::new(&name);
     let fail = || Error::io("decompress", path);
@@ -56,9 +57,9 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         row.name != FORMAT.name && (row.sniff)(&Place::Folder(path.into()), &head)
     };
     let Some(row) = FORMATS.iter().find(inside) else {
-        return Err(unknown::explain(path, &head, false));
+        return Err(explain(path, &head, false));
     };
-    let (place, copy) = if row.name == sqlite3::FORMAT.name {
+    let (place, copy) = if row.medium == Medium::File {
         let copy = Temporary::new()?;
         let limit = file_bytes.saturating_mul(MOST_UNPACKED).max(1 << 30);
         let source = unpack(&mut stream, &copy, limit).map_err(fail())?;
