@@ -10,4 +10,6 @@
 mod cli;
 mod encode;
 mod properties;
+mod reading;
+mod support;
 mod warehouse;
