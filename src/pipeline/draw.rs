@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Stage, Watch};
 use crate::evolution::{Evolution, Place, Places};
 use crate::geometry::Size;
-use crate::layout::{Engine, Layout};
+use crate::layout::{Engine, Layout, lay_out};
 use crate::notice::{Notice, NoticeKind, Notices};
 use crate::picture::{Sketch, Wish};
 use crate::style::Style;
@@ -47,64 +47,110 @@ pub(super) struct Composed {
 }
 
 /// Chooses what is shown and lays it out. With `--fit auto` the page grows, then the largest innermost namespaces are
-/// collapsed, until the smallest text is at least 9 pixels high or nothing is left to collapse.
+/// collapsed, until the smallest text is at least 9 pixels high or nothing is left to collapse; then those that turn
+/// out to fit are opened again.
 pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
-    let mut options = drawing.view.clone();
     let mut wish = drawing.wish.clone();
-    let mut collapsed: Vec<Arc<str>> = Vec::new();
-    let layout = loop {
-        let (layout, text, next) = attempt(evolution, drawing, &options, &wish);
-        if !drawing.is_fitted || text >= READABLE {
-            break layout;
-        }
-        if !drawing.is_sized && wish.size != LARGEST && wish.width_mm.is_none() {
+    let mut options = drawing.view.clone();
+    let asked = options.collapse.len();
+    let mut best = Attempt::new(evolution, drawing, &options, &wish);
+    if drawing.is_fitted && !best.is_readable() {
+        if !drawing.is_sized && wish.width_mm.is_none() {
             wish.size = LARGEST;
-            continue;
+            best = Attempt::new(evolution, drawing, &options, &wish);
         }
-        // Far too small a text is not worth a layout for every namespace on the way.
-        let many = if text < READABLE / 2.0 {
-            next.len().div_ceil(4)
-        } else {
-            1
-        };
-        if next.is_empty() {
-            break layout;
-        }
-        collapsed.extend(next.iter().take(many).cloned());
-        options.collapse.extend(next.into_iter().take(many));
-    };
+        collapse(evolution, drawing, &wish, &mut options, &mut best);
+        open_again(evolution, drawing, &wish, (&mut options, asked), &mut best);
+    }
     let (view, mut notices) = view(evolution, &options);
-    notices.extend(told(&collapsed, &drawing.wish, &wish));
-    let remarks = layout.remarks.iter();
+    notices.extend(told(&options.collapse[asked..], &drawing.wish, &wish));
+    let remarks = best.layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
     Composed {
         view,
         options,
         wish,
-        layout,
+        layout: best.layout,
         notices,
     }
 }
 
-/// One try: the layout, the size of its smallest text, and which namespaces to collapse next.
-fn attempt(
+/// A layout of what some options show.
+struct Attempt {
+    layout: Layout,
+    /// The size of its smallest text in pixels.
+    text: f64,
+}
+
+impl Attempt {
+    fn new(evolution: &Evolution, drawing: &Drawing, options: &ViewOptions, wish: &Wish) -> Self {
+        // The widest labels depend on rates, so that the windows are needed too.
+        let (view, _) = view(evolution, options);
+        let sketch = Sketch::new(&view, &drawing.style, &drawing.fonts, wish.clone());
+        let layout = lay_out(sketch.plan(), &sketch.layout_wish(), drawing.engine);
+        let text = sketch.text_px(&layout);
+        Self { layout, text }
+    }
+
+    fn is_readable(&self) -> bool {
+        self.text >= READABLE
+    }
+}
+
+/// Collapses namespaces until the text can be read.
+fn collapse(
     evolution: &Evolution,
     drawing: &Drawing,
-    options: &ViewOptions,
     wish: &Wish,
-) -> (Layout, f64, Vec<Arc<str>>) {
-    // The widest labels depend on rates, so that the frames are needed; without them only candidates are found.
-    let (view, _) = view(evolution, options);
-    let sketch = Sketch::new(&view, &drawing.style, &drawing.fonts, wish.clone());
-    let layout = crate::layout::lay_out(sketch.plan(), &sketch.layout_wish(), drawing.engine);
-    let text = sketch.text_px(&layout);
-    let candidates = outline(evolution, options).collapsible(options);
-    let fresh = candidates
-        .into_iter()
-        .map(|c| c.name)
-        .filter(|name| !options.collapse.contains(name));
-    (layout, text, fresh.collect())
+    options: &mut ViewOptions,
+    best: &mut Attempt,
+) {
+    while !best.is_readable() {
+        let candidates = outline(evolution, options).collapsible(options);
+        let fresh = candidates
+            .into_iter()
+            .map(|c| c.name)
+            .filter(|name| !options.collapse.contains(name));
+        let fresh: Vec<Arc<str>> = fresh.collect();
+        if fresh.is_empty() {
+            return;
+        }
+        // Far too small a text is not worth a layout for every namespace on the way.
+        let many = if best.text < READABLE / 2.0 {
+            fresh.len().div_ceil(4)
+        } else {
+            1
+        };
+        options.collapse.extend(fresh.into_iter().take(many));
+        *best = Attempt::new(evolution, drawing, options, wish);
+    }
+}
+
+/// How many namespaces are tried to be opened again.
+const MOST_REOPENED: usize = 24;
+
+/// Opens namespaces that were collapsed on the way and need not have been, the outermost first.
+fn open_again(
+    evolution: &Evolution,
+    drawing: &Drawing,
+    wish: &Wish,
+    options: (&mut ViewOptions, usize),
+    best: &mut Attempt,
+) {
+    let (options, asked) = options;
+    let collapsed = options.collapse[asked..].to_vec();
+    if !best.is_readable() {
+        return;
+    }
+    for name in collapsed.iter().rev().take(MOST_REOPENED) {
+        let mut opened = options.clone();
+        opened.collapse.retain(|n| n != name);
+        let attempt = Attempt::new(evolution, drawing, &opened, wish);
+        if attempt.is_readable() {
+            (*options, *best) = (opened, attempt);
+        }
+    }
 }
 
 /// What `--fit auto` did.
