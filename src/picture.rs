@@ -13,6 +13,7 @@ mod tween;
 mod union;
 mod words;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use self::arrows::{Arrows, Track};
@@ -24,6 +25,7 @@ use self::title::Title;
 pub use self::union::{Part, Union, sign};
 use crate::geometry::Size;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
+use crate::notice::{Notice, NoticeKind};
 use crate::scene::{Group, Scene};
 use crate::style::Style;
 use crate::text::Fonts;
@@ -241,11 +243,7 @@ impl<'a> Picture<'a> {
 
     fn ground(&self) -> Vec<Group> {
         let sketch = &self.sketch;
-        let boxes = self.boxes();
-        let spaces = sketch.draft.spaces.iter().zip(&self.layout.clusters);
-        let mut groups: Vec<Group> = spaces
-            .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name)))
-            .collect();
+        let mut groups = Vec::new();
         if !sketch.wish.bare {
             groups.push(self.title.ground());
             groups.push(legend::legend(&sketch.legend, sketch.style, &sketch.page));
@@ -265,6 +263,12 @@ impl<'a> Picture<'a> {
 
     fn graph(&self, frame: &Frame, groups: &mut Vec<Group>) {
         let view = self.sketch.view;
+        let boxes = self.boxes();
+        let full = self.inhabited(frame);
+        let spaces = self.sketch.draft.spaces.iter().zip(&self.layout.clusters);
+        for (at, (space, place)) in spaces.enumerate() {
+            groups.push(boxes.space(space, *place, &encoded(&space.name), !full[at]));
+        }
         let arrows = Arrows {
             style: self.sketch.style,
             fonts: self.sketch.fonts,
@@ -287,7 +291,6 @@ impl<'a> Picture<'a> {
             pile.push(group);
         }
         groups.append(&mut changed);
-        let boxes = self.boxes();
         for shown in &frame.items {
             let at = shown.id as usize;
             if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
@@ -296,9 +299,25 @@ impl<'a> Picture<'a> {
         }
     }
 
+    /// For each namespace with a box, whether anything inside it is there.
+    fn inhabited(&self, frame: &Frame) -> Vec<bool> {
+        let view = self.sketch.view;
+        let mut full = vec![false; view.namespaces.len()];
+        for shown in &frame.items {
+            let mut space = view.items.get(shown.id as usize).and_then(|i| i.cluster);
+            // Parents come first in the list, so that this ends.
+            while let Some(at) = space.filter(|at| full.get(*at) == Some(&false)) {
+                full[at] = true;
+                space = view.namespaces[at].parent;
+            }
+        }
+        full
+    }
+
     fn boxes(&self) -> Boxes<'_> {
         Boxes {
             style: self.sketch.style,
+            fonts: self.sketch.fonts,
             fit: self.fit,
         }
     }
@@ -331,6 +350,23 @@ fn tracks(sketch: &Sketch<'_>, layout: &Layout, fit: Fit) -> Vec<Track> {
             Track::new(arrow_id(arrow, &ends), ends, route, link.label, fit)
         })
         .collect()
+}
+
+/// What to say of names with characters that no font has; `None` if there are none.
+pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
+    let names = view.items.iter().map(|item| &*item.name);
+    let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();
+    let first: Vec<String> = missing
+        .iter()
+        .take(3)
+        .map(|c| c.escape_unicode().to_string())
+        .collect();
+    let more = if missing.len() > 3 { ", …" } else { "" };
+    let text = format!(
+        "names hold characters that the font lacks; they are drawn as {}{more}; `--font FILE` adds a font",
+        first.join(", ")
+    );
+    (!missing.is_empty()).then(|| Notice::new(NoticeKind::Glyph, text))
 }
 
 fn item_id(item: &Item) -> String {

@@ -1,19 +1,23 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
-use super::draft::{LINE, Label, Space, Tells, second_line};
+use super::draft::{LINE, Label, Space, Tells, pendant, second_line};
 use super::look::{self, BoxLook};
 use super::page::Fit;
 use super::{badge, words};
 use crate::geometry::{Point, Rect};
 use crate::graph::State;
-use crate::scene::{Anchor, Form, Group, Shape, Stroke, Text};
+use crate::scene::{Anchor, Fade, Form, Group, Shape, Stroke, Text};
 use crate::style::{Body, Color, Style};
-use crate::text::Weight;
+use crate::text::{Fonts, Weight};
 use crate::view::{Item, ItemKind, Mark, Shown};
+
+/// The opacity of a namespace in which nothing is.
+const EMPTY: f64 = 0.35;
 
 /// What boxes are drawn with.
 pub(super) struct Boxes<'a> {
     pub(super) style: &'a Style,
+    pub(super) fonts: &'a Fonts,
     pub(super) fit: Fit,
 }
 
@@ -28,8 +32,8 @@ pub(super) struct Card {
 }
 
 impl Boxes<'_> {
-    /// The box around a namespace.
-    pub(super) fn space(&self, space: &Space, place: Rect, id: &str) -> Group {
+    /// The box around a namespace; pale while nothing inside it is there.
+    pub(super) fn space(&self, space: &Space, place: Rect, id: &str, is_empty: bool) -> Group {
         let style = &self.style.cluster;
         let scale = self.fit.scale;
         let place = self.fit.rect(place);
@@ -38,6 +42,7 @@ impl Boxes<'_> {
             class: "namespace".to_owned(),
             data: vec![("name", space.name.clone())],
             title: space.name.clone(),
+            fade: Fade(if is_empty { EMPTY } else { 1.0 }),
             ..Group::default()
         };
         let stroke = Stroke {
@@ -93,6 +98,11 @@ impl Boxes<'_> {
             fixed => fixed.to_owned(),
         };
         self.lines(&mut group, &card.label, &second, inner, body, &look);
+        if let Some(text) = pendant(shown, card.tells) {
+            let (below, size) = self.below(place);
+            let paint = (look.stroke.color, style.badge.sign);
+            badge::pill(&mut group, self.fonts, paint, &text, below, size);
+        }
         if let Some(mark) = shown.mark {
             badge::badge(
                 &mut group,
@@ -103,6 +113,30 @@ impl Boxes<'_> {
             );
         }
         group
+    }
+
+    /// The middle of what hangs on a box and its font size: over the lower edge, clear of the name, and at most as far
+    /// down as boxes are apart.
+    fn below(&self, place: Rect) -> (Point, f64) {
+        let size = self.style.edge.size * self.fit.scale;
+        (
+            Point::new(place.centre().x, place.bottom() + size * 0.38),
+            size,
+        )
+    }
+
+    /// The words of what hangs on a box, without the pill.
+    pub(super) fn pendant_text(&self, place: Rect, text: &str) -> Text {
+        let (below, size) = self.below(place);
+        Text {
+            at: Point::new(below.x, below.y + size * 0.36),
+            anchor: Anchor::Middle,
+            size,
+            weight: Weight::SemiBold,
+            color: self.style.changed.color,
+            halo: Some((self.style.edge.halo, self.style.edge.halo_width)),
+            text: text.to_owned(),
+        }
     }
 
     /// The outline, and the part inside it that the label stands in.

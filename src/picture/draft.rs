@@ -317,10 +317,16 @@ pub(super) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
         return Some(state.to_string());
     }
     match (tells, changed_rate(shown), shown.hz) {
-        (Tells::Nothing, _, _) | (Tells::Changes, None, _) => None,
-        (_, Some((before, now)), _) => Some(words::hz_change(before, now)),
+        (Tells::Nothing | Tells::Changes, _, _) => None,
+        (Tells::Rates, Some((before, now)), _) => Some(words::hz_change(before, now)),
         (Tells::Rates, None, rate) => rate.filter(|hz| *hz > 0.0).map(words::hz),
     }
+}
+
+/// What hangs on a box for one window: the rate that changed, where neither an arrow nor its smaller line tells it.
+pub(super) fn pendant(shown: &Shown, tells: Tells) -> Option<String> {
+    let (before, now) = changed_rate(shown).filter(|_| tells == Tells::Changes)?;
+    Some(words::hz_change(before, now))
 }
 
 /// The element with this id among those of a window, which are sorted.

@@ -83,11 +83,16 @@ impl Page {
     }
 }
 
-/// The scale of furniture on a page of this size.
+/// The scale of furniture on a page of this size: on a larger page it grows less than the graph.
 pub(super) fn unit(size: Size) -> f64 {
-    (size.w / STANDARD.w)
+    let ratio = (size.w / STANDARD.w)
         .min(size.h / STANDARD.h)
-        .clamp(0.62, 2.5)
+        .clamp(0.62, 4.0);
+    if ratio > 1.0 {
+        libm::pow(ratio, 0.7)
+    } else {
+        ratio
+    }
 }
 
 impl Fit {

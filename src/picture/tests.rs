@@ -110,6 +110,21 @@ fn names_are_shortened_inside_their_namespace_only() {
 }
 
 #[test]
+fn characters_without_a_glyph_are_spelled_out_and_noticed() {
+    let mission = ["/机器>/t@1 /plain>/t@2"];
+    let (view, _) = view(&evolution(&mission), &ViewOptions::default());
+    let notice = unshown(&view, &Fonts::bundled()).unwrap();
+    assert!(
+        notice.text.contains("\\u{5668}, \\u{673a};"),
+        "{}",
+        notice.text
+    );
+    let svg = crate::svg::write(&scenes(&mission)[0]);
+    assert!(svg.contains(">/\\u{673a}\\u{5668}</text>") && svg.contains("data-name=\"/机器\""));
+    assert!(svg.contains("id=\"n-.00673a.005668\""));
+}
+
+#[test]
 fn colours_never_move_anything() {
     let places = |style| with_picture(&MISSION, style, Wish::default(), |p| p.layout().clone());
     assert_eq!(places("light"), places("dark"));

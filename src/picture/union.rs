@@ -74,13 +74,14 @@ impl Picture<'_> {
         };
         let boxes = Boxes {
             style: sketch.style,
+            fonts: sketch.fonts,
             fit,
         };
         let spaces = sketch.draft.spaces.iter().zip(&layout.clusters);
         Union {
             size: layout.size,
             spaces: spaces
-                .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name)))
+                .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name), false))
                 .collect(),
             order: self.order.clone(),
             arrows: self.union_arrows(fit),
@@ -105,10 +106,15 @@ impl Picture<'_> {
                 let mut shown = plain(is_live.then_some(1.0));
                 // Whatever it tells, it is a line to be filled.
                 shown.lifecycle = is_live.then(|| "-".into());
+                let mut group = boxes.item(item, &card, &shown);
+                let tells_changes = card.tells == Tells::Changes;
+                if tells_changes {
+                    group.text(boxes.pendant_text(card.place, "-"));
+                }
                 Part {
-                    group: boxes.item(item, &card, &shown),
-                    is_live,
-                    tells_changes: card.tells == Tells::Changes,
+                    group,
+                    is_live: is_live || tells_changes,
+                    tells_changes,
                     rect: card.place,
                     badge: corner(item.kind, card.place, 1.0),
                     marks,

@@ -7,7 +7,7 @@ use crate::evolution::{Evolution, Place, Places};
 use crate::geometry::Size;
 use crate::layout::{Engine, Layout, lay_out};
 use crate::notice::{Notice, NoticeKind, Notices};
-use crate::picture::{Sketch, Wish};
+use crate::picture::{self, Sketch, Wish};
 use crate::style::Style;
 use crate::text::Fonts;
 use crate::view::{View, ViewOptions, outline, view};
@@ -65,6 +65,7 @@ pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn 
     }
     let (view, mut notices) = view(evolution, &options);
     notices.extend(told(&options.collapse[asked..], &drawing.wish, &wish));
+    notices.extend(picture::unshown(&view, &drawing.fonts));
     let remarks = best.layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
     Composed {
