@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use super::cast::Cast;
 use super::select::Reason;
-use super::{ItemKind, ViewOptions};
+use super::ViewOptions;
 use crate::graph::Elements;
 use crate::notice::{Notice, NoticeKind, Notices};
 
 /// So many names are given as examples.
 const EXAMPLES: usize = 3;
 
-/// What was hidden for each reason, counted; topics and groups that went into collapsed namespaces too.
+/// What was hidden for each reason, counted. What was grouped or collapsed is seen, as part of its box.
 pub(super) fn notes(elements: &Elements, cast: &Cast, options: &ViewOptions) -> Notices {
     let nodes = elements.nodes.iter().map(|n| n.name.as_str());
     let topics = elements.topics.iter().map(|t| t.name.as_str());
@@ -29,11 +29,6 @@ pub(super) fn notes(elements: &Elements, cast: &Cast, options: &ViewOptions) -> 
         let (what, how) = words(reason);
         let text = format!("{what} left out ({}): {how}", examples(&names));
         add(&mut notices, names.len(), text);
-    }
-    for item in cast.items.iter().filter(|i| i.kind == ItemKind::Namespace) {
-        let name = shortened(&item.name);
-        let text = format!("namespace `{name}` collapsed to one box: `--expand {name}` opens it");
-        add(&mut notices, item.members.len(), text);
     }
     if options.hide.unreachable {
         let text = "nodes are left out of windows in which they are silent: `--hide` without `unreachable` shows them";
@@ -140,13 +135,11 @@ mod tests {
         let narrow = ViewOptions {
             hide: Hide::NONE,
             ns_filter: NameFilter::parse("/b/.*").unwrap(),
-            collapse: vec!["/b".into()],
             ..ViewOptions::default()
         };
         assert_eq!(
             told(window, &narrow),
             [
-                "1 namespace `/b` collapsed to one box: `--expand /b` opens it",
                 "2 nodes outside `--ns-filter` left out (/a, /record_7): widen the filter to see them",
                 "2 topics without a node inside `--ns-filter` left out (/clock, /rosout): widen the filter to see them",
             ]
