@@ -183,17 +183,24 @@ impl Fonts {
             return Cow::Borrowed(text);
         }
         let chars: Vec<char> = text.chars().collect();
-        let mut keep = chars.len().saturating_sub(2);
-        loop {
+        let short = |keep: usize| -> String {
             // A name is told by its end rather than by its beginning.
             let head = keep * 2 / 5;
             let tail = &chars[chars.len() - (keep - head)..];
-            let short: String = chars[..head].iter().chain(&['…']).chain(tail).collect();
-            if keep <= 2 || self.width(&short, size, weight) <= most {
-                return Cow::Owned(short);
+            chars[..head].iter().chain(&['…']).chain(tail).collect()
+        };
+        // The more is kept the wider it is, so that the most that fits is found by halving.
+        let most_kept = chars.len().saturating_sub(2);
+        let (mut fits, mut wide) = (most_kept.min(2), most_kept + 1);
+        while wide - fits > 1 {
+            let keep = fits.midpoint(wide);
+            if self.width(&short(keep), size, weight) <= most {
+                fits = keep;
+            } else {
+                wide = keep;
             }
-            keep -= 1;
         }
+        Cow::Owned(short(fits))
     }
 }
 

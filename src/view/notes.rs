@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::ViewOptions;
 use super::cast::Cast;
 use super::select::Reason;
-use super::ViewOptions;
 use crate::graph::Elements;
 use crate::notice::{Notice, NoticeKind, Notices};
 
