@@ -71,7 +71,7 @@ pub enum Error {
         /// What to do.
         hint: String,
     },
-    /// The user broke off. Exit code 130.
+    /// The user broke off.
     Interrupted,
     /// Something could not be drawn or written.
     Output {

@@ -183,7 +183,7 @@ impl<'a> Source<'a> {
                 format!("{}–{}", time(frame.span.start), time(frame.span.end)),
                 Weight::SemiBold,
             ),
-            (frame.caption.join("; "), Weight::Regular),
+            (self.caption(&frame.caption, page), Weight::Regular),
         ];
         for (row, (words, weight)) in (1_u8..).zip(lines) {
             let most = page.panel.w;
@@ -210,6 +210,24 @@ impl<'a> Source<'a> {
             group.id = format!("w{}-{}", frame.index, group.id);
             groups.push(group);
         }
+    }
+
+    /// As many of the changes, the most important first, as fit under a panel; the first in any case.
+    fn caption(&self, changes: &[String], page: &Page) -> String {
+        let mut words = String::new();
+        for change in changes {
+            let longer = if words.is_empty() {
+                change.clone()
+            } else {
+                format!("{words}; {change}")
+            };
+            let width = self.fonts.width(&longer, page.caption, Weight::Regular);
+            if !words.is_empty() && width > page.panel.w {
+                break;
+            }
+            words = longer;
+        }
+        words
     }
 
     /// The shared legend from `y` on; returns its height.
@@ -306,5 +324,169 @@ fn moved(group: &Group, by: f64, to: Point) -> Group {
     Group {
         pieces: group.pieces.iter().map(piece).collect(),
         ..group.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::evidence::Degree;
+    use crate::graph::{Element, Elements, State};
+    use crate::layout;
+    use crate::notice::Notices;
+    use crate::time::{Period, Span, Stamp};
+    use crate::view::{Frame, Item, ItemKind, Mark, Shown, Tally};
+
+    /// Four minutes in which a node is there and another comes and goes.
+    fn mission() -> (Evolution, View) {
+        let minute = |i: i64| Stamp(i * 60_000_000_000);
+        let period = Period::parse("1m").unwrap();
+        let evolution = Evolution {
+            bags: Vec::new(),
+            span: Span {
+                start: minute(0),
+                end: minute(4),
+            },
+            messages: 0,
+            period,
+            step: period,
+            elements: Elements::default(),
+            windows: Vec::new(),
+            layout: None,
+            notices: Notices::new(),
+        };
+        let item = |(id, name): (u32, &str)| Item {
+            kind: ItemKind::Node,
+            name: Arc::from(name),
+            members: vec![Element::Node(id)],
+            cluster: None,
+        };
+        let shown = |id, mark| Shown {
+            id,
+            state: State::Active,
+            degree: Degree::Measured,
+            mark,
+            hz: None,
+            from_hz: None,
+            count: None,
+            lifecycle: None,
+        };
+        let frame = |(index, mark): (usize, Option<Mark>)| Frame {
+            index,
+            span: Span {
+                start: minute(index as i64),
+                end: minute(index as i64 + 1),
+            },
+            partial: false,
+            messages: 0,
+            items: std::iter::once(shown(0, None))
+                .chain(mark.map(|m| shown(1, Some(m))))
+                .collect(),
+            arrows: Vec::new(),
+            tally: Tally::default(),
+            caption: mark
+                .map(|m| format!("/planner {}", m.class()))
+                .into_iter()
+                .collect(),
+        };
+        let marks = [None, Some(Mark::Added), None, Some(Mark::Removed)];
+        let view = View {
+            items: (0..).zip(["/driver", "/planner"]).map(item).collect(),
+            frames: marks.into_iter().enumerate().map(frame).collect(),
+            ..View::default()
+        };
+        (evolution, view)
+    }
+
+    fn strip_of(choice: &str, width_mm: Option<f64>) -> Strip {
+        let (evolution, view) = mission();
+        let (style, fonts) = (Style::builtin("paper").unwrap(), Fonts::bundled());
+        let sketch = Sketch::new(&view, &style, &fonts, Wish::default());
+        let picture = sketch.laid_out(layout::engine("layered").unwrap());
+        let source = Source {
+            evolution: &evolution,
+            view: &view,
+            picture: &picture,
+            style: &style,
+            fonts: &fonts,
+        };
+        strip(source, &Choice::parse(choice).unwrap(), width_mm, 1280.0).unwrap()
+    }
+
+    fn texts(strip: &Strip) -> Vec<&Text> {
+        let pieces = strip.scene.groups.iter().flat_map(|g| &g.pieces);
+        let text = |piece| match piece {
+            &Piece::Text(ref text) => Some(text),
+            &Piece::Shape(_) => None,
+        };
+        pieces.filter_map(text).collect()
+    }
+
+    #[test]
+    fn every_panel_tells_its_time_and_change_and_the_legend_stands_once() {
+        let strip = strip_of("changes", None);
+        let words: Vec<&str> = texts(&strip).iter().map(|t| t.text.as_str()).collect();
+        for expected in [
+            "00:00–01:00",
+            "01:00–02:00",
+            "03:00–04:00",
+            "/planner added",
+        ] {
+            assert_eq!(
+                words.iter().filter(|w| **w == expected).count(),
+                1,
+                "{expected}"
+            );
+        }
+        assert!(!words.contains(&"02:00–03:00"));
+        assert_eq!(words.iter().filter(|w| **w == "node").count(), 1);
+    }
+
+    #[test]
+    fn ids_stay_unique() {
+        let strip = strip_of("2x2", None);
+        let ids: BTreeSet<&str> = strip.scene.groups.iter().map(|g| g.id.as_str()).collect();
+        assert_eq!(ids.len(), strip.scene.groups.len());
+    }
+
+    #[test]
+    fn on_paper_the_width_is_exact_and_captions_can_be_read() {
+        let strip = strip_of("2x2", Some(88.0));
+        assert_eq!(strip.scene.width_mm, Some(88.0));
+        assert!((strip.scene.size.w - 88.0 * PX_PER_MM).abs() < 1e-9);
+        assert_eq!(strip.remarks, Vec::<String>::new());
+        let smallest = texts(&strip)
+            .iter()
+            .map(|t| t.size)
+            .fold(f64::MAX, f64::min);
+        assert!(smallest * PT_PER_PX >= SMALLEST_PT);
+    }
+
+    #[test]
+    fn text_that_is_too_small_is_told_with_what_would_help() {
+        let strip = strip_of("2x2", Some(20.0));
+        assert!(strip.remarks[0].contains("mm`"), "{:?}", strip.remarks);
+    }
+
+    #[test]
+    fn everything_stands_on_the_page() {
+        for choice in ["2x2", "0", "changes"] {
+            let strip = strip_of(choice, None);
+            let page = strip.scene.size;
+            for piece in strip.scene.groups.iter().flat_map(|g| &g.pieces) {
+                let bounds = piece_bounds(piece).unwrap();
+                assert!(
+                    bounds.x >= -1.0 && bounds.right() <= page.w + 1.0,
+                    "{choice}: {piece:?}"
+                );
+                assert!(
+                    bounds.y >= -1.0 && bounds.bottom() <= page.h + 1.0,
+                    "{choice}: {piece:?}"
+                );
+            }
+        }
     }
 }

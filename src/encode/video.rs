@@ -168,6 +168,9 @@ impl Video<'_> {
                 command.args(self.kind.piped).arg("pipe:1");
             }
         }
+        // An interrupt on the terminal is ours to handle: ffmpeg ends when its pipe does.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
         let mut child = child.map_err(|e| missing(self.target.path().to_owned(), &e))?;
         Ok(Work {
