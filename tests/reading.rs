@@ -572,10 +572,10 @@ fn independent(path: &Path) -> Option<BTreeMap<String, u64>> {
             for message in chunk.messages() {
                 match message.ok()? {
                     ::rosbag::MessageRecord::Connection(c) => {
-                        drop(topics.insert(c.id, c.storage_topic.to_owned()))
+                        drop(topics.insert(c.id, c.storage_topic.to_owned()));
                     }
                     ::rosbag::MessageRecord::MessageData(m) => {
-                        *counts.entry(topics.get(&m.conn_id)?.clone()).or_default() += 1
+                        *counts.entry(topics.get(&m.conn_id)?.clone()).or_default() += 1;
                     }
                 }
             }

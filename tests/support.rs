@@ -2,6 +2,7 @@
 
 pub mod cdr;
 pub mod mcap;
+pub mod mission;
 pub mod rosbag1;
 pub mod sqlite3;
 
@@ -24,6 +25,8 @@ pub struct Publisher {
     pub latching: bool,
     /// `offered_qos_profiles` (ROS 2).
     pub qos: String,
+    /// The message definition; none if empty.
+    pub definition: String,
 }
 
 /// A described bag: who publishes, and what was sent when, in order of time.
@@ -194,7 +197,10 @@ pub fn shared(below: &str) -> Option<PathBuf> {
         .join("../shared")
         .join(below);
     if !path.exists() {
-        println!("skipped: {} is not there", path.display());
+        #[expect(clippy::print_stdout, reason = "a test that skips says so")]
+        {
+            println!("skipped: {} is not there", path.display());
+        }
         return None;
     }
     Some(path)

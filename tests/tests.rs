@@ -11,5 +11,6 @@ mod cli;
 mod encode;
 mod properties;
 mod reading;
+mod ros2_example;
 mod support;
 mod warehouse;

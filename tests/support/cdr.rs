@@ -11,7 +11,7 @@ impl Default for Cdr {
 
 impl Cdr {
     fn align(&mut self, to: usize) {
-        while (self.0.len() - 4) % to != 0 {
+        while !(self.0.len() - 4).is_multiple_of(to) {
             self.0.push(0);
         }
     }

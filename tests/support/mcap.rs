@@ -53,7 +53,9 @@ pub fn write(recording: &Recording, options: &Options) -> Vec<u8> {
         .publishers
         .iter()
         .map(|p| {
-            let schema = to.add_schema(&p.type_name, schema, b"# none\n").unwrap();
+            let schema = to
+                .add_schema(&p.type_name, schema, p.definition.as_bytes())
+                .unwrap();
             let mut metadata = BTreeMap::new();
             if options.profile == "ros1" {
                 metadata.insert("callerid".to_owned(), p.node.clone());

@@ -49,7 +49,7 @@ fn connection(id: u32, publisher: &Publisher) -> Vec<u8> {
         ("topic", publisher.topic.as_bytes()),
         ("type", publisher.type_name.as_bytes()),
         ("md5sum", b"00000000000000000000000000000000"),
-        ("message_definition", b"# none\n"),
+        ("message_definition", publisher.definition.as_bytes()),
         ("callerid", publisher.node.as_bytes()),
         ("latching", latching),
     ]);

@@ -36,6 +36,12 @@ pub fn write(recording: &Recording, path: &Path) {
         let row = params![id, publisher.topic, publisher.type_name, publisher.qos];
         all.execute("INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr', ?4, '')", row)
             .unwrap();
+        if !publisher.definition.is_empty() {
+            let row = params![publisher.type_name, publisher.definition];
+            let sql = "INSERT INTO message_definitions SELECT NULL, ?1, 'ros2msg', ?2, '' \
+                       WHERE NOT EXISTS (SELECT 1 FROM message_definitions WHERE topic_type = ?1)";
+            all.execute(sql, row).unwrap();
+        }
     }
     {
         let mut insert = all
