@@ -87,6 +87,7 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Reading {
         },
         graph: graph::Options {
             grace: graph.grace.unwrap_or(0) as usize,
+            ..graph::Options::default()
         },
         rate_change: graph.rate_change,
     }

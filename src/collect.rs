@@ -7,7 +7,6 @@ use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::error::{Error, Result};
 use crate::evidence::{self, Heard, Piece, Read, SOURCES};
 use crate::facts::{Facts, SourceId};
-use crate::name::TopicName;
 use crate::notice::{Notice, NoticeKind, Notices};
 use crate::proof::{Stream, Trust};
 use crate::stamps::Stamps;
@@ -69,7 +68,7 @@ impl Collector {
                     stream,
                     place,
                     source,
-                    time: Stamp(0),
+                    time: None,
                 });
             }
         }
@@ -84,7 +83,7 @@ impl Collector {
                 stream,
                 place,
                 source: *source,
-                time: message.time,
+                time: Some(message.time),
             };
             let done = Cursor::new(&stream.connection.encoding, message.data)
                 .and_then(|mut payload| read(&mut heard, &mut payload));
@@ -118,9 +117,12 @@ impl Collector {
     }
 }
 
-/// rospy latches its log, and yet the last record says nothing about its node's life.
-fn is_log(topic: &TopicName) -> bool {
-    topic.as_str() == "/rosout"
+/// Whether the last message stands for its publisher after its moment. rospy latches its log and ROS 2 keeps its
+/// own, and yet the last record says nothing about its node's life.
+fn is_held(connection: &Connection) -> bool {
+    let qos = connection.qos.as_deref().unwrap_or_default();
+    let kept = connection.latching || evidence::qos::is_transient_local(qos);
+    kept && connection.topic.as_str() != "/rosout"
 }
 
 /// Says that a stream, or a message of it, has another layout than its type promises.
@@ -166,7 +168,8 @@ impl Sink for BagSink<'_> {
             connection: connection.clone(),
             topic,
             publisher: publisher.map(|p| all.facts.name(p.as_str())),
-            latched: connection.latching && !is_log(&connection.topic),
+            speaker: None,
+            latched: is_held(connection),
             trust: Trust::Whole,
             times: all.messages.series(),
         };
@@ -308,27 +311,4 @@ fn believed(days: &BTreeMap<i64, u64>) -> Option<Span> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
-        let span = believed(&days.iter().copied().collect())?;
-        Some((span.start.0 / DAY, span.end.0 / DAY))
-    }
-
-    #[test]
-    fn a_few_messages_far_from_the_bulk_are_set_aside() {
-        assert_eq!(kept(&[(0, 3), (20_000, 500)]), Some((20_000, 20_001)));
-        assert_eq!(kept(&[(0, 1), (20_000, 2)]), Some((20_000, 20_001)));
-        assert_eq!(kept(&[(0, 500), (20_000, 3)]), Some((0, 1)));
-    }
-
-    #[test]
-    fn a_bag_that_is_one_piece_or_two_halves_is_kept_whole() {
-        assert_eq!(kept(&[(0, 500)]), None);
-        assert_eq!(kept(&[(20_000, 2), (20_006, 3)]), None);
-        assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
-        assert_eq!(kept(&[(0, 1), (20_000, 1)]), None);
-        assert_eq!(kept(&[]), None);
-    }
-}
+mod tests;

@@ -4,13 +4,14 @@ use crate::bag::{Connection, Encoding};
 
 /// A message layout.
 pub(crate) struct Shape {
-    /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`.
+    /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`. A star at its start stands for anything.
     pub(crate) type_name: &'static str,
     /// Its md5 sum in ROS 1, looked at where the definition is missing; empty in ROS 2.
     pub(crate) md5: &'static str,
     /// The encoding it is for.
     pub(crate) encoding: Encoding,
-    /// The fields of the message and of all messages inside it, as [`outline`] writes them.
+    /// The fields of the message and of all messages inside it, as [`outline`] writes them; none if the reader looks
+    /// at the definition itself.
     pub(crate) fields: &'static [(&'static str, &'static str)],
 }
 
@@ -56,8 +57,15 @@ impl Shape {
     /// Whether the messages of a connection can be read.
     pub(crate) fn fit(&self, connection: &Connection) -> Fit {
         let type_name = connection.type_name.replacen("/msg/", "/", 1);
-        if type_name != self.type_name || connection.encoding != self.encoding {
+        let named = match self.type_name.strip_prefix('*') {
+            Some(end) => type_name.ends_with(end),
+            None => type_name == self.type_name,
+        };
+        if !named || connection.encoding != self.encoding {
             return Fit::OtherType;
+        }
+        if self.fields.is_empty() {
+            return Fit::Same;
         }
         let definition = connection.definition.as_deref().unwrap_or_default();
         let hash = connection.type_hash.as_deref().unwrap_or_default();

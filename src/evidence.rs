@@ -7,15 +7,22 @@ mod action;
 mod bond;
 mod connection;
 mod diagnostics;
+mod discovery;
 mod dynamic_reconfigure;
+mod lifecycle;
 mod links;
+mod metrics;
+mod only_publisher;
 mod parameter_events;
+pub(crate) mod qos;
+mod recorder;
+mod rosgraph;
 mod rosout;
 mod rosout_ros2;
 mod rosout_rule;
+mod service_event;
 mod statistics;
-
-use std::io;
+mod topic_statistics;
 
 use crate::definition::{self, Fit, Shape};
 use crate::facts::{Claim, Facts, Name, Said, SourceId};
@@ -39,7 +46,7 @@ pub struct Source {
 }
 
 /// Draws a conclusion.
-type Conclude = fn(SourceId, &mut Known<'_>) -> io::Result<()>;
+type Conclude = fn(SourceId, &mut Known<'_>);
 
 /// A source that does nothing yet, for rows to fill in.
 const NOTHING: Source = Source {
@@ -62,6 +69,46 @@ pub const SOURCES: &[Source] = &[
         word: "statistics",
         about: "`/statistics` of ROS 1 (`rosgraph_msgs/TopicStatistics`)",
         reads: &[(statistics::SHAPE, statistics::read)],
+        ..NOTHING
+    },
+    Source {
+        word: "topic_statistics",
+        about: "`/topic_statistics` of graph-monitor (`rosgraph_monitor_msgs/msg/TopicStatistics`)",
+        reads: &[(topic_statistics::SHAPE, topic_statistics::read)],
+        ..NOTHING
+    },
+    Source {
+        word: "rosgraph",
+        about: "`/rosgraph` of graph-monitor (`rosgraph_msgs/msg/Graph`, `rosgraph_monitor_msgs/msg/Graph`)",
+        reads: &[
+            (rosgraph::SHAPE, rosgraph::read),
+            (rosgraph::OLD_SHAPE, rosgraph::read),
+        ],
+        ..NOTHING
+    },
+    Source {
+        word: "discovery",
+        about: "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)",
+        reads: &[(discovery::SHAPE, discovery::read)],
+        ..NOTHING
+    },
+    Source {
+        word: "lifecycle",
+        about: "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)",
+        reads: &[(lifecycle::SHAPE, lifecycle::read)],
+        ..NOTHING
+    },
+    Source {
+        word: "service_event",
+        about: "`<service>/_service_event` of service introspection",
+        reads: &[(service_event::SHAPE, service_event::read)],
+        ..NOTHING
+    },
+    Source {
+        word: "qos",
+        about: "offered quality of service in ROS 2 recordings",
+        announced: Some(qos::announced),
+        conclude: &[qos::conclude],
         ..NOTHING
     },
     Source {
@@ -88,6 +135,13 @@ pub const SOURCES: &[Source] = &[
             (rosout_ros2::SHAPE, rosout_ros2::read),
         ],
         conclude: &[rosout::conclude, rosout_ros2::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "metrics",
+        about: "`/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`)",
+        reads: &[(metrics::SHAPE, metrics::read)],
+        conclude: &[metrics::conclude],
         ..NOTHING
     },
     Source {
@@ -120,6 +174,18 @@ pub const SOURCES: &[Source] = &[
         ..NOTHING
     },
     Source {
+        word: "only_publisher",
+        about: "messages that name no publisher, of topics that one node is known to publish",
+        conclude: &[only_publisher::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "recorder",
+        about: "the recorder subscribes everything recorded",
+        conclude: &[recorder::conclude],
+        ..NOTHING
+    },
+    Source {
         word: "rosout_rule",
         about: "every node of ROS 1 publishes `/rosout`",
         conclude: &[rosout_rule::conclude],
@@ -134,7 +200,8 @@ pub(crate) struct Heard<'a> {
     /// The stream's place among all streams.
     pub(crate) place: usize,
     pub(crate) source: SourceId,
-    pub(crate) time: Stamp,
+    /// When the message was recorded; `None` at an announcement.
+    pub(crate) time: Option<Stamp>,
 }
 
 impl Heard<'_> {
@@ -145,7 +212,9 @@ impl Heard<'_> {
 
     /// Takes down the sequence number of a message, which falls back when its publisher starts anew.
     pub(crate) fn sequence(&mut self, number: u32) {
-        self.facts.sequence(self.place, self.time, number);
+        if let Some(time) = self.time {
+            self.facts.sequence(self.place, time, number);
+        }
     }
 
     /// Takes a claim down, made now, with the words it rests on.

@@ -63,14 +63,16 @@ pub(crate) enum Claim {
     Lists(Name, Name),
     /// Log records of the second node come over a connection that names the first as publisher.
     Carries(Name, Name),
-    /// A logger of this name, which is a node or a part of one, logs.
-    Logger(Name),
+    /// A logger of this name, which is a node or a part of one, logs to this topic.
+    Logger(Name, Name),
     /// A status on this topic (second) is named after this node (first).
     Reports(Name, Name),
     /// This node is in this lifecycle state.
     Lifecycle(Name, Name),
-    /// The first node runs the second one in its own process.
-    Hosts(Name, Name),
+    /// This service (by the topic of its events) has this client.
+    Client(Name, Name),
+    /// This service (by the topic of its events) was called: a request or a reply was sent or received.
+    Called(Name, Name),
     /// This topic has this type.
     Type(Name, Name),
     /// This topic is offered with this quality of service.
@@ -81,13 +83,12 @@ pub(crate) enum Claim {
 
 impl Claim {
     /// The names in it.
-    fn names(self) -> [Option<Name>; 2] {
+    pub(crate) fn names(self) -> [Option<Name>; 2] {
         match self {
             Self::Node(a)
             | Self::NodeGone(a)
             | Self::Topic(a)
             | Self::Appears(a)
-            | Self::Logger(a)
             | Self::Snapshot(a) => [Some(a), None],
             Self::Publish(a, b)
             | Self::Subscribe(a, b)
@@ -95,8 +96,10 @@ impl Claim {
             | Self::Lists(a, b)
             | Self::Carries(a, b)
             | Self::Reports(a, b)
+            | Self::Logger(a, b)
             | Self::Lifecycle(a, b)
-            | Self::Hosts(a, b)
+            | Self::Client(a, b)
+            | Self::Called(a, b)
             | Self::Type(a, b)
             | Self::Quality(a, b) => [Some(a), Some(b)],
         }
@@ -115,9 +118,10 @@ impl Claim {
             Self::Lists(a, b) => Self::Lists(to(a), to(b)),
             Self::Carries(a, b) => Self::Carries(to(a), to(b)),
             Self::Reports(a, b) => Self::Reports(to(a), to(b)),
-            Self::Logger(a) => Self::Logger(to(a)),
+            Self::Logger(a, b) => Self::Logger(to(a), to(b)),
             Self::Lifecycle(a, b) => Self::Lifecycle(to(a), to(b)),
-            Self::Hosts(a, b) => Self::Hosts(to(a), to(b)),
+            Self::Client(a, b) => Self::Client(to(a), to(b)),
+            Self::Called(a, b) => Self::Called(to(a), to(b)),
             Self::Type(a, b) => Self::Type(to(a), to(b)),
             Self::Quality(a, b) => Self::Quality(to(a), to(b)),
             Self::Snapshot(a) => Self::Snapshot(to(a)),
@@ -207,17 +211,17 @@ impl Facts {
         &mut self,
         said: Said,
         source: &'static str,
-        time: Stamp,
+        time: Option<Stamp>,
         words: impl FnOnce() -> String,
     ) {
         if self.watched.is_empty() || self.pieces.len() >= MOST {
             return;
         }
         let names = said.claim.names();
-        let named = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
-        if self.watched.iter().all(named) {
+        let about = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
+        if self.watched.iter().all(about) {
             self.pieces.push(Piece {
-                time: Some(time),
+                time,
                 source,
                 degree: said.degree,
                 text: words(),
@@ -235,8 +239,8 @@ impl Facts {
         self.times.add(id, &[time], Some(&[number]));
     }
 
-    /// Takes in that `source` claims something at `time`.
-    pub(crate) fn add(&mut self, source: SourceId, said: Said, time: Stamp) {
+    /// Takes in that `source` claims something, at `time` if it is a matter of time.
+    pub(crate) fn add(&mut self, source: SourceId, said: Said, time: Option<Stamp>) {
         let key = (said.claim, source, said.snapshot);
         let place = match self.places.get(&key) {
             Some(place) => *place,
@@ -259,7 +263,7 @@ impl Facts {
         };
         let fact = &mut self.list[place];
         fact.degree = fact.degree.min(said.degree);
-        self.times.add(fact.times, &[time], None);
+        self.times.add(fact.times, time.as_slice(), None);
     }
 
     /// Numbers all names in the order of their texts; tells the new number of each old one.

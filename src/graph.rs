@@ -8,7 +8,9 @@ mod build;
 mod lives;
 mod rates;
 mod restarts;
+mod roles;
 mod settle;
+mod values;
 mod windows;
 
 use std::sync::Arc;

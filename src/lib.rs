@@ -46,6 +46,7 @@ pub mod terminal;
 pub mod text;
 pub mod time;
 mod trust;
+mod value;
 pub mod view;
 pub mod window;
 pub mod wire;

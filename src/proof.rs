@@ -18,6 +18,8 @@ pub(crate) struct Stream {
     pub(crate) connection: Connection,
     pub(crate) topic: Name,
     pub(crate) publisher: Option<Name>,
+    /// The node that counts as its publisher when graphs are built: by its name or by its role.
+    pub(crate) speaker: Option<Name>,
     /// Whether a message outlives its moment: latched (ROS 1) or transient local (ROS 2).
     pub(crate) latched: bool,
     /// How far its publisher's name is believed.
@@ -49,6 +51,16 @@ pub(crate) enum What {
 }
 
 impl What {
+    /// The same element with its node under another name.
+    pub(crate) fn with_node(self, to: &mut impl FnMut(Name) -> Name) -> Self {
+        match self {
+            Self::Node(node) => Self::Node(to(node)),
+            Self::Topic(topic) => Self::Topic(topic),
+            Self::Publish(node, topic) => Self::Publish(to(node), topic),
+            Self::Subscribe(topic, node) => Self::Subscribe(topic, to(node)),
+        }
+    }
+
     /// The same element by new names.
     fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
         match self {
@@ -104,8 +116,8 @@ pub(crate) struct Known<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: &'a mut Facts,
     pub(crate) proofs: Vec<Proof>,
-    /// The process that a nodelet or component runs in.
-    pub(crate) hosts: BTreeMap<Name, Name>,
+    /// Why times could not be read, if so.
+    pub(crate) failed: Option<io::Error>,
     publishers: BTreeMap<Name, BTreeSet<Name>>,
     nodes: BTreeSet<Name>,
 }
@@ -116,7 +128,7 @@ impl<'a> Known<'a> {
             streams,
             facts,
             proofs: Vec::new(),
-            hosts: BTreeMap::new(),
+            failed: None,
             publishers: BTreeMap::new(),
             nodes: BTreeSet::new(),
         }
@@ -193,33 +205,46 @@ impl<'a> Known<'a> {
         );
     }
 
+    /// The node that a name without its namespace means: the only known one that ends so, else one of this name.
+    pub(crate) fn meant(&self, node: Name) -> Name {
+        let text = self.text(node);
+        let mut ending = self
+            .nodes
+            .iter()
+            .filter(|n| self.text(**n).ends_with(&*text));
+        match (self.nodes.contains(&node), ending.next(), ending.next()) {
+            (false, Some(only), None) => *only,
+            _ => node,
+        }
+    }
+
     /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
         self.facts.text(name)
     }
 
+    /// When a fact was claimed, sorted; empty if that cannot be read, which is kept.
+    pub(crate) fn times(&mut self, fact: &Fact) -> Vec<Stamp> {
+        self.facts.times(fact).unwrap_or_else(|error| {
+            self.failed = Some(error);
+            Vec::new()
+        })
+    }
+
     /// All claims of one source with their signs and ends, sorted.
-    pub(crate) fn claims(
-        &mut self,
-        source: SourceId,
-    ) -> io::Result<Vec<(Fact, Vec<Stamp>, Vec<Stamp>)>> {
+    pub(crate) fn claims(&mut self, source: SourceId) -> Vec<(Fact, Vec<Stamp>, Vec<Stamp>)> {
         let endings = self.endings();
-        let facts: Vec<Fact> = self
-            .facts
-            .list
-            .iter()
-            .filter(|f| f.source == source)
-            .copied()
-            .collect();
+        let facts = self.facts.list.iter().filter(|f| f.source == source);
+        let facts: Vec<Fact> = facts.copied().collect();
         let times = |fact: Fact| {
-            let (signs, ends) = self.times(&fact, &endings)?;
-            Ok((fact, signs, ends))
+            let (signs, ends) = self.signs_and_ends(&fact, &endings);
+            (fact, signs, ends)
         };
         facts.into_iter().map(times).collect()
     }
 
     /// What the claims say without any rule: nodes, topics, publications and subscriptions.
-    pub(crate) fn take_at_their_word(&mut self) -> io::Result<()> {
+    pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         for fact in self.facts.list.clone() {
             let what = match fact.claim {
@@ -229,7 +254,7 @@ impl<'a> Known<'a> {
                 Claim::Subscribe(node, topic) => What::Subscribe(topic, node),
                 _ => continue,
             };
-            let (signs, ends) = self.times(&fact, &endings)?;
+            let (signs, ends) = self.signs_and_ends(&fact, &endings);
             self.prove(Proof {
                 what,
                 source: fact.source,
@@ -241,7 +266,6 @@ impl<'a> Known<'a> {
                 },
             });
         }
-        Ok(())
     }
 
     /// The facts that end others.
@@ -256,25 +280,25 @@ impl<'a> Known<'a> {
     }
 
     /// When a claim was made, and when it was taken back, sorted.
-    fn times(
+    fn signs_and_ends(
         &mut self,
         fact: &Fact,
         endings: &BTreeMap<Claim, Vec<Fact>>,
-    ) -> io::Result<(Vec<Stamp>, Vec<Stamp>)> {
-        let signs = self.facts.times(fact)?;
+    ) -> (Vec<Stamp>, Vec<Stamp>) {
+        let signs = self.times(fact);
         let mut ends = Vec::new();
         let ending = match fact.claim {
             Claim::Node(node) => Some(Claim::NodeGone(node)),
             Claim::Subscribe(node, topic) => Some(Claim::Unsubscribe(node, topic)),
             _ => None,
         };
-        for end in ending.iter().flat_map(|e| endings.get(e)).flatten() {
-            ends.extend(self.facts.times(end)?);
+        for end in ending.iter().filter_map(|e| endings.get(e)).flatten() {
+            ends.extend(self.times(end));
         }
         let snapshot = fact.snapshot.map(Claim::Snapshot);
-        for taken in snapshot.iter().flat_map(|s| endings.get(s)).flatten() {
+        for taken in snapshot.iter().filter_map(|s| endings.get(s)).flatten() {
             // A snapshot that does not hold the claim ends it.
-            let times = self.facts.times(taken)?;
+            let times = self.times(taken);
             ends.extend(
                 times
                     .into_iter()
@@ -283,6 +307,6 @@ impl<'a> Known<'a> {
         }
         ends.sort_unstable();
         ends.dedup();
-        Ok((signs, ends))
+        (signs, ends)
     }
 }

@@ -31,10 +31,10 @@ pub(crate) fn judge(streams: &mut [Stream], facts: &Facts) -> Vec<Notice> {
         let mut played = false;
         for at in of_bag {
             let stream = &mut streams[*at];
-            let player = stream
+            let by_player = stream
                 .publisher
                 .is_some_and(|node| is_player(&facts.text(node)));
-            if player && &*facts.text(stream.topic) != "/rosout" {
+            if by_player && &*facts.text(stream.topic) != "/rosout" {
                 played = true;
                 stream.trust = Trust::Player;
             }

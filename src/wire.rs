@@ -146,6 +146,11 @@ impl<'a> Cursor<'a> {
         Ok(self.u8()? != 0)
     }
 
+    /// The next 16 bits.
+    pub fn u16(&mut self) -> Result<u16> {
+        self.number().map(u16::from_le_bytes)
+    }
+
     /// The next 32 bits.
     pub fn u32(&mut self) -> Result<u32> {
         self.number().map(u32::from_le_bytes)
@@ -218,6 +223,15 @@ impl<'a> Cursor<'a> {
         self.skip_string()?;
         Ok(seq)
     }
+}
+
+/// Bytes as hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    let digit = |n: u8| char::from_digit(u32::from(n), 16).unwrap_or('0');
+    bytes
+        .iter()
+        .flat_map(|b| [digit(b >> 4), digit(b & 15)])
+        .collect()
 }
 
 #[cfg(test)]

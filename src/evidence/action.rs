@@ -1,15 +1,13 @@
 //! Actions: whoever publishes status, feedback or result is the server and takes goals; whoever publishes goals is a
 //! client and takes the rest. The goals' ids name clients of ROS 1 (`/client-N-time`).
 
-use std::collections::BTreeMap;
-use std::io;
-
 use super::Heard;
 use crate::bag::Encoding;
 use crate::definition::{HEADER, Shape};
 use crate::facts::{Claim, Degree, Name, SourceId};
 use crate::proof::{Known, What};
 use crate::wire::{self, Cursor};
+use std::collections::BTreeMap;
 
 /// `actionlib_msgs/GoalStatusArray`.
 pub(super) const SHAPE: Shape = Shape {
@@ -65,7 +63,7 @@ const TAKES: [&str; 2] = ["goal", "cancel"];
 /// The parts of an action that a bag holds or somebody names, by the action's name.
 type Actions = BTreeMap<String, BTreeMap<&'static str, Name>>;
 
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     for (action, parts) in ros1_actions(known) {
         let mut all = BTreeMap::new();
         for part in SENDS.iter().chain(&TAKES) {
@@ -76,7 +74,6 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
     for (_, parts) in ros2_actions(known) {
         tie(source, known, &parts, &parts);
     }
-    Ok(())
 }
 
 /// Draws all edges that follow from those known.

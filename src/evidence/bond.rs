@@ -1,15 +1,12 @@
 //! Bonds: whoever publishes a bond topic (`bond/Status`) also subscribes it.
 
-use std::io;
-
 use crate::facts::SourceId;
 use crate::proof::Known;
 
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     for topic in known.topics_of(|kind| matches!(kind, "bond/Status" | "bond/msg/Status")) {
         for node in known.publishers(topic).collect::<Vec<_>>() {
             known.subscribes_as_well(source, node, topic, topic);
         }
     }
-    Ok(())
 }

@@ -1,12 +1,10 @@
 //! ROS 1 connection headers and MCAP channel metadata: who publishes each message (`callerid`).
 
-use std::io;
-
 use crate::facts::{Degree, SourceId};
 use crate::proof::{Known, Proof, Trust, What, When};
 
 /// Every stream proves its topic, and its publisher as far as that is believed.
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
         let proof = |what, when| Proof {
@@ -21,11 +19,9 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
         };
         let edge = What::Publish(node, stream.topic);
         match stream.trust {
-            Trust::Whole => known.prove(proof(edge, When::Messages(at))),
-            Trust::First => known.prove(proof(edge, When::First(at))),
             Trust::Player if known.named_by_others(stream.topic, node) => {}
-            Trust::Player => known.prove(proof(edge, When::Messages(at))),
+            Trust::Whole | Trust::Player => known.prove(proof(edge, When::Messages(at))),
+            Trust::First => known.prove(proof(edge, When::First(at))),
         }
     }
-    Ok(())
 }

@@ -1,17 +1,15 @@
 //! Diagnostics: the name of a status begins with its node (`ns/node: …`); whoever publishes `/diagnostics_agg`
 //! subscribes `/diagnostics`.
 
-use std::collections::BTreeSet;
-use std::io;
-
 use super::Heard;
 use crate::bag::Encoding;
 use crate::definition::{HEADER, HEADER2, Shape};
-use crate::facts::{Claim, Degree, Name, SourceId};
+use crate::facts::{Claim, Degree, SourceId};
 use crate::proof::{Known, Proof, Trust, What, When};
 use crate::wire::{self, Cursor};
+use std::collections::BTreeSet;
 
-/// `diagnostic_msgs/DiagnosticArray`, as diagnostic_msgs 1.2 and later.
+/// `diagnostic_msgs/DiagnosticArray`, since `diagnostic_msgs` 1.2.
 pub(super) const SHAPE: Shape = Shape {
     type_name: "diagnostic_msgs/DiagnosticArray",
     md5: "60810da900de1dd6ddd437c3503511da",
@@ -84,7 +82,7 @@ fn node(name: &str) -> Option<&str> {
 }
 
 /// Names in statuses count where the header does not tell who publishes them.
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     let told = |topic| {
         let mut of = known.streams.iter().filter(|s| s.topic == topic);
         of.all(|s| s.publisher.is_some() && s.trust == Trust::Whole)
@@ -93,12 +91,12 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
     let untold: BTreeSet<Claim> = claims
         .filter(|claim| matches!(claim, Claim::Reports(_, topic) if !told(*topic)))
         .collect();
-    for (fact, signs, ends) in known.claims(source)? {
+    for (fact, signs, ends) in known.claims(source) {
         let Claim::Reports(node, topic) = fact.claim else {
             continue;
         };
         if untold.contains(&fact.claim) {
-            let node = settled(known, node);
+            let node = known.meant(node);
             known.prove(Proof {
                 what: What::Publish(node, topic),
                 source,
@@ -114,20 +112,6 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
     let [all, each] = ["/diagnostics_agg", "/diagnostics"].map(|name| known.facts.name(name));
     for node in known.publishers(all).collect::<Vec<_>>() {
         known.subscribes_as_well(source, node, all, each);
-    }
-    Ok(())
-}
-
-/// In ROS 2 a status names its node without the namespace: the only known node that ends so is meant.
-fn settled(known: &Known<'_>, node: Name) -> Name {
-    let text = known.text(node);
-    let mut ending = known
-        .nodes()
-        .iter()
-        .filter(|n| known.text(**n).ends_with(&*text));
-    match (known.nodes().contains(&node), ending.next(), ending.next()) {
-        (false, Some(only), None) => *only,
-        _ => node,
     }
 }
 

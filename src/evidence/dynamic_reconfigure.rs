@@ -1,14 +1,12 @@
-//! dynamic_reconfigure of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` are a node's own. A
+//! `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` are a node's own. A
 //! caller of another name, unless the topic lies below it, runs that node as a nodelet.
-
-use std::io;
 
 use crate::facts::{Degree, Name, SourceId};
 use crate::proof::{Known, Proof, What, When};
 
 const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
 
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     let is_config = |kind: &str| {
         matches!(
             kind,
@@ -30,7 +28,6 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
             if is_nodelet(&known.text(*caller), node) {
                 let node = known.facts.name(node);
                 known.like(source, What::Node(node), What::Node(*caller));
-                known.hosts.insert(node, *caller);
             }
         }
         if callers.is_empty() {
@@ -38,7 +35,6 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
             own(source, known, node, topic);
         }
     }
-    Ok(())
 }
 
 /// Whether a topic of `node` that `caller` publishes tells of a nodelet, not of a part of the caller.

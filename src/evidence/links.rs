@@ -19,12 +19,14 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
             format!("{name}: {text}")
         });
     }
-    if let Some(link) = link(text).filter(|_| file.ends_with(".cpp")) {
+    let roscpp = file.rsplit('.').next() == Some("cpp");
+    if let Some(link) = link(text).filter(|_| roscpp) {
         let node = heard.name(link.node.unwrap_or(name));
         let topic = heard.name(link.topic);
-        let claim = match link.ends {
-            true => Claim::Unsubscribe(node, topic),
-            false => Claim::Subscribe(node, topic),
+        let claim = if link.ends {
+            Claim::Unsubscribe(node, topic)
+        } else {
+            Claim::Subscribe(node, topic)
         };
         heard.claim(claim, Degree::Stated, || format!("{name} logs: {text}"));
     }

@@ -4,7 +4,6 @@
 //! the file that logged.
 
 use std::collections::BTreeSet;
-use std::io;
 
 use super::Heard;
 use crate::facts::{Claim, Degree, Name, Said, SourceId};
@@ -44,7 +43,7 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
     }
     // The list is whole: what is in an earlier one and not in this one is no longer the node's.
     let list = heard.name(&format!("topics of {name}"));
-    let rospy = file.ends_with(".py");
+    let rospy = file.rsplit('.').next() == Some("py");
     for topic in topics {
         let words = || format!("{name} logs with {topic} in its list of topics: {message}");
         let topic = heard.name(topic);
@@ -68,9 +67,9 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
 /// subscription. If nobody is known to publish it, a recorder of all topics knows whether somebody advertises it.
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
-    let advertised = advertised(known)?;
-    for (fact, signs, ends) in known.claims(source)? {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
+    let advertised = advertised(known);
+    for (fact, signs, ends) in known.claims(source) {
         let Claim::Lists(node, topic) = fact.claim else {
             continue;
         };
@@ -93,25 +92,24 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
             },
         });
     }
-    Ok(())
 }
 
 /// Every topic that a recorder of all topics has seen advertised; `None` if none tells. Such a recorder goes on to
 /// subscribe long after its start; one that was given names does not.
-fn advertised(known: &mut Known<'_>) -> io::Result<Option<BTreeSet<Name>>> {
+fn advertised(known: &mut Known<'_>) -> Option<BTreeSet<Name>> {
     let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
     let mut seen: Option<(Stamp, Stamp)> = None;
     for fact in known.facts.list.clone() {
         if let Claim::Appears(topic) = fact.claim {
             topics.insert(topic);
-            for time in known.facts.times(&fact)? {
+            for time in known.times(&fact) {
                 let (first, last) = seen.unwrap_or((time, time));
                 seen = Some((first.min(time), last.max(time)));
             }
         }
     }
     let all = seen.is_some_and(|(first, last)| last.since(first) > LATE_NS);
-    Ok(all.then_some(topics))
+    all.then_some(topics)
 }
 
 /// A recorder subscribes the topics that it was told by name sooner than this.

@@ -1,7 +1,6 @@
 //! Log records of ROS 2: a node is alive. Dots stand for slashes; the loggers of a node's parts are folded into it.
 
 use std::collections::BTreeSet;
-use std::io;
 use std::sync::Arc;
 
 use super::Heard;
@@ -39,7 +38,8 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
     }
     let text = format!("/{}", name.trim_start_matches('/').replace('.', "/"));
     let node = heard.name(&text);
-    heard.claim(Claim::Logger(node), Degree::Stated, || {
+    let topic = heard.stream.topic;
+    heard.claim(Claim::Logger(node, topic), Degree::Stated, || {
         format!("logger {name}: {message}")
     });
     Ok(())
@@ -54,22 +54,22 @@ const PARTS: [&str; 5] = [
     "tf2_ros",
 ];
 
-/// A logger is a part of the nearest node or logger above it, and a node if there is none.
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
-    let claims = known.claims(source)?;
+/// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
+    let claims = known.claims(source);
     let loggers = claims
         .iter()
         .filter_map(|(fact, signs, _)| match fact.claim {
-            Claim::Logger(name) => Some((known.text(name), signs.clone())),
+            Claim::Logger(name, topic) => Some((known.text(name), topic, signs.clone())),
             _ => None,
         });
     let mut loggers: Vec<_> = loggers.collect();
-    loggers.sort();
+    loggers.sort_by(|a, b| a.0.cmp(&b.0));
     let mut nodes: BTreeSet<Arc<str>> = known.nodes().iter().map(|n| known.text(*n)).collect();
-    for (logger, signs) in loggers {
+    for (logger, topic, signs) in loggers {
         let node = owner(&logger, &nodes);
         nodes.insert(node.into());
-        let what = What::Node(known.facts.name(node));
+        let what = What::Publish(known.facts.name(node), topic);
         known.prove(Proof {
             what,
             source,
@@ -81,7 +81,6 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
             },
         });
     }
-    Ok(())
 }
 
 /// The node that a logger belongs to. Shorter names come first, so that a part finds its node.

@@ -1,19 +1,17 @@
 //! Every node of ROS 1 publishes `/rosout`, mostly silently; the node `/rosout` subscribes it and publishes
 //! `/rosout_agg`.
 
-use std::io;
-
 use crate::bag::Encoding;
 use crate::facts::{Degree, SourceId};
 use crate::proof::{Known, Proof, What, When};
 
-pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()> {
+pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     let ros1 = known
         .streams
         .iter()
         .any(|s| s.connection.encoding == Encoding::Ros1);
     if !ros1 || known.nodes().is_empty() {
-        return Ok(());
+        return;
     }
     let [log, all] = ["/rosout", "/rosout_agg"].map(|name| known.facts.name(name));
     let rule = |what, when| Proof {
@@ -30,5 +28,4 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) -> io::Result<()
     known.prove(rule(What::Node(log), When::Whole));
     known.prove(rule(What::Publish(log, all), When::Whole));
     known.prove(rule(What::Subscribe(log, log), When::Whole));
-    Ok(())
 }

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use super::build::Built;
 use super::lives::Track;
 use super::rates::{Rates, Tally};
+use super::roles::role;
+use super::values::Values;
 use super::windows::Windows;
 use super::{Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, Topic, TopicState};
 use crate::collect::Collected;
@@ -22,6 +24,7 @@ const SHORTEST_NS: i64 = 1_000_000;
 pub(super) fn assemble(
     tracks: &BTreeMap<What, Track>,
     traffic: &Traffic,
+    values: &Values,
     windows: &Windows<'_>,
     collected: &Collected,
 ) -> Built {
@@ -33,6 +36,7 @@ pub(super) fn assemble(
         },
         windows,
         collected,
+        values,
         traffic,
         nodes: BTreeMap::new(),
         topics: BTreeMap::new(),
@@ -54,6 +58,7 @@ struct Assembly<'a> {
     built: Built,
     windows: &'a Windows<'a>,
     collected: &'a Collected,
+    values: &'a Values,
     traffic: &'a Traffic,
     nodes: BTreeMap<Name, NodeId>,
     topics: BTreeMap<Name, u32>,
@@ -70,7 +75,7 @@ impl Assembly<'_> {
             }
             for (place, stream) in streams.iter().enumerate() {
                 let stream = &self.collected.streams[*stream];
-                let Some(node) = stream.publisher.filter(|_| stream.trust != Trust::First) else {
+                let Some(node) = stream.speaker.filter(|_| stream.trust != Trust::First) else {
                     continue;
                 };
                 let of = self
@@ -92,7 +97,7 @@ impl Assembly<'_> {
         let (first, last) = track.bounds();
         let text = self.collected.facts.text(name);
         self.built.elements.nodes.push(Node {
-            role: text.clone(),
+            role: role(&text).into(),
             name: text.into(),
             evidence: track.evidence,
             first,
@@ -109,7 +114,7 @@ impl Assembly<'_> {
                 state,
                 degree,
                 hz: count.and_then(|n| per_second(n, *span)),
-                lifecycle: None,
+                lifecycle: self.values.lifecycle(name, *span),
             });
         }
     }
@@ -123,6 +128,7 @@ impl Assembly<'_> {
             .iter()
             .flat_map(|(streams, _)| streams)
             .map(|s| self.collected.streams[*s].connection.type_name.clone())
+            .chain(self.values.types(name))
             .filter(|name| !name.is_empty())
             .collect();
         types.sort_unstable();
@@ -133,7 +139,7 @@ impl Assembly<'_> {
             evidence: track.evidence,
             first,
             last,
-            qos: None,
+            qos: self.values.quality(name),
         });
         let tallies = traffic.map_or(&[][..], |(_, rates)| &rates.tallies);
         let mut tallies = tallies.iter().peekable();

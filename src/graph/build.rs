@@ -7,7 +7,9 @@ use super::assemble::{Traffic, assemble};
 use super::lives::Track;
 use super::rates::{Rates, rates};
 use super::restarts::{Restarts, restarts};
+use super::roles::role;
 use super::settle::{Frame, settle};
+use super::values::Values;
 use super::windows::Windows;
 use super::{Elements, Graph, NodeId};
 use crate::collect::{Collected, spool_error};
@@ -23,6 +25,8 @@ use crate::time::{Span, Stamp};
 pub struct Options {
     /// Windows of silence before something that never speaks again counts as gone.
     pub grace: usize,
+    /// Whether nodes whose names differ only in an anonymous suffix are one, under the name of their role.
+    pub roles: bool,
 }
 
 /// The graphs of a mission.
@@ -45,7 +49,7 @@ pub struct Built {
 /// # Errors
 /// If the temporary file of times cannot be read.
 pub fn build(collected: &mut Collected, windows: &[Span], options: &Options) -> Result<Built> {
-    Builder::new(collected, windows)
+    Builder::new(collected, windows, options)
         .and_then(|builder| builder.run(collected, options))
         .map_err(spool_error)
 }
@@ -59,27 +63,40 @@ struct Builder<'a> {
     /// Per topic: its streams and their messages.
     rates: Traffic,
     restarts: Restarts,
+    values: Values,
 }
 
 impl<'a> Builder<'a> {
-    fn new(collected: &mut Collected, windows: &'a [Span]) -> io::Result<Self> {
+    fn new(collected: &mut Collected, windows: &'a [Span], options: &Options) -> io::Result<Self> {
         let mut known = Known::new(&collected.streams, &mut collected.facts);
-        known.take_at_their_word()?;
+        known.take_at_their_word();
         for (row, source) in SOURCES.iter().enumerate() {
             for conclude in source.conclude {
-                conclude(row, &mut known)?;
+                conclude(row, &mut known);
             }
         }
+        if let Some(error) = known.failed {
+            return Err(error);
+        }
         let mut proofs = known.proofs;
+        let roles = if options.roles {
+            fold(&mut proofs, collected)
+        } else {
+            BTreeMap::new()
+        };
         let new = collected.facts.renumber();
         let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
         for proof in &mut proofs {
             proof.rename(&to);
         }
+        let roles: BTreeMap<Name, Name> = roles.into_iter().map(|(a, b)| (to(a), to(b))).collect();
+        let role = |name: Name| roles.get(&name).copied().unwrap_or(name);
         for stream in &mut collected.streams {
             stream.topic = to(stream.topic);
             stream.publisher = stream.publisher.map(to);
+            stream.speaker = stream.publisher.map(role);
         }
+        let values = Values::new(&mut collected.facts, role)?;
         let span = collected.span;
         let start = span.map_or(Stamp(0), |s| s.start);
         let end = span.map_or(Stamp(0), |s| s.end.plus(-1));
@@ -90,6 +107,7 @@ impl<'a> Builder<'a> {
             tracks: BTreeMap::new(),
             rates: BTreeMap::new(),
             restarts: Restarts::new(),
+            values,
         })
     }
 
@@ -180,7 +198,13 @@ impl<'a> Builder<'a> {
     }
 
     fn assemble(self, collected: &Collected) -> Built {
-        let mut built = assemble(&self.tracks, &self.rates, &self.windows, collected);
+        let mut built = assemble(
+            &self.tracks,
+            &self.rates,
+            &self.values,
+            &self.windows,
+            collected,
+        );
         for (node, restarts) in &self.restarts {
             let name = collected.facts.text(*node);
             let id = built
@@ -198,19 +222,42 @@ impl<'a> Builder<'a> {
     }
 }
 
+/// Puts every node under the name of its role; tells which names changed.
+fn fold(proofs: &mut [Proof], collected: &mut Collected) -> BTreeMap<Name, Name> {
+    let mut roles = BTreeMap::new();
+    let mut to = |node: Name| {
+        let text = collected.facts.text(node);
+        match role(&text) {
+            same if *same == *text => node,
+            role => {
+                let role = collected.facts.name(role);
+                roles.insert(node, role);
+                role
+            }
+        }
+    };
+    for proof in proofs {
+        proof.what = proof.what.with_node(&mut to);
+        if let When::Like(other) = &mut proof.when {
+            *other = other.with_node(&mut to);
+        }
+    }
+    roles
+}
+
 /// Puts the messages of one stream on a track.
 fn follow(track: &mut Track, rates: &Rates, place: usize, latched: bool, end: Stamp) {
-    let Some(trace) = rates.traces.get(place).copied().flatten() else {
+    let Some(spoke) = rates.traces.get(place).copied().flatten() else {
         track.whole = true;
         return;
     };
-    track.signs.extend([trace.first, trace.last]);
-    track.ceased |= trace.ceased(end);
+    track.signs.extend([spoke.first, spoke.last]);
+    track.ceased |= spoke.ceased(end);
     if latched {
         track.held = true;
         track.latched = track
             .latched
-            .map_or(Some(trace.first), |l| Some(l.min(trace.first)));
+            .map_or(Some(spoke.first), |l| Some(l.min(spoke.first)));
     }
     for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
         track.mark(tally.window, Degree::Measured);

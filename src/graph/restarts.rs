@@ -57,7 +57,7 @@ pub(super) fn restarts(collected: &mut Collected, proofs: &[Proof]) -> io::Resul
 fn own_streams(collected: &Collected) -> BTreeMap<Name, Vec<usize>> {
     let mut of: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
     for (at, stream) in collected.streams.iter().enumerate() {
-        if let Some(node) = stream.publisher.filter(|_| stream.trust == Trust::Whole) {
+        if let Some(node) = stream.speaker.filter(|_| stream.trust == Trust::Whole) {
             of.entry(node).or_default().push(at);
         }
     }

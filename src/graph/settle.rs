@@ -39,19 +39,9 @@ pub(super) fn settle(tracks: &mut BTreeMap<What, Track>, proofs: &[Proof], frame
         of_topics.entry(topic).or_default().extend(&track.lives);
         tracks.insert(what, track);
     }
-    for proof in proofs {
-        if let When::Like(other) = proof.when
-            && let Some(lives) = tracks.get(&other).map(|t| t.lives.clone())
-            && let Some(track) = tracks.get_mut(&proof.what)
-            && track.signs.is_empty()
-        {
-            if !matches!(proof.what, What::Node(_)) {
-                of_topics
-                    .entry(ends(proof.what).1)
-                    .or_default()
-                    .extend(&lives);
-            }
-            track.lives = lives;
+    for (what, lives) in live_like(tracks, proofs, false) {
+        if !matches!(what, What::Node(_)) {
+            of_topics.entry(ends(what).1).or_default().extend(lives);
         }
     }
     for (what, track) in tracks.iter_mut() {
@@ -62,6 +52,28 @@ pub(super) fn settle(tracks: &mut BTreeMap<What, Track>, proofs: &[Proof], frame
             track.lives.extend(edges);
         }
     }
+    live_like(tracks, proofs, true);
+}
+
+/// Lets elements live like others, which are topics or not; tells which did.
+fn live_like(
+    tracks: &mut BTreeMap<What, Track>,
+    proofs: &[Proof],
+    topics: bool,
+) -> Vec<(What, Vec<Life>)> {
+    let mut done = Vec::new();
+    for proof in proofs {
+        if let When::Like(other) = proof.when
+            && matches!(other, What::Topic(_)) == topics
+            && let Some(lives) = tracks.get(&other).map(|t| t.lives.clone())
+            && let Some(track) = tracks.get_mut(&proof.what)
+            && track.signs.is_empty()
+        {
+            track.lives.clone_from(&lives);
+            done.push((proof.what, lives));
+        }
+    }
+    done
 }
 
 /// All edges.

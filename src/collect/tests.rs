@@ -1,0 +1,464 @@
+//! Every source, fed with single messages.
+
+use super::*;
+use crate::bag::Encoding;
+use crate::facts::Claim;
+
+/// A payload under construction.
+struct Payload {
+    bytes: Vec<u8>,
+    cdr: bool,
+}
+
+impl Payload {
+    fn ros1() -> Self {
+        Self {
+            bytes: Vec::new(),
+            cdr: false,
+        }
+    }
+
+    fn cdr() -> Self {
+        Self {
+            bytes: vec![0, 1, 0, 0],
+            cdr: true,
+        }
+    }
+
+    fn number<const N: usize>(mut self, bytes: [u8; N]) -> Self {
+        while self.cdr && !(self.bytes.len() - 4).is_multiple_of(N) {
+            self.bytes.push(0);
+        }
+        self.bytes.extend(bytes);
+        self
+    }
+
+    fn byte(self, value: u8) -> Self {
+        self.number([value])
+    }
+
+    fn u32(self, value: u32) -> Self {
+        self.number(value.to_le_bytes())
+    }
+
+    fn u64(self, value: u64) -> Self {
+        self.number(value.to_le_bytes())
+    }
+
+    fn time(self) -> Self {
+        self.u32(1).u32(2)
+    }
+
+    fn raw(mut self, bytes: &[u8]) -> Self {
+        self.bytes.extend(bytes);
+        self
+    }
+
+    fn text(self, text: &str) -> Self {
+        let zero = if self.cdr { "\0" } else { "" };
+        let text = format!("{text}{zero}");
+        self.u32(u32::try_from(text.len()).unwrap())
+            .raw(text.as_bytes())
+    }
+
+    fn header(self, seq: u32) -> Self {
+        let start = if self.cdr { self } else { self.u32(seq) };
+        start.time().text("")
+    }
+
+    fn log(name: &str, message: &str, file: &str, topics: &[&str]) -> Self {
+        let record = Self::ros1()
+            .header(7)
+            .byte(2)
+            .text(name)
+            .text(message)
+            .text(file)
+            .text("f")
+            .u32(3);
+        let record = record.u32(u32::try_from(topics.len()).unwrap());
+        topics
+            .iter()
+            .fold(record, |record, topic| record.text(topic))
+    }
+}
+
+/// A collector that has heard one message of a connection, with what it wanted of it.
+fn hear(topic: &str, kind: &str, publisher: Option<&str>, payload: &Payload) -> (Collector, Want) {
+    let mut collector = Collector::new(Options::default());
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    let want = bag.connection(&Connection {
+        id: ConnectionId(0),
+        topic: topic.into(),
+        type_name: kind.into(),
+        definition: None,
+        type_hash: None,
+        publisher: publisher.map(Into::into),
+        latching: false,
+        qos: None,
+        encoding: if payload.cdr {
+            Encoding::Cdr
+        } else {
+            Encoding::Ros1
+        },
+    });
+    bag.message(Message {
+        connection: ConnectionId(0),
+        time: Stamp(5),
+        data: &payload.bytes,
+        size: 0,
+    });
+    (collector, want)
+}
+
+/// What one message claims, a line each, sorted.
+fn claims(topic: &str, kind: &str, publisher: Option<&str>, payload: &Payload) -> Vec<String> {
+    let (collector, want) = hear(topic, kind, publisher, payload);
+    assert_eq!(want, Want::Payload);
+    assert!(collector.notices.is_empty(), "{:?}", collector.notices);
+    let facts = &collector.facts;
+    let line = |claim: Claim| {
+        let debug = format!("{claim:?}");
+        let kind = debug.split('(').next().unwrap().to_owned();
+        let names = claim.names().into_iter().flatten();
+        names.fold(kind, |line, name| format!("{line} {}", facts.text(name)))
+    };
+    let mut lines: Vec<_> = facts.list.iter().map(|fact| line(fact.claim)).collect();
+    lines.sort();
+    lines
+}
+
+#[test]
+fn roscpp_names_what_it_publishes() {
+    let record = Payload::log("/a", "hello", "src/a.cpp", &["/scan"]);
+    assert_eq!(
+        claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
+        [
+            "Node /a",
+            "Publish /a /rosout",
+            "Publish /a /scan",
+            "Snapshot topics of /a"
+        ]
+    );
+}
+
+#[test]
+fn rospy_names_what_it_publishes_and_subscribes() {
+    let record = Payload::log("/a", "hello", "a.py", &["/scan"]);
+    assert_eq!(
+        claims("/rosout_agg", "rosgraph_msgs/Log", Some("/rosout"), &record),
+        ["Lists /a /scan", "Node /a", "Snapshot topics of /a"]
+    );
+}
+
+#[test]
+fn a_log_connection_of_another_node_was_merged() {
+    let record = Payload::log("/b", "hello", "a.py", &[]);
+    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
+    assert!(all.contains(&"Carries /a /b".to_owned()), "{all:?}");
+}
+
+#[test]
+fn roscpp_tells_of_its_subscribers() {
+    let text = "Connection to subscriber [callerid=[/c] address=[x]] to topic [/scan] dropped";
+    let record = Payload::log("/a", text, "link.cpp", &[]);
+    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
+    assert!(all.contains(&"Unsubscribe /c /scan".to_owned()), "{all:?}");
+}
+
+#[test]
+fn the_recorder_dates_a_topic() {
+    let record = Payload::log("/record_1", "Subscribing to /map", "recorder.cpp", &[]);
+    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/record_1"), &record);
+    assert!(all.contains(&"Appears /map".to_owned()), "{all:?}");
+}
+
+#[test]
+fn a_log_record_of_ros2_names_its_logger() {
+    let record = Payload::cdr()
+        .time()
+        .byte(20)
+        .text("r1.nav")
+        .text("hi")
+        .text("f")
+        .text("g")
+        .u32(1);
+    assert_eq!(
+        claims("/rosout", "rcl_interfaces/msg/Log", None, &record),
+        ["Logger /r1/nav /rosout"]
+    );
+}
+
+#[test]
+fn statistics_know_both_ends() {
+    let message = Payload::ros1()
+        .text("/scan")
+        .text("/lidar")
+        .text("/slam")
+        .time()
+        .time();
+    let message = message.u32(10).u32(0).u32(999).raw(&[0; 48]);
+    assert_eq!(
+        claims(
+            "/statistics",
+            "rosgraph_msgs/TopicStatistics",
+            Some("/slam"),
+            &message
+        ),
+        ["Publish /lidar /scan", "Subscribe /slam /scan"]
+    );
+}
+
+#[test]
+fn parameter_events_name_their_node() {
+    let value = |p: Payload| {
+        p.byte(2)
+            .byte(0)
+            .u64(5)
+            .u64(0)
+            .text("")
+            .u32(0)
+            .u32(0)
+            .u32(0)
+            .u32(0)
+            .u32(0)
+    };
+    let message = Payload::cdr()
+        .time()
+        .text("/r1/nav")
+        .u32(1)
+        .text("use_sim_time");
+    let message = value(message).u32(0).u32(0);
+    assert_eq!(
+        claims(
+            "/parameter_events",
+            "rcl_interfaces/msg/ParameterEvent",
+            None,
+            &message
+        ),
+        ["Node /r1/nav", "Publish /r1/nav /parameter_events"]
+    );
+}
+
+#[test]
+fn a_transition_tells_the_state() {
+    let message = Payload::cdr()
+        .u64(1)
+        .byte(3)
+        .text("activate")
+        .byte(2)
+        .text("inactive")
+        .byte(3)
+        .text("active");
+    assert_eq!(
+        claims(
+            "/amcl/transition_event",
+            "lifecycle_msgs/msg/TransitionEvent",
+            None,
+            &message
+        ),
+        [
+            "Lifecycle /amcl active",
+            "Publish /amcl /amcl/transition_event"
+        ]
+    );
+}
+
+#[test]
+fn a_graph_snapshot_names_everything() {
+    let duration = |p: Payload| p.u32(0).u32(0);
+    let qos = |p: Payload| {
+        let p = duration(duration(p.u32(10)))
+            .byte(1)
+            .byte(1)
+            .byte(2)
+            .byte(1);
+        duration(p)
+    };
+    let message = Payload::cdr().time().u32(1).text("/lidar");
+    let message = qos(message
+        .u32(1)
+        .text("/scan")
+        .text("sensor_msgs/msg/LaserScan"));
+    let message = message.u32(0).u32(0).u32(0);
+    assert_eq!(
+        claims(
+            "/rosgraph",
+            "rosgraph_monitor_msgs/msg/Graph",
+            None,
+            &message
+        ),
+        [
+            "Node /lidar",
+            "Publish /lidar /scan",
+            "Snapshot snapshot /rosgraph",
+            "Type /scan sensor_msgs/msg/LaserScan"
+        ]
+    );
+}
+
+#[test]
+fn topic_statistics_tell_publishers_from_subscribers() {
+    let one = |p: Payload, kind, node| {
+        let p = p.byte(kind).text(node).text("/scan").u32(9);
+        p.time().time().time()
+    };
+    let message = one(one(Payload::cdr().time().u32(2), 0, "/lidar"), 1, "/slam");
+    assert_eq!(
+        claims(
+            "/topic_statistics",
+            "rosgraph_monitor_msgs/msg/TopicStatistics",
+            None,
+            &message
+        ),
+        ["Publish /lidar /scan", "Subscribe /slam /scan"]
+    );
+}
+
+#[test]
+fn metrics_name_a_subscriber() {
+    let message = Payload::cdr()
+        .text("slam")
+        .text("message_age")
+        .text("ms")
+        .time()
+        .time();
+    let message = message.u32(1).byte(1).u64(0);
+    assert_eq!(
+        claims(
+            "/statistics",
+            "statistics_msgs/msg/MetricsMessage",
+            None,
+            &message
+        ),
+        ["Reports /slam /statistics"]
+    );
+}
+
+#[test]
+fn discovery_names_nodes_with_either_length_of_identifier() {
+    for gid in [16, 24] {
+        let id = vec![7; gid];
+        let message = Payload::cdr()
+            .raw(&id)
+            .u32(1)
+            .text("/r1")
+            .text("nav")
+            .u32(1)
+            .raw(&id)
+            .u32(0);
+        let all = claims(
+            "ros_discovery_info",
+            "rmw_dds_common/msg/ParticipantEntitiesInfo",
+            None,
+            &message,
+        );
+        assert!(all.contains(&"Node /r1/nav".to_owned()), "{gid}: {all:?}");
+    }
+}
+
+#[test]
+fn service_events_count_clients_and_calls() {
+    let message = Payload::cdr()
+        .byte(1)
+        .time()
+        .raw(&[9; 16])
+        .u64(3)
+        .u32(0)
+        .u32(0);
+    let all = claims("/add/_service_event", "a/srv/Add_Event", None, &message);
+    let expected = [
+        "Called /add/_service_event request received",
+        "Topic /add/_service_event",
+    ];
+    assert!(
+        expected.iter().all(|e| all.contains(&(*e).to_owned())),
+        "{all:?}"
+    );
+    assert_eq!(all.len(), 3);
+}
+
+#[test]
+fn diagnostics_name_their_node() {
+    let message = Payload::ros1()
+        .header(1)
+        .u32(1)
+        .byte(0)
+        .text("r1/lidar: Rate")
+        .text("")
+        .text("")
+        .u32(1);
+    let message = message.text("k").text("v");
+    assert_eq!(
+        claims(
+            "/diagnostics",
+            "diagnostic_msgs/DiagnosticArray",
+            None,
+            &message
+        ),
+        ["Reports /r1/lidar /diagnostics"]
+    );
+}
+
+#[test]
+fn the_status_of_a_goal_names_its_client() {
+    let message = Payload::ros1()
+        .header(1)
+        .u32(1)
+        .time()
+        .text("/boss-1-1795170744.123")
+        .byte(1)
+        .text("");
+    assert_eq!(
+        claims(
+            "/move/status",
+            "actionlib_msgs/GoalStatusArray",
+            None,
+            &message
+        ),
+        ["Publish /boss /move/goal"]
+    );
+}
+
+#[test]
+fn a_payload_of_another_layout_is_a_notice_and_no_claim() {
+    let message = Payload::log("/a", "hello", "a.py", &[]).byte(1);
+    let (collector, _) = hear("/rosout", "rosgraph_msgs/Log", None, &message);
+    assert!(collector.facts.list.is_empty());
+    let kinds: Vec<_> = collector.notices.iter().map(|n| n.kind).collect();
+    assert_eq!(kinds, [NoticeKind::Undecodable]);
+}
+
+#[test]
+fn every_layout_survives_any_cut() {
+    let record = Payload::log("/a", "hello", "a.py", &["/b", "/c"]);
+    for len in 0..record.bytes.len() {
+        let cut = Payload {
+            bytes: record.bytes[..len].to_vec(),
+            cdr: false,
+        };
+        let (collector, _) = hear("/rosout", "rosgraph_msgs/Log", None, &cut);
+        assert!(collector.facts.list.is_empty(), "{len}");
+    }
+}
+
+fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
+    let span = believed(&days.iter().copied().collect())?;
+    Some((span.start.0 / DAY, span.end.0 / DAY))
+}
+
+#[test]
+fn a_few_messages_far_from_the_bulk_are_set_aside() {
+    assert_eq!(kept(&[(0, 3), (20_000, 500)]), Some((20_000, 20_001)));
+    assert_eq!(kept(&[(0, 1), (20_000, 2)]), Some((20_000, 20_001)));
+    assert_eq!(kept(&[(0, 500), (20_000, 3)]), Some((0, 1)));
+}
+
+#[test]
+fn a_bag_that_is_one_piece_or_two_halves_is_kept_whole() {
+    assert_eq!(kept(&[(0, 500)]), None);
+    assert_eq!(kept(&[(20_000, 2), (20_006, 3)]), None);
+    assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
+    assert_eq!(kept(&[(0, 1), (20_000, 1)]), None);
+    assert_eq!(kept(&[]), None);
+}
