@@ -8,6 +8,7 @@ mod plain;
 mod rqt;
 mod union;
 
+use crate::error::{Error, Result};
 use crate::evidence::Evidence;
 use crate::evolution::Evolution;
 use crate::geometry::Size;
@@ -33,6 +34,18 @@ pub enum Profile {
 impl Profile {
     /// The profiles by the words of the command line.
     pub const ALL: [(&'static str, Self); 2] = [("rqt", Self::Rqt), ("plain", Self::Plain)];
+
+    /// The profile of this word.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another word.
+    pub fn parse(word: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|(name, _)| *name == word);
+        found.map(|(_, profile)| *profile).ok_or_else(|| {
+            let what = format!("`{word}` is no profile of DOT");
+            Error::usage(what, "profiles: rqt, plain")
+        })
+    }
 }
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.

@@ -197,6 +197,14 @@ pub struct Format {
     pub start: Start,
 }
 
+impl Format {
+    /// Whether it shows the picture; the others write the graph itself, whose size no page limits.
+    pub fn is_drawn(&self) -> bool {
+        let data = ["dot", "mmd", "json", "csv", "parquet", "gexf", "graphml"];
+        !data.contains(&self.word)
+    }
+}
+
 /// All formats.
 pub const FORMATS: &[Format] = &[
     Format {

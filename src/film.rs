@@ -94,6 +94,8 @@ impl Scenes for Picture<'_> {
 pub struct Film<'a> {
     /// The whole sequence.
     pub evolution: &'a Evolution,
+    /// What data files hold: the whole sequence too, or the part that is viewed.
+    pub data: &'a Evolution,
     /// What the picture shows of it.
     pub view: &'a View,
     /// What draws a window.

@@ -111,6 +111,7 @@ fn run(
     let fonts = Fonts::bundled();
     let film = Film {
         evolution: &evolution,
+        data: &evolution,
         view: &view,
         picture: &Discs,
         painter: &Painter::new(&fonts),

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::typed::{LookArgs, SequenceArgs, ViewArgs};
+use crate::dot::Profile;
 use crate::error::{Error, Result};
 use crate::film;
 use crate::geometry::Size;
@@ -94,6 +95,7 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<film::Options> {
         tween: args.tween,
         hold_changes: args.hold_changes,
         max_bytes: args.max_bytes,
+        dot_profile: Profile::parse(&args.dot_profile)?,
         strip: strip.transpose()?,
         ..film::Options::default()
     })

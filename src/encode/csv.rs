@@ -72,7 +72,7 @@ pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn E
     }
     target.must_be_one("the tables hold all windows")?;
     Ok(Box::new(Tables {
-        evolution: film.evolution,
+        evolution: film.data,
         target: target.clone(),
     }))
 }

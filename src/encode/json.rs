@@ -18,7 +18,7 @@ struct Data<'a> {
 pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
     target.must_be_one("the data of all windows is one file")?;
     Ok(Box::new(Data {
-        evolution: film.evolution,
+        evolution: film.data,
         target: target.clone(),
     }))
 }

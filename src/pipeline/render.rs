@@ -74,6 +74,8 @@ pub fn show(job: &Render, mut evolution: Evolution, watch: &mut dyn Watch) -> Re
     if let Some(from) = &job.captions {
         drawing.wish.phases = captions::phases(&evolution, &job.reading.inputs, from)?;
     }
+    // What is not drawn need not be made to fit a page.
+    drawing.is_fitted &= job.outputs.iter().any(|o| o.format.is_drawn());
     let Composed {
         view,
         options,
@@ -83,19 +85,16 @@ pub fn show(job: &Render, mut evolution: Evolution, watch: &mut dyn Watch) -> Re
     } = compose(&evolution, &drawing, watch);
     evolution.notices.extend(notices.iter());
     evolution.layout = Some(places(&view, &layout));
-    let data = if job.is_filtered {
-        filtered(&evolution, &options)
-    } else {
-        evolution.clone()
-    };
     let picture = Sketch::new(&view, &drawing.style, &drawing.fonts, wish).with(layout);
-    let strip = side_by_side(job, &data, &view, &picture)?;
+    let strip = side_by_side(job, &evolution, &view, &picture)?;
     for remark in strip.iter().flat_map(|s| &s.remarks) {
         let notice = Notice::new(NoticeKind::Note, remark.clone());
         evolution.notices.add(notice);
     }
+    let viewed = job.is_filtered.then(|| filtered(&evolution, &options));
     let film = Film {
-        evolution: &data,
+        evolution: &evolution,
+        data: viewed.as_ref().unwrap_or(&evolution),
         view: &view,
         picture: &picture,
         painter: &Painter::new(&drawing.fonts),

@@ -75,6 +75,7 @@ fn main() {
     };
     let film = Film {
         evolution: &evolution,
+        data: &evolution,
         view: &view,
         picture: &picture,
         painter: &painter,
