@@ -1,9 +1,10 @@
 //! The film strip: chosen windows side by side on one page, with one legend and the time under each.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evolution::Evolution;
 use crate::film::Choice;
 use crate::geometry::{Point, Rect, Size};
+use crate::layout::{self, Engine, Layout};
 use crate::picture::{Picture, Sketch, Wish};
 use crate::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
 use crate::style::Style;
@@ -23,6 +24,8 @@ const SMALLEST_PX: f64 = 9.0;
 const CAPTION: (f64, f64) = (9.0, 14.0);
 /// Space between panels, in pixels.
 const GAP: f64 = 10.0;
+/// Shapes of panels that are tried on paper: height over width.
+const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
 /// How many times as high as wide a strip becomes at most, if there is a choice.
 const HIGHEST: f64 = 1.3;
 
@@ -48,6 +51,8 @@ pub struct Source<'a> {
     pub style: &'a Style,
     /// What is written with.
     pub fonts: &'a Fonts,
+    /// What lays out anew where room is scarce.
+    pub engine: &'a dyn Engine,
 }
 
 /// The strip of `choice`. With `width_mm` the page is that wide on paper; otherwise as wide as it needs to be read on a
@@ -62,23 +67,20 @@ pub fn strip(
     width: f64,
 ) -> Result<Strip> {
     let windows = choice.places(source.view)?;
-    let bare = source.bare();
-    let natural = bare.scene(0).size;
-    let mut page = Page {
-        columns: columns(choice, windows.len(), natural),
-        width: width_mm.map_or(width, |mm| mm * PX_PER_MM),
-        panel: Size::default(),
-        caption: if width_mm.is_some() {
-            CAPTION.0
-        } else {
-            CAPTION.1
-        },
-    };
-    if width_mm.is_none() {
-        let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
-        page.width = page.width.max((legible + GAP) * page.columns as f64 + GAP);
+    let mut best: Option<(f64, Page, Picture<'_>)> = None;
+    for layout in source.layouts(width_mm.is_some()) {
+        let bare = source.bare(&layout);
+        let page = Page::new(choice, windows.len(), &bare, width_mm, width);
+        // A page that is too high counts as if it were shrunk until it is not.
+        let high = page.corner(windows.len().next_multiple_of(page.columns)).y;
+        let text = page.text / (high / page.width / HIGHEST).max(1.0);
+        if best.as_ref().is_none_or(|(most, ..)| text > *most) {
+            best = Some((text, page, bare));
+        }
     }
-    page.fit(natural);
+    let Some((_, page, bare)) = best else {
+        return Err(Error::usage("there is nothing to show", ""));
+    };
     let mut groups = Vec::new();
     for (at, window) in windows.iter().enumerate() {
         source.panel(&bare.scene(*window), &page, at, *window, &mut groups);
@@ -86,10 +88,7 @@ pub fn strip(
     let rows = windows.len().div_ceil(page.columns);
     let graphs = page.corner(rows * page.columns).y;
     let height = graphs + source.legend(&page, graphs, &mut groups);
-    let scale = page.panel.w / natural.w.max(1.0);
-    let remarks = width_mm
-        .map(|mm| remark(bare.text_px() * scale, mm))
-        .into_iter();
+    let remarks = width_mm.map(|mm| remark(page.text, mm)).into_iter();
     let scene = Scene {
         size: Size::new(page.width, height),
         width_mm,
@@ -135,13 +134,37 @@ struct Page {
     panel: Size,
     /// The font size of what is not graph.
     caption: f64,
+    /// The smallest font size in the graphs.
+    text: f64,
 }
 
 impl Page {
-    fn fit(&mut self, natural: Size) {
-        let columns = self.columns as f64;
-        let wide = ((self.width - GAP * (columns + 1.0)) / columns).max(1.0);
-        self.panel = Size::new(wide, wide * natural.h / natural.w.max(1.0));
+    fn new(
+        choice: &Choice,
+        panels: usize,
+        bare: &Picture<'_>,
+        width_mm: Option<f64>,
+        width: f64,
+    ) -> Self {
+        let natural = bare.scene(0).size;
+        let columns = columns(choice, panels, natural);
+        let (mut width, mut caption) = (width, CAPTION.1);
+        match width_mm {
+            Some(mm) => (width, caption) = (mm * PX_PER_MM, CAPTION.0),
+            None => {
+                let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
+                width = width.max((legible + GAP) * columns as f64 + GAP);
+            }
+        }
+        let wide = ((width - GAP * (columns as f64 + 1.0)) / columns as f64).max(1.0);
+        let scale = wide / natural.w.max(1.0);
+        Self {
+            columns,
+            width,
+            panel: Size::new(wide, natural.h * scale),
+            caption,
+            text: bare.text_px() * scale,
+        }
     }
 
     /// The top left corner of a panel.
@@ -156,9 +179,23 @@ impl Page {
 }
 
 impl<'a> Source<'a> {
+    /// Ways to lay out the graph: as in the picture, and on paper, where room is scarce, for other shapes of panels.
+    fn layouts(&self, on_paper: bool) -> Vec<Layout> {
+        let mut layouts = vec![self.picture.layout().clone()];
+        if on_paper {
+            let sketch = Sketch::new(self.view, self.style, self.fonts, Wish::default());
+            layouts.extend(SHAPES.map(|high| {
+                let page = Size::new(1000.0, 1000.0 * high);
+                let orientation = None;
+                let wish = layout::Wish { page, orientation };
+                layout::lay_out(sketch.plan(), &wish, self.engine)
+            }));
+        }
+        layouts
+    }
+
     /// The picture without furniture, at its natural size.
-    fn bare(&self) -> Picture<'a> {
-        let layout = self.picture.layout();
+    fn bare(&self, layout: &Layout) -> Picture<'a> {
         let wish = Wish {
             size: Size::new(layout.size.w * 1.06 + 8.0, layout.size.h * 1.06 + 8.0),
             bare: true,
@@ -342,7 +379,7 @@ mod tests {
 
     /// Four minutes in which a node is there and another comes and goes.
     fn mission() -> (Evolution, View) {
-        let minute = |i: i64| Stamp(i * 60_000_000_000);
+        let minute = |i: usize| Stamp(i64::try_from(i).unwrap() * 60_000_000_000);
         let period = Period::parse("1m").unwrap();
         let evolution = Evolution {
             bags: Vec::new(),
@@ -377,8 +414,8 @@ mod tests {
         let frame = |(index, mark): (usize, Option<Mark>)| Frame {
             index,
             span: Span {
-                start: minute(index as i64),
-                end: minute(index as i64 + 1),
+                start: minute(index),
+                end: minute(index + 1),
             },
             partial: false,
             messages: 0,
@@ -412,17 +449,20 @@ mod tests {
             picture: &picture,
             style: &style,
             fonts: &fonts,
+            engine: layout::engine("layered").unwrap(),
         };
         strip(source, &Choice::parse(choice).unwrap(), width_mm, 1280.0).unwrap()
     }
 
     fn texts(strip: &Strip) -> Vec<&Text> {
         let pieces = strip.scene.groups.iter().flat_map(|g| &g.pieces);
-        let text = |piece| match piece {
-            &Piece::Text(ref text) => Some(text),
-            &Piece::Shape(_) => None,
-        };
-        pieces.filter_map(text).collect()
+        let mut texts = Vec::new();
+        for piece in pieces {
+            if let Piece::Text(text) = piece {
+                texts.push(text);
+            }
+        }
+        texts
     }
 
     #[test]

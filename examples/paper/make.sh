@@ -3,7 +3,7 @@
 set -eu
 cd "$(dirname "$0")"
 bag=../warehouse.bag
-bagreel --version > version.tex
+printf '\\newcommand{\\version}{%s}\n' "$(bagreel --version)" > version.tex
 bagreel render "$bag" --period 30 --style paper --strip 2x3 --width 180mm -o strip.pdf
 bagreel render "$bag" --period 30 --style paper --ns-filter /robot1 --strip 1x3 --width 88mm -o column.pdf
 bagreel render "$bag" --period 30 --style paper -o mission.pdf

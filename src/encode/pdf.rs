@@ -4,8 +4,8 @@ use std::io::Write as _;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use krilla::Document;
 use krilla::color::rgb;
+use krilla::configure::{ConfigurationBuilder, PdfVersion};
 use krilla::destination::XyzDestination;
 use krilla::geom::{self, PathBuilder, Transform};
 use krilla::metadata::Metadata;
@@ -15,6 +15,7 @@ use krilla::page::PageSettings;
 use krilla::paint::{Fill, LineCap, LineJoin, Stroke, StrokeDash};
 use krilla::surface::Surface;
 use krilla::text::{Font, TextDirection};
+use krilla::{Document, SerializeSettings};
 
 use super::{Encoder, Frame, Needs, Written};
 use crate::error::{Error, Result};
@@ -140,7 +141,12 @@ impl Encoder for Book<'_> {
 
 /// Draws pages until there are no more, and gives the file's bytes.
 fn press(sheets: &Receiver<Sheet>, fonts: &Fonts) -> std::result::Result<Vec<u8>, String> {
-    let mut document = Document::new();
+    // What every TeX takes as a figure.
+    let version = ConfigurationBuilder::new().with_version(PdfVersion::Pdf15);
+    let mut document = Document::new_with(SerializeSettings {
+        configuration: version.finish().map_err(|e| format!("{e:?}"))?,
+        ..SerializeSettings::default()
+    });
     let faces: Vec<Option<Font>> = fonts
         .files()
         .map(|f| Font::new(f.to_vec().into(), 0))

@@ -9,14 +9,14 @@ use crate::view::{Tally, View};
 pub enum Choice {
     /// Columns and rows: the first window and those that change most.
     Grid(usize, usize),
-    /// The first window and all that show a change, [`MOST`] at most.
+    /// The first window and all that show a change, at most a dozen.
     Changes,
     /// These, by index.
     Windows(Vec<usize>),
 }
 
 /// The most windows on a strip that are chosen for the user.
-pub const MOST: usize = 12;
+const MOST: usize = 12;
 impl Choice {
     /// Reads `3x2`, `changes` or `0,4,9`.
     ///

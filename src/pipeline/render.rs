@@ -133,6 +133,7 @@ fn side_by_side(
         picture,
         style: &job.drawing.style,
         fonts: &job.drawing.fonts,
+        engine: job.drawing.engine,
     };
     let choice = asked.unwrap_or(&Choice::Changes);
     strip(source, choice, wish.width_mm, wish.size.w).map(Some)

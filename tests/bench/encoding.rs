@@ -58,6 +58,7 @@ fn main() {
         picture: &picture,
         style: &style,
         fonts: &fonts,
+        engine: layout::engine("layered").unwrap(),
     };
     let page = strip(
         source,
