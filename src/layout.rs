@@ -4,6 +4,7 @@
 
 mod acyclic;
 mod cut;
+mod fold;
 mod layered;
 mod order;
 mod pack;

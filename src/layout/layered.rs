@@ -5,7 +5,7 @@
 use super::cut::{Lane, cut};
 use super::room::{Room, turned};
 use super::{Engine, Layers, Layout, Orientation, Part, Plan, Route, Rows, Wish};
-use super::{acyclic, order, pack, parts, place, rank, route};
+use super::{acyclic, fold, order, pack, parts, place, rank, route};
 use crate::error::Result;
 use crate::geometry::{Point, Rect, Size};
 
@@ -28,7 +28,11 @@ impl Engine for Layered {
 /// The layered layout of a sane plan.
 pub(super) fn lay_out(plan: &Plan, wish: &Wish) -> Layout {
     let parts = parts::parts(plan);
-    let drafts: Vec<Vec<Draft>> = parts.iter().map(|part| drafts(plan, part)).collect();
+    let aspect = wish.page.w / wish.page.h.max(1.0);
+    let drafts: Vec<Vec<Draft>> = parts
+        .iter()
+        .map(|part| drafts(plan, part, aspect))
+        .collect();
     let both = [Orientation::LeftRight, Orientation::TopBottom];
     let wished = both
         .into_iter()
@@ -53,8 +57,9 @@ struct Draft {
     crossings: u64,
 }
 
-/// The drafts of a part: cycles broken in different ways, long edges led outside and inside of clusters.
-fn drafts(plan: &Plan, part: &Part) -> Vec<Draft> {
+/// The drafts of a part: cycles broken in different ways, shallow graphs folded, long edges led outside and inside of
+/// clusters.
+fn drafts(plan: &Plan, part: &Part, aspect: f64) -> Vec<Draft> {
     let n = part.vertices.len();
     let greedy = acyclic::greedy(n, &part.ends);
     let (mut broken, mut lanes) = (vec![greedy], vec![Lane::Inside]);
@@ -75,9 +80,15 @@ fn drafts(plan: &Plan, part: &Part) -> Vec<Draft> {
             .iter()
             .zip(&reversed)
             .map(|(&(a, b), &turn)| if turn { (b, a) } else { (a, b) });
-        let rank = rank::ranks(n, &turned.collect::<Vec<_>>());
-        for &lane in &lanes {
-            let layers = cut(part, &rank, lane);
+        let turned: Vec<_> = turned.collect();
+        let rank = rank::ranks(n, &turned);
+        let folds =
+            fold::suitable(n, aspect).map(|many| fold::fold(&rank, &turned, &part.home, many));
+        let mut ranks: Vec<_> = folds.into_iter().flatten().collect();
+        ranks.insert(0, rank);
+        ranks.dedup();
+        for (rank, &lane) in ranks.iter().flat_map(|r| lanes.iter().map(move |l| (r, l))) {
+            let layers = cut(part, rank, lane);
             let (rows, crossings) = order::order(&layers, effort);
             drafts.push(Draft {
                 layers,
