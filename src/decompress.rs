@@ -1,6 +1,7 @@
 //! The compressions of bags as streams: what comes out is read piece by piece, so no number in a file sizes memory.
 
 use std::io::{self, Read};
+use std::ops::Range;
 
 /// A compression that a bag may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,7 +49,7 @@ impl Compression {
         Ok(match self {
             Self::None => Box::new(from),
             Self::Bz2 => Box::new(bzip2::read::MultiBzDecoder::new(from)),
-            Self::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(from)),
+            Self::Lz4 => lz4(from)?,
             Self::Zstd => {
                 let mut decoder = zstd::Decoder::new(from)?;
                 decoder.window_log_max(LARGEST_WINDOW)?;
@@ -69,6 +70,94 @@ pub(crate) fn zstd_payload(bytes: &[u8], limit: usize) -> Option<Vec<u8>> {
     let most = u64::try_from(limit).ok()?.saturating_add(1);
     reader.take(most).read_to_end(&mut out).ok()?;
     (out.len() <= limit).then_some(out)
+}
+
+/// LZ4 frames as ROS writes them, of independent blocks, are unpacked block by block: without the content's checksum
+/// that takes two thirds of the time. All others go through the crate's own decoder.
+fn lz4<'a>(mut from: impl Read + Send + 'a) -> io::Result<Box<dyn Read + Send + 'a>> {
+    let mut head = Vec::new();
+    from.by_ref().take(6).read_to_end(&mut head)?;
+    let plain = head.starts_with(b"\x04\x22\x4d\x18") && head.len() == 6;
+    // Version 1, independent blocks, no dictionary.
+    if plain && head[4] & 0b1110_0001 == 0b0110_0000 {
+        let largest = match head[5] >> 4 & 7 {
+            4 => 64 << 10,
+            5 => 256 << 10,
+            6 => 1 << 20,
+            _ => 4 << 20,
+        };
+        // The content's size, if it stands there, and a checksum of the head.
+        let rest = if head[4] & 0b1000 == 0 { 1 } else { 9 };
+        io::copy(&mut from.by_ref().take(rest), &mut io::sink())?;
+        return Ok(Box::new(Blocks {
+            from,
+            checksums: head[4] & 0b1_0000 != 0,
+            packed: Vec::new(),
+            plain: vec![0; largest],
+            ready: 0..0,
+            ended: false,
+        }));
+    }
+    let whole = io::Cursor::new(head).chain(from);
+    Ok(Box::new(lz4_flex::frame::FrameDecoder::new(whole)))
+}
+
+/// The independent blocks of one LZ4 frame.
+struct Blocks<R> {
+    from: R,
+    /// Whether each block is followed by one, which nobody looks at.
+    checksums: bool,
+    packed: Vec<u8>,
+    plain: Vec<u8>,
+    /// What of `plain` has not been handed out.
+    ready: Range<usize>,
+    ended: bool,
+}
+
+impl<R: Read> Blocks<R> {
+    fn next(&mut self) -> io::Result<()> {
+        let mut head = [0; 4];
+        self.from.read_exact(&mut head)?;
+        let head = u32::from_le_bytes(head);
+        let (stored, len) = (head >> 31 == 1, (head & 0x7fff_ffff) as usize);
+        self.ended = len == 0;
+        if len > self.plain.len() {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "an LZ4 block is too long",
+            ));
+        }
+        let into = if stored {
+            &mut self.plain
+        } else {
+            &mut self.packed
+        };
+        if !stored {
+            into.resize(len, 0);
+        }
+        self.from.read_exact(&mut into[..len])?;
+        self.ready = 0..len;
+        if !stored && !self.ended {
+            let n = lz4_flex::block::decompress_into(&self.packed, &mut self.plain);
+            self.ready = 0..n.map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
+        }
+        if self.checksums && !self.ended {
+            self.from.read_exact(&mut [0; 4])?;
+        }
+        Ok(())
+    }
+}
+
+impl<R: Read> Read for Blocks<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        while self.ready.is_empty() && !self.ended {
+            self.next()?;
+        }
+        let n = self.ready.len().min(into.len());
+        into[..n].copy_from_slice(&self.plain[self.ready.start..self.ready.start + n]);
+        self.ready.start += n;
+        Ok(n)
+    }
 }
 
 #[cfg(test)]
@@ -111,6 +200,37 @@ mod tests {
                 .read_to_end(&mut out)
                 .unwrap();
             assert!(out == plain, "{how:?}");
+        }
+    }
+
+    #[test]
+    fn every_kind_of_lz4_frame_comes_out_again() {
+        use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
+        let plain: Vec<u8> = (0..500_000u64)
+            .flat_map(|i| (i * i / 7).to_le_bytes())
+            .collect();
+        for mode in [BlockMode::Independent, BlockMode::Linked] {
+            for size in [BlockSize::Max64KB, BlockSize::Max1MB, BlockSize::Max4MB] {
+                for checks in [false, true] {
+                    let info = FrameInfo::new().block_mode(mode).block_size(size);
+                    let info = info.block_checksums(checks).content_checksum(checks);
+                    let info = info.content_size(checks.then_some(plain.len() as u64));
+                    let mut to = FrameEncoder::with_frame_info(info, Vec::new());
+                    to.write_all(&plain).unwrap();
+                    let packed = to.finish().unwrap();
+                    let mut out = Vec::new();
+                    let mut reader = Compression::Lz4.reader(&packed[..]).unwrap();
+                    reader.read_to_end(&mut out).unwrap();
+                    assert!(out == plain, "{mode:?} {size:?} {checks}");
+                    let cut = Compression::Lz4
+                        .reader(&packed[..packed.len() / 2])
+                        .unwrap();
+                    assert!(
+                        io::copy(&mut { cut }, &mut io::sink()).is_err(),
+                        "cut {mode:?}"
+                    );
+                }
+            }
         }
     }
 

@@ -225,6 +225,23 @@ fn a_cut_bag_keeps_what_came_before_the_cut() {
 }
 
 #[test]
+fn reading_from_the_front_goes_on_behind_damage() {
+    let recording = support::small();
+    let mut bytes = rosbag1::unindexed(&rosbag1::write(&recording, Pack::Lz4, 4000));
+    let chunks: Vec<usize> = (0..bytes.len())
+        .filter(|at| bytes[*at..].starts_with(b"op=\x05"))
+        .collect();
+    // Garbage over the head of a chunk in the middle.
+    let at = chunks[chunks.len() / 2];
+    bytes[at - 30..at + 20].fill(0x77);
+    let (_dir, path) = placed("x.bag", &bytes);
+    let (report, kept) = read(&path, Want::Stamps).unwrap();
+    assert!(!report.complete);
+    let (found, sent) = (kept.stamps.len(), recording.messages.len());
+    assert!(found < sent && found > sent * 9 / 10, "{found} of {sent}");
+}
+
+#[test]
 fn a_wrong_index_costs_time_and_no_message() {
     let recording = support::small();
     let mut bytes = rosbag1::write(&recording, Pack::Lz4, 4000);

@@ -1,5 +1,7 @@
 //! A tiny bag builder: one description, written as ROS 1 bag, MCAP and SQLite; and a sink that keeps what it is told.
 
+#![expect(unreachable_pub, reason = "a test binary has no outside")]
+
 pub mod cdr;
 pub mod mcap;
 pub mod mission;

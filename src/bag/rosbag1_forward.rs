@@ -9,6 +9,9 @@ use crate::notice::{Notice, NoticeKind};
 use crate::source::Stream;
 use crate::time::Stamp;
 
+/// How far is looked at a time for where records go on, in bytes.
+const STRIDE: usize = 64 * 1024;
+
 /// What was found on the way.
 #[derive(Debug, Default)]
 pub(super) struct Found {
@@ -74,11 +77,33 @@ impl Walk<'_> {
                 Ok((record, len)) => self.record(stream, record, len),
                 Err(stop) => Err(stop),
             };
-            if let Err(stop) = stop {
-                return stop;
+            match stop {
+                Ok(()) => {}
+                Err(Stop::Broken) if self.resume(stream) => {}
+                Err(stop) => return stop,
             }
             self.sink.progress(stream.position(), self.total);
         }
+    }
+
+    /// Passes over what is no record, up to the next chunk; answers whether there is one.
+    fn resume(&mut self, stream: &mut Stream<'_>) -> bool {
+        let from = stream.position();
+        while let Ok(window) = stream.peek(2 * STRIDE) {
+            let len = window.len();
+            let mut starts = 0..len.min(STRIDE);
+            if let Some(at) = starts.find(|at| records::is_chunk(&window[*at..])) {
+                stream.advance(at);
+                let lost = stream.position() - from;
+                self.damage(&format!("{lost} bytes from byte {from} on are no records"));
+                return true;
+            }
+            if len <= STRIDE {
+                break;
+            }
+            stream.advance(STRIDE);
+        }
+        false
     }
 
     fn chunk(

@@ -110,6 +110,14 @@ pub(super) fn parse(header: &[u8]) -> Option<Record> {
     Some(Fields(header).record().unwrap_or(Record::Other))
 }
 
+/// Whether a chunk's record begins here.
+pub(super) fn is_chunk(bytes: &[u8]) -> bool {
+    // Real headers take 40 to 60 bytes; the test is made at every byte.
+    let len = u32_at(bytes, 0).filter(|n| (20..200).contains(n));
+    let header = len.and_then(|n| bytes.get(4..4 + n as usize));
+    matches!(header.and_then(parse), Some(Record::Chunk { .. }))
+}
+
 /// A header that has been walked through once.
 struct Fields<'a>(&'a [u8]);
 

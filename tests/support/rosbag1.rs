@@ -182,7 +182,7 @@ pub fn write(recording: &Recording, how: Pack, chunk: usize) -> Vec<u8> {
     for id in &seen {
         bytes.extend(connection(*id, &recording.publishers[*id as usize]));
     }
-    infos.iter().for_each(|info| bytes.extend(info));
+    bytes.extend(infos.concat());
     let head = bag_header(index_pos, seen.len(), infos.len());
     bytes[MAGIC.len()..MAGIC.len() + head.len()].copy_from_slice(&head);
     bytes
