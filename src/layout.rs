@@ -4,8 +4,12 @@
 
 mod acyclic;
 mod cut;
+mod detour;
 mod fold;
+mod keep;
+mod labels;
 mod layered;
+mod layout_rs;
 mod order;
 mod pack;
 mod parts;
@@ -136,7 +140,10 @@ pub trait Engine {
 }
 
 /// Every engine: its word on the command line, and itself. The first is the default.
-pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[("layered", &layered::Layered)];
+pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[
+    ("layered", &layered::Layered),
+    ("layout-rs", &layout_rs::LayoutRs),
+];
 
 /// The engine of this word.
 ///
@@ -165,6 +172,33 @@ pub fn lay_out(plan: &Plan, wish: &Wish, engine: &dyn Engine) -> Layout {
     })
 }
 
+/// The layout of this plan with the boxes of an earlier one where they were: `known` has a place per vertex, `None` for
+/// a new one. New boxes stand near what they are linked to; frames and routes are found anew.
+///
+/// Where nothing moved and nothing is new, this is the layout of [`lay_out`].
+pub fn extend(plan: &Plan, wish: &Wish, engine: &dyn Engine, known: &[Option<Rect>]) -> Layout {
+    let fresh = lay_out(plan, wish, engine);
+    let same = |(now, then): (&Rect, &Option<Rect>)| {
+        then.is_some_and(|then| (now.x - then.x).abs() < 1.0 && (now.y - then.y).abs() < 1.0)
+    };
+    if known.iter().all(Option::is_none)
+        || fresh.boxes.len() == known.len() && fresh.boxes.iter().zip(known).all(same)
+    {
+        return fresh;
+    }
+    let plan = plan.sane();
+    let mut layout = keep::kept(&plan, known, fresh.orientation);
+    let (routes, straight) = detour::routes(&plan, &layout.boxes);
+    layout.routes = routes;
+    if straight > 0 {
+        layout.remarks.push(format!(
+            "{straight} edges found no way around the kept boxes"
+        ));
+    }
+    labels::place(&plan, &mut layout);
+    layout
+}
+
 impl Plan {
     /// This plan with every size finite and every reference valid; a link that names nothing gets a route without pieces.
     fn sane(&self) -> Self {
@@ -180,6 +214,16 @@ impl Plan {
         }
         for link in &mut plan.links {
             link.label = link.label.map(sane_size);
+        }
+        plan
+    }
+
+    /// This plan as if no cluster were there.
+    fn without_clusters(&self) -> Self {
+        let mut plan = self.clone();
+        plan.clusters.clear();
+        for vertex in &mut plan.vertices {
+            vertex.cluster = None;
         }
         plan
     }

@@ -10,6 +10,7 @@
 
 mod cli;
 mod encode;
+mod layout;
 mod properties;
 mod reading;
 mod ros2_example;

@@ -2,10 +2,12 @@
 //!
 //! It is the line through the other files of this folder, which is why it alone knows its siblings.
 
+use std::collections::BTreeSet;
+
 use super::cut::{Lane, cut};
 use super::room::{Room, turned};
 use super::{Engine, Layers, Layout, Orientation, Part, Plan, Route, Rows, Wish};
-use super::{acyclic, fold, order, pack, parts, place, rank, route};
+use super::{acyclic, fold, labels, order, pack, parts, place, rank, route};
 use crate::error::Result;
 use crate::geometry::{Point, Rect, Size};
 
@@ -45,9 +47,31 @@ pub(super) fn lay_out(plan: &Plan, wish: &Wish) -> Layout {
             .collect();
         assembled(plan, wish, &parts, blocks, orientation)
     });
-    tries
-        .reduce(|best, next| if next.0 > best.0 { next } else { best })
-        .map_or_else(Layout::empty, |best| best.1)
+    let labelled = tries.map(|(quality, mut layout)| {
+        labels::place(plan, &mut layout);
+        (quality * (0.6 + 0.4 * labelled(plan, &layout)), layout)
+    });
+    let best = labelled.reduce(|best, next| if next.0 > best.0 { next } else { best });
+    best.map_or_else(Layout::empty, |best| best.1)
+}
+
+/// How many of the labels found room, from 0 to 1.
+fn labelled(plan: &Plan, layout: &Layout) -> f64 {
+    let wanted = plan
+        .links
+        .iter()
+        .filter(|link| link.label.is_some())
+        .count();
+    let placed = layout
+        .routes
+        .iter()
+        .filter(|route| route.label.is_some())
+        .count();
+    if wanted == 0 {
+        1.0
+    } else {
+        placed as f64 / wanted as f64
+    }
 }
 
 /// One way of cutting and ordering a part.
@@ -57,56 +81,63 @@ struct Draft {
     crossings: u64,
 }
 
-/// The drafts of a part: cycles broken in different ways, shallow graphs folded, long edges led outside and inside of
-/// clusters.
+/// The drafts of a part: every way of ranking, with long edges led outside and inside of clusters.
 fn drafts(plan: &Plan, part: &Part, aspect: f64) -> Vec<Draft> {
-    let n = part.vertices.len();
-    let greedy = acyclic::greedy(n, &part.ends);
-    let (mut broken, mut lanes) = (vec![greedy], vec![Lane::Inside]);
-    if part.ends.len() <= MANY {
-        broken.push(acyclic::in_order(n, &part.ends));
-        broken.push(acyclic::by_cluster(&part.ends, &part.home, &part.parent));
-        broken.dedup();
+    let ways = rankings(part, aspect);
+    let mut lanes = vec![Lane::Inside];
+    if part.ends.len() <= MANY && !part.clusters.is_empty() {
         lanes.push(Lane::Outside);
     }
-    if part.clusters.is_empty() {
-        lanes.truncate(1);
-    }
-    let effort = EFFORT * n / plan.vertices.len().max(1) / broken.len() / lanes.len();
-    let mut drafts = Vec::new();
-    for reversed in broken {
-        let turned = part
-            .ends
-            .iter()
-            .zip(&reversed)
-            .map(|(&(a, b), &turn)| if turn { (b, a) } else { (a, b) });
-        let turned: Vec<_> = turned.collect();
-        let rank = rank::ranks(n, &turned);
-        let folds =
-            fold::suitable(n, aspect).map(|many| fold::fold(&rank, &turned, &part.home, many));
-        let mut ranks: Vec<_> = folds.into_iter().flatten().collect();
-        ranks.insert(0, rank);
-        ranks.dedup();
-        for (rank, &lane) in ranks.iter().flat_map(|r| lanes.iter().map(move |l| (r, l))) {
-            let layers = cut(part, rank, lane);
-            let (rows, crossings) = order::order(&layers, effort);
-            drafts.push(Draft {
-                layers,
-                rows,
-                crossings,
-            });
+    let share = EFFORT * part.vertices.len() / plan.vertices.len().max(1);
+    let effort = share / ways.len().max(1) / lanes.len();
+    let pairs = ways
+        .iter()
+        .flat_map(|rank| lanes.iter().map(move |lane| (rank, *lane)));
+    let draft = |(rank, lane): (&Vec<usize>, Lane)| {
+        let layers = cut(part, rank, lane);
+        let (rows, crossings) = order::order(&layers, effort);
+        Draft {
+            layers,
+            rows,
+            crossings,
         }
+    };
+    pairs.map(draft).collect()
+}
+
+/// Ranks for a part: cycles broken in different ways, shallow graphs folded.
+fn rankings(part: &Part, aspect: f64) -> Vec<Vec<usize>> {
+    let n = part.vertices.len();
+    let ranked = |reversed: &[bool]| {
+        let edges = rank::turned(&part.ends, reversed);
+        (rank::ranks(n, &edges), edges)
+    };
+    let mut ways = vec![acyclic::greedy(n, &part.ends)];
+    if part.ends.len() > MANY {
+        return vec![ranked(&ways[0]).0];
     }
-    drafts
+    ways.push(acyclic::in_order(n, &part.ends));
+    ways.push(acyclic::by_cluster(&part.ends, &part.home, &part.parent));
+    let mut rankings = Vec::new();
+    for reversed in ways {
+        let (rank, edges) = ranked(&reversed);
+        let folded =
+            fold::suitable(n, aspect).map(|many| fold::fold(&rank, &edges, &part.home, many));
+        rankings.push(rank);
+        rankings.extend(folded.into_iter().flatten());
+    }
+    let mut seen = BTreeSet::new();
+    rankings.retain(|rank| seen.insert(rank.clone()));
+    rankings
 }
 
 /// One part placed and routed, its top left corner at (0, 0).
-struct Block {
-    size: Size,
-    crossings: u64,
-    boxes: Vec<Rect>,
-    routes: Vec<Route>,
-    clusters: Vec<Rect>,
+pub(super) struct Block {
+    pub(super) size: Size,
+    pub(super) crossings: u64,
+    pub(super) boxes: Vec<Rect>,
+    pub(super) routes: Vec<Route>,
+    pub(super) clusters: Vec<Rect>,
 }
 
 /// How good a drawing is: the scale at which it fills the page, how small it is at all, how free of crossings.
@@ -180,7 +211,7 @@ impl Block {
     }
 
     /// This block, so far with x along and y across, turned to the page and moved to (0, 0).
-    fn on_page(self, orientation: Orientation) -> Self {
+    pub(super) fn on_page(self, orientation: Orientation) -> Self {
         let reach = self
             .routes
             .iter()
@@ -217,7 +248,7 @@ impl Block {
 }
 
 /// All blocks packed, with the quality of the whole.
-fn assembled(
+pub(super) fn assembled(
     plan: &Plan,
     wish: &Wish,
     parts: &[Part],

@@ -11,6 +11,8 @@ use super::{Kind, Layers, Rows, monotone};
 /// How often one order is swept at most, and after how many sweeps without gain it is given up.
 const SWEEPS: usize = 24;
 const PATIENCE: usize = 6;
+/// How often the best order is shaken at most.
+const SHAKES: usize = 16;
 
 /// The best order found and its number of crossings, borders of clusters included. `effort` counts edges swept: the
 /// search begins anew, then shakes the best order, until it is spent.
@@ -28,7 +30,10 @@ pub(super) fn order(layers: &Layers, effort: usize) -> (Rows, u64) {
         search.improve(&depth_first(layers, false), false);
     }
     let mut dice = Dice(1);
-    while search.effort > 0 && search.best.1 > 0 {
+    for _ in 0..SHAKES {
+        if search.effort == 0 || search.best.1 == 0 {
+            break;
+        }
         let shaken = search.shaken(&mut dice);
         search.improve(&shaken, dice.throw() > 0.0);
     }

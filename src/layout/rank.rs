@@ -26,6 +26,13 @@ pub(super) fn ranks(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     rank.iter().map(|r| r - least).collect()
 }
 
+/// These edges with some reversed.
+pub(super) fn turned(edges: &[(usize, usize)], reversed: &[bool]) -> Vec<(usize, usize)> {
+    let turn =
+        |(&(from, to), &turn): (&(usize, usize), &bool)| if turn { (to, from) } else { (from, to) };
+    edges.iter().zip(reversed).map(turn).collect()
+}
+
 /// The length of the longest path to each vertex, and the vertices sorted along the edges.
 fn longest_paths(after: &[Vec<usize>], before: &[Vec<usize>]) -> (Vec<usize>, Vec<usize>) {
     let n = after.len();

@@ -11,6 +11,8 @@ const EDGE_GAP: f64 = 7.0;
 /// The room between a cluster's border and what is inside, and outside.
 const PADDING: f64 = 8.0;
 const MARGIN: f64 = 4.0;
+/// The room before and after a label between two layers.
+const LABEL_GAP: f64 = 12.0;
 /// The room that the first self loop takes beside its vertex, and each further one.
 const LOOP: (f64, f64) = (14.0, 6.0);
 
@@ -22,6 +24,8 @@ pub(super) struct Room<'a> {
     pub(super) size: Vec<Size>,
     /// How many self loops each vertex has.
     loops: Vec<usize>,
+    /// The longest label along that stands between a layer and the next.
+    label: Vec<f64>,
     /// The size of each cluster's title; the first stands for the outside.
     title: Vec<Size>,
 }
@@ -37,6 +41,13 @@ impl<'a> Room<'a> {
         for &(from, _) in part.ends.iter().filter(|(from, to)| from == to) {
             loops[from] += 1;
         }
+        let mut label = vec![0.0_f64; layers.ranks];
+        for (&i, chain) in part.links.iter().zip(&layers.chains) {
+            if let (Some(size), &[first, _]) = (plan.links[i].label, chain.as_slice()) {
+                let label = &mut label[layers.rank[first]];
+                *label = label.max(turned(size, orientation).w);
+            }
+        }
         let size = |&v: &usize| turned(plan.vertices[v].size, orientation);
         let title = |&c: &usize| turned(plan.clusters[c].title, orientation);
         Self {
@@ -44,6 +55,7 @@ impl<'a> Room<'a> {
             orientation,
             size: part.vertices.iter().map(size).collect(),
             loops,
+            label,
             title: std::iter::once(Size::default())
                 .chain(part.clusters.iter().map(title))
                 .collect(),
@@ -115,9 +127,10 @@ impl<'a> Room<'a> {
     pub(super) fn columns(&self, rows: &Rows, across: &[f64]) -> Vec<(f64, f64)> {
         let depth = self.depths();
         let mut width = self.widths();
-        let gaps: Vec<f64> = rows
-            .iter()
-            .map(|row| self.bending_room(row, across))
+        let bending = rows.iter().map(|row| self.bending_room(row, across));
+        let gaps: Vec<f64> = bending
+            .zip(&self.label)
+            .map(|(room, label)| room.max(label + LABEL_GAP))
             .collect();
         self.widen_for_titles(&mut width, &gaps);
         let mut at = 0.0;

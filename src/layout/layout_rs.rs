@@ -1,0 +1,185 @@
+//! A second engine: cycles, ranks and order are ours, the places come from the crate `layout-rs`, the routes are ours.
+//!
+//! Its own way through a graph takes exponential time on some and routes edges through boxes; its placement does not.
+//! Like `layered.rs`, it is a line through its siblings. It knows no clusters: their frames stay empty.
+
+use ::layout::core::base::Orientation as Direction;
+use ::layout::core::geometry::{Point as TheirPoint, Position};
+use ::layout::core::style::StyleAttr;
+use ::layout::std_shapes::shapes::{Element, ShapeKind};
+use ::layout::topo::layout::VisualGraph;
+use ::layout::topo::placer::Placer;
+
+use super::cut::{Lane, cut};
+use super::layered::{Block, assembled};
+use super::room::{Room, turned};
+use super::{Engine, Kind, Layers, Layout, Orientation, Part, Plan, Rows, Wish};
+use super::{acyclic, labels, order, parts, rank, route};
+use crate::error::{Error, Result};
+use crate::geometry::{Rect, Size};
+
+/// More vertices than this take it too long.
+const MOST: usize = 150;
+/// How many edges the search for a good order may sweep, per part.
+const EFFORT: usize = 20_000;
+/// The room around boxes, and around edges: along, across.
+const BOX_HALO: Size = Size::new(50.0, 14.0);
+const EDGE_HALO: Size = Size::new(10.0, 7.0);
+
+/// The engine behind `--layout layout-rs`.
+pub(super) struct LayoutRs;
+
+impl Engine for LayoutRs {
+    fn lay_out(&self, plan: &Plan, wish: &Wish) -> Result<Layout> {
+        let hint = "use `--layout layered`, or show fewer elements";
+        if plan.vertices.len() > MOST {
+            return Err(Error::usage(
+                format!("layout-rs takes too long for more than {MOST} elements"),
+                hint,
+            ));
+        }
+        let orientation = wish.orientation.unwrap_or(Orientation::LeftRight);
+        // It states what it expects with `assert!`.
+        let attempt = std::panic::catch_unwind(|| lay_out(plan, wish, orientation));
+        attempt.unwrap_or_else(|_| Err(Error::usage("layout-rs gave up on this graph", hint)))
+    }
+}
+
+fn lay_out(plan: &Plan, wish: &Wish, orientation: Orientation) -> Result<Layout> {
+    let flat = plan.without_clusters();
+    let parts = parts::parts(&flat);
+    let blocks: Option<Vec<Block>> = parts
+        .iter()
+        .map(|part| block(&flat, part, orientation))
+        .collect();
+    let blocks = blocks.ok_or_else(|| {
+        Error::usage(
+            "layout-rs put boxes on top of each other",
+            "use `--layout layered`",
+        )
+    })?;
+    let (_, mut layout) = assembled(&flat, wish, &parts, blocks, orientation);
+    layout.clusters = vec![Rect::default(); plan.clusters.len()];
+    labels::place(&flat, &mut layout);
+    if !plan.clusters.is_empty() {
+        layout
+            .remarks
+            .push("layout-rs draws no boxes around namespaces".to_owned());
+    }
+    Ok(layout)
+}
+
+/// One part, or nothing if its boxes overlap.
+fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
+    let n = part.vertices.len();
+    let reversed = acyclic::in_order(n, &part.ends);
+    let layers = cut(
+        part,
+        &rank::ranks(n, &rank::turned(&part.ends, &reversed)),
+        Lane::Outside,
+    );
+    let (rows, crossings) = order::order(&layers, EFFORT);
+    let room = Room::new(plan, part, &layers, orientation);
+    let places = places(&layers, &rows, &room, orientation);
+    let across: Vec<f64> = places.iter().map(|&(_, across)| across).collect();
+    let columns: Vec<(f64, f64)> = rows
+        .iter()
+        .map(|row| column(row, &layers, &room, &places))
+        .collect();
+    let outline: Vec<_> = part
+        .vertices
+        .iter()
+        .map(|&v| plan.vertices[v].outline)
+        .collect();
+    let sheet = route::Sheet {
+        layers: &layers,
+        size: &room.size,
+        outline: &outline,
+        across: &across,
+        columns: &columns,
+    };
+    let boxes: Vec<Rect> = (0..n)
+        .map(|v| Rect::around(sheet.centre(v), room.size[v]))
+        .collect();
+    let clear = (0..n).all(|v| boxes[..v].iter().all(|other| !other.overlaps(&boxes[v])));
+    let routes = sheet.routes(&part.ends);
+    clear.then(|| {
+        Block {
+            size: Size::default(),
+            crossings,
+            boxes,
+            routes,
+            clusters: Vec::new(),
+        }
+        .on_page(orientation)
+    })
+}
+
+/// The middle of each item: along, across.
+fn places(layers: &Layers, rows: &Rows, room: &Room, orientation: Orientation) -> Vec<(f64, f64)> {
+    let direction = match orientation {
+        Orientation::LeftRight => Direction::LeftToRight,
+        Orientation::TopBottom => Direction::TopToBottom,
+    };
+    let mut graph = VisualGraph::new(direction);
+    graph.dag.set_validate(false);
+    let point = |size: Size| {
+        let size = turned(size, orientation);
+        TheirPoint::new(size.w, size.h)
+    };
+    for item in 0..layers.kind.len() {
+        let vertex = layers.kind[item] == Kind::Vertex;
+        let (size, halo) = if vertex {
+            let size = room.size[item];
+            (
+                Size::new(size.w, size.h + 2.0 * room.loop_room(item)),
+                BOX_HALO,
+            )
+        } else {
+            (Size::new(1.0, 1.0), EDGE_HALO)
+        };
+        let mut element = if vertex {
+            Element::create(
+                ShapeKind::new_box(""),
+                StyleAttr::simple(),
+                direction.flip(),
+                point(size),
+            )
+        } else {
+            Element::empty_connector(direction.flip())
+        };
+        element.pos = Position::new(
+            TheirPoint::zero(),
+            point(size),
+            TheirPoint::zero(),
+            point(halo),
+        );
+        graph.add_node(element);
+    }
+    for (item, after) in layers.down.iter().enumerate() {
+        for &next in after {
+            graph.dag.add_edge(item.into(), next.into());
+        }
+    }
+    *graph.dag.ranks_mut() = rows
+        .iter()
+        .map(|row| row.iter().map(|&item| item.into()).collect())
+        .collect();
+    Placer::new(&mut graph).layout(false);
+    let middle = |item: usize| {
+        let at = graph.pos(item.into()).center();
+        let at = turned(Size::new(at.x, at.y), orientation);
+        (at.w, at.h)
+    };
+    (0..layers.kind.len()).map(middle).collect()
+}
+
+/// The extent of a layer along.
+fn column(row: &[usize], layers: &Layers, room: &Room, places: &[(f64, f64)]) -> (f64, f64) {
+    let middle = row.iter().map(|&item| places[item].0).sum::<f64>() / row.len().max(1) as f64;
+    let vertices = row
+        .iter()
+        .filter(|&&item| layers.kind[item] == Kind::Vertex);
+    let half = vertices.map(|&v| room.size[v].w / 2.0).fold(0.0, f64::max);
+    (middle - half, middle + half)
+}

@@ -1,0 +1,235 @@
+//! Any plan, however odd, is laid out so that boxes, routes, frames and labels keep out of each other's way.
+
+#[path = "bench/layout/measure.rs"]
+mod measure;
+
+use bagreel::geometry::{Point, Rect, Size};
+use bagreel::layout::{self, Cluster, Layout, Link, Orientation, Outline, Plan, Vertex, Wish};
+use proptest::prelude::*;
+
+fn wish(orientation: Option<Orientation>) -> Wish {
+    Wish {
+        page: Size::new(1280.0, 560.0),
+        orientation,
+    }
+}
+
+fn laid_out(plan: &Plan, orientation: Option<Orientation>) -> Layout {
+    layout::lay_out(plan, &wish(orientation), layout::engine("layered").unwrap())
+}
+
+fn plans() -> impl Strategy<Value = Plan> {
+    let clusters = prop::collection::vec(
+        (any::<prop::sample::Index>(), any::<bool>(), 10.0..120.0),
+        0..6,
+    );
+    (1_usize..30, clusters).prop_flat_map(|(n, clusters)| {
+        let clusters: Vec<Cluster> = clusters
+            .into_iter()
+            .enumerate()
+            .map(|(at, (parent, nested, w))| Cluster {
+                parent: (nested && at > 0).then(|| parent.index(at)),
+                title: Size::new(w, 14.0),
+            })
+            .collect();
+        let count = clusters.len();
+        let vertex = (
+            20.0..160.0,
+            16.0..40.0,
+            any::<bool>(),
+            prop::option::of(0..count.max(1)),
+        );
+        let vertices = prop::collection::vec(vertex, n);
+        let links = prop::collection::vec((0..n, 0..n, prop::option::of(20.0..60.0)), 0..60);
+        (vertices, links).prop_map(move |(vertices, links)| Plan {
+            vertices: vertices
+                .into_iter()
+                .map(|(w, h, round, cluster)| Vertex {
+                    size: Size::new(w, h),
+                    outline: if round {
+                        Outline::Ellipse
+                    } else {
+                        Outline::Box
+                    },
+                    cluster: cluster.filter(|&c| c < count),
+                })
+                .collect(),
+            links: links
+                .into_iter()
+                .map(|(from, to, label)| Link {
+                    from,
+                    to,
+                    label: label.map(|w| Size::new(w, 13.0)),
+                })
+                .collect(),
+            clusters: clusters.clone(),
+        })
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    #[test]
+    fn everything_keeps_out_of_the_way(plan in plans(), down in any::<bool>()) {
+        let orientation = if down { Orientation::TopBottom } else { Orientation::LeftRight };
+        let layout = laid_out(&plan, Some(orientation));
+        let found = measure::measure(&plan, &layout);
+        prop_assert_eq!(found.overlaps, 0, "boxes overlap");
+        prop_assert_eq!(found.through, 0, "an edge runs through a foreign box");
+        prop_assert_eq!(found.foreign, 0, "a cluster holds what is not its own");
+        prop_assert_eq!(found.label_overlaps, 0, "a label covers a box or a label");
+        prop_assert_eq!(layout.orientation, orientation);
+        for (link, route) in plan.links.iter().zip(&layout.routes) {
+            let end = route.curves.last().unwrap()[2];
+            prop_assert!(is_at(&plan, &layout, link.from, route.start), "{route:?} begins elsewhere");
+            prop_assert!(is_at(&plan, &layout, link.to, end), "{route:?} ends elsewhere");
+        }
+    }
+
+    #[test]
+    fn frames_are_nested_or_apart(plan in plans()) {
+        let layout = laid_out(&plan, None);
+        for (c, frame) in layout.clusters.iter().enumerate() {
+            prop_assert!(frame.w == 0.0 || frame.w >= plan.clusters[c].title.w, "no room for the title");
+            for d in c + 1..layout.clusters.len() {
+                let (other, inside) = (&layout.clusters[d], is_inside(&plan, d, c));
+                if frame.w > 0.0 && other.w > 0.0 {
+                    prop_assert_eq!(frame.overlaps(other), inside, "{} and {}", c, d);
+                    prop_assert!(!inside || holds(frame, other), "{} leaves {}", d, c);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_plan_gives_the_same_layout(plan in plans()) {
+        prop_assert_eq!(laid_out(&plan, None), laid_out(&plan, None));
+    }
+
+    #[test]
+    fn everything_is_on_the_page(plan in plans()) {
+        let layout = laid_out(&plan, None);
+        let page = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
+        for rect in layout.boxes.iter().chain(&layout.clusters) {
+            prop_assert!(holds(&page, rect), "{rect:?} leaves {page:?}");
+        }
+    }
+
+    #[test]
+    fn known_boxes_stay(plan in plans(), known in prop::collection::vec(any::<bool>(), 30)) {
+        let before = laid_out(&plan, None);
+        let places: Vec<Option<Rect>> =
+            before.boxes.iter().zip(known).map(|(rect, known)| known.then_some(*rect)).collect();
+        let after = layout::extend(&plan, &wish(None), layout::engine("layered").unwrap(), &places);
+        for (rect, place) in after.boxes.iter().zip(&places) {
+            let moved = |place: &Rect| (place.x - rect.x).abs() + (place.y - rect.y).abs();
+            prop_assert!(place.as_ref().is_none_or(|place| moved(place) < 1e-6));
+        }
+        prop_assert_eq!(measure::measure(&plan, &after).overlaps, 0);
+    }
+
+    #[test]
+    fn the_second_engine_keeps_boxes_apart(plan in plans()) {
+        let layout = layout::lay_out(&plan, &wish(None), layout::engine("layout-rs").unwrap());
+        let found = measure::measure(&plan, &layout);
+        prop_assert_eq!((found.overlaps, found.label_overlaps), (0, 0));
+    }
+}
+
+/// Whether one rectangle is inside another, rounding aside.
+fn holds(outer: &Rect, inner: &Rect) -> bool {
+    let outer = outer.grown(0.01);
+    outer.union(inner) == outer
+}
+
+fn is_inside(plan: &Plan, inner: usize, outer: usize) -> bool {
+    let mut at = Some(inner);
+    while let Some(c) = at.filter(|&c| c != outer) {
+        at = plan.clusters[c].parent;
+    }
+    at.is_some()
+}
+
+/// Whether a point is on the outline of a vertex, give or take a pixel.
+fn is_at(plan: &Plan, layout: &Layout, v: usize, p: Point) -> bool {
+    let (rect, centre) = (layout.boxes[v], layout.boxes[v].centre());
+    let within = |by: f64| {
+        let rect = rect.grown(by);
+        let (x, y) = (
+            (p.x - centre.x) / (rect.w / 2.0),
+            (p.y - centre.y) / (rect.h / 2.0),
+        );
+        match plan.vertices[v].outline {
+            Outline::Box => x.abs().max(y.abs()) <= 1.0,
+            Outline::Ellipse => x * x + y * y <= 1.0,
+        }
+    };
+    within(1.0) && !within(-1.0)
+}
+
+#[test]
+fn nothing_needs_no_room() {
+    for (word, _) in layout::ENGINES {
+        let layout = layout::lay_out(&Plan::default(), &wish(None), layout::engine(word).unwrap());
+        assert_eq!(layout.size, Size::default(), "{word}");
+    }
+}
+
+#[test]
+fn a_broken_plan_is_laid_out_all_the_same() {
+    let odd = Size::new(f64::NAN, f64::INFINITY);
+    let vertex = |size, cluster| Vertex {
+        size,
+        outline: Outline::Ellipse,
+        cluster,
+    };
+    let plan = Plan {
+        vertices: vec![
+            vertex(odd, Some(7)),
+            vertex(Size::new(-3.0, 0.0), Some(1)),
+            vertex(Size::default(), None),
+        ],
+        links: [(0, 1), (1, 9), (2, 2), (0, 0), (1, 0)]
+            .map(|(from, to)| Link {
+                from,
+                to,
+                label: Some(odd),
+            })
+            .to_vec(),
+        clusters: vec![
+            Cluster {
+                parent: Some(1),
+                title: odd,
+            },
+            Cluster {
+                parent: Some(5),
+                title: odd,
+            },
+        ],
+    };
+    for (word, _) in layout::ENGINES {
+        let page = Wish {
+            page: odd,
+            orientation: None,
+        };
+        let layout = layout::lay_out(&plan, &page, layout::engine(word).unwrap());
+        let finite = |r: &Rect| [r.x, r.y, r.w, r.h].iter().all(|x| x.is_finite());
+        assert!(
+            layout.boxes.iter().chain(&layout.clusters).all(finite),
+            "{word}"
+        );
+        assert_eq!(layout.routes.len(), 5);
+        assert!(layout.routes[1].curves.is_empty());
+    }
+}
+
+#[test]
+fn an_unknown_engine_is_a_usage_error_with_the_words() {
+    let error = layout::engine("circo").err().unwrap();
+    assert!(
+        error.hint().contains("layered, layout-rs"),
+        "{}",
+        error.hint()
+    );
+}
