@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use super::{Outline, Plan, Route};
-use crate::geometry::{Point, Rect};
+use crate::geometry::{Point, Rect, Size};
 
 /// How near to a foreign box an edge may come, and how far from it an edge turns.
 const CLEAR: f64 = 3.0;
@@ -108,26 +108,29 @@ fn contains(rect: &Rect, outline: Outline, p: Point) -> bool {
 }
 
 /// The ends of the `count`-th edge between two boxes, inside both, beside those of the edges before.
-fn shifted((a, b): &(Place, Place), count: usize) -> (Point, Point) {
-    let (p, q) = (a.rect().centre(), b.rect().centre());
+fn shifted((from, to): &(Place, Place), count: usize) -> (Point, Point) {
+    let (start, end) = (from.rect().centre(), to.rect().centre());
     let step = (count / 2) as f64
         * if count.is_multiple_of(2) {
             PARALLEL
         } else {
             -PARALLEL
         };
-    let length = libm::hypot(q.x - p.x, q.y - p.y).max(1e-9);
     // The same side for edges there and back.
-    let turn = if a.v < b.v { 1.0 } else { -1.0 };
-    let (x, y) = (
-        -(q.y - p.y) / length * step * turn,
-        (q.x - p.x) / length * step * turn,
+    let step = if from.v < to.v { step } else { -step };
+    let length = libm::hypot(end.x - start.x, end.y - start.y).max(1e-9);
+    let aside = Point::new(
+        (start.y - end.y) / length * step,
+        (end.x - start.x) / length * step,
     );
-    let inside = |rect: Rect, p: Point| {
-        let (w, h) = (rect.w / 4.0, rect.h / 4.0);
-        Point::new(p.x + x.clamp(-w, w), p.y + y.clamp(-h, h))
+    let inside = |rect: Rect| {
+        let (most, centre) = (Size::new(rect.w / 4.0, rect.h / 4.0), rect.centre());
+        Point::new(
+            centre.x + aside.x.clamp(-most.w, most.w),
+            centre.y + aside.y.clamp(-most.h, most.h),
+        )
     };
-    (inside(a.rect(), p), inside(b.rect(), q))
+    (inside(from.rect()), inside(to.rect()))
 }
 
 /// The way cut at the outlines, as straight pieces.

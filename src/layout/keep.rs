@@ -28,9 +28,9 @@ pub(super) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation
         neighbours[link.from].push(link.to);
         neighbours[link.to].push(link.from);
     }
-    for v in 0..plan.vertices.len() {
+    for (v, neighbours) in neighbours.iter().enumerate() {
         if table.boxes[v].is_none() {
-            table.boxes[v] = Some(table.place_for(v, &neighbours[v]));
+            table.boxes[v] = Some(table.place_for(v, neighbours));
         }
     }
     let clusters = table.frames();

@@ -163,13 +163,21 @@ impl Line {
     }
 }
 
-fn on_cubic([p, a, b, q]: [Point; 4], t: f64) -> Point {
-    let u = 1.0 - t;
-    let (f, g, h, k) = (u * u * u, 3.0 * u * u * t, 3.0 * u * t * t, t * t * t);
-    Point::new(
-        f * p.x + g * a.x + h * b.x + k * q.x,
-        f * p.y + g * a.y + h * b.y + k * q.y,
-    )
+/// The point at `t` of a cubic, by its four points.
+fn on_cubic(points: [Point; 4], t: f64) -> Point {
+    let rest = 1.0 - t;
+    let weights = [
+        rest * rest * rest,
+        3.0 * rest * rest * t,
+        3.0 * rest * t * t,
+        t * t * t,
+    ];
+    points
+        .iter()
+        .zip(weights)
+        .fold(Point::default(), |sum, (point, weight)| {
+            Point::new(sum.x + weight * point.x, sum.y + weight * point.y)
+        })
 }
 
 /// Rectangles with a number each, found by place.

@@ -1,5 +1,11 @@
 //! What makes a layout good or bad, in numbers, for any engine alike.
 
+#![allow(dead_code, reason = "the properties look at some of the numbers only")]
+#![allow(
+    clippy::many_single_char_names,
+    reason = "formulas of analytic geometry"
+)]
+
 use bagreel::geometry::{Point, Rect};
 use bagreel::layout::{Layout, Outline, Plan, Route};
 
