@@ -15,7 +15,9 @@ use crate::error::Error;
 use crate::evolution::Evolution;
 use crate::graph;
 use crate::info::{SurveyRow, json, survey_csv, survey_text};
-use crate::pipeline::{Drawing, Reading, Render, Rendered, Watch as _, is_survey, read, survey};
+use crate::pipeline::{
+    Drawing, Reading, Render, Rendered, Watch as _, explain, is_survey, read, survey,
+};
 use crate::terminal::Terminal;
 use crate::window::{Division, Length};
 use typed::{
@@ -87,7 +89,7 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Reading {
         },
         graph: graph::Options {
             grace: graph.grace.unwrap_or(0) as usize,
-            ..graph::Options::default()
+            roles: graph.roles,
         },
         rate_change: graph.rate_change,
     }
@@ -261,6 +263,14 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
             InfoFormat::Json => json(&rows),
         });
         return Ok(DONE);
+    }
+    if !args.why.is_empty() {
+        let mut reading = reading;
+        reading.collect.why.clone_from(&args.why);
+        let (evolution, pieces) = explain(&reading, terminal)?;
+        terminal.results(&crate::info::why(&evolution, &args.why, &pieces)?);
+        terminal.notices(&evolution.notices);
+        return Ok(code(&evolution));
     }
     let evolution = read(&reading, terminal)?;
     let info = crate::info::info(&evolution);

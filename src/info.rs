@@ -3,12 +3,14 @@
 mod advice;
 mod survey;
 mod text;
+mod why;
 
 use serde::Serialize;
 
 pub use advice::advice;
 pub use survey::{SurveyRow, survey_csv, survey_text};
 pub use text::text;
+pub use why::why;
 
 use crate::evidence::{Degree, Evidence};
 use crate::evolution::Evolution;

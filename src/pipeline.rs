@@ -7,7 +7,7 @@ mod render;
 mod survey;
 
 pub use draw::Drawing;
-pub use read::{Reading, read};
+pub use read::{Reading, explain, read};
 pub use render::{Render, Rendered, check, render, show};
 pub use survey::{is_survey, survey};
 

@@ -29,6 +29,8 @@ pub struct Changes<'a> {
     /// The share by which a rate must change, 0...
     threshold: f64,
     before: Option<(Span, Graph)>,
+    /// When each topic was sent on: from the first sign of a publisher to the last.
+    sent: Vec<(Option<Stamp>, Option<Stamp>)>,
     /// Who last sent messages on each topic.
     senders: BTreeMap<TopicId, BTreeSet<NodeId>>,
 }
@@ -40,6 +42,7 @@ impl<'a> Changes<'a> {
             elements,
             threshold,
             before: None,
+            sent: sent(elements),
             senders: BTreeMap::new(),
         }
     }
@@ -94,9 +97,11 @@ impl<'a> Changes<'a> {
     fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
         let mut steady = BTreeSet::new();
         for (old, new) in &diff.topics.changed {
-            if is_steady(old) && is_steady(new) {
+            let topic = Element::Topic(new.id);
+            let secs = (self.present(topic, spans.0), self.present(topic, spans.1));
+            if is_steady(old, secs.0) && is_steady(new, secs.1) {
                 steady.insert(new.id);
-                changes.extend(self.rate(Element::Topic(new.id), (old.hz, new.hz), spans));
+                changes.extend(self.rate(topic, (old.hz, new.hz), spans));
             }
         }
         let crowded = self.crowded(graph);
@@ -124,7 +129,8 @@ impl<'a> Changes<'a> {
             hz * (span.nanos() as f64 / 1e9) / part.max(f64::MIN_POSITIVE)
         };
         let (from, to) = (over(from_hz, spans.0, before), over(to_hz, spans.1, after));
-        rate_differs(from, to, secs, self.threshold).then_some(Change::Rate {
+        let shows = (to_hz - from_hz).abs() > self.threshold * from_hz;
+        (shows && rate_differs(from, to, secs, self.threshold)).then_some(Change::Rate {
             what,
             from_hz,
             to_hz,
@@ -133,7 +139,10 @@ impl<'a> Changes<'a> {
 
     /// How many seconds of a window lie between an element's first and last sign of life.
     fn present(&self, what: Element, span: Span) -> f64 {
-        let (first, last) = self.elements.life(what);
+        let (first, last) = match what {
+            Element::Topic(id) => self.sent[id as usize],
+            other => self.elements.life(other),
+        };
         let start = first.map_or(span.start, |at| at.max(span.start));
         let end = last.map_or(span.end, |at| at.plus(1).min(span.end));
         end.since(start).max(0) as f64 / 1e9
@@ -202,20 +211,41 @@ const FEW: f64 = 3.5;
 /// A gap this many times the median period long makes a topic one that speaks when it has something to say.
 const UNSTEADY: f64 = 4.0;
 
-/// Whether a rate changed: by more than the share `threshold` of what it was, by more than the one message that two
-/// windows of the same steady topic may differ by, and not on a topic too slow for windows of `secs` seconds.
+/// And so does a median period that, message by message, covers less than this share of the time.
+const COVERED: f64 = 0.6;
+
+/// Whether a rate changed: by more than the share `threshold` of what it was, by more than the two messages that two
+/// windows of the same jittering topic may differ by, and not on a topic too slow for windows of `secs` seconds.
 fn rate_differs(from: f64, to: f64, secs: f64, threshold: f64) -> bool {
     let by = (to - from).abs();
-    by > threshold * from && by * secs > 1.5 && from.max(to) * secs > FEW
+    by > threshold * from && by * secs > 2.2 && from.max(to) * secs > FEW
 }
 
-/// Whether a topic sends at a rate at all: not latched, and in even steps as far as is known.
-fn is_steady(topic: &TopicState) -> bool {
+/// Whether a topic sends at a rate at all in a window that it was there for `secs` seconds of: not latched, and in
+/// even steps all the time, as far as is known.
+fn is_steady(topic: &TopicState, secs: f64) -> bool {
     let even = match (topic.median_period_s, topic.max_gap_s) {
-        (Some(median), Some(gap)) => gap <= UNSTEADY * median,
+        (Some(median), Some(gap)) => {
+            gap <= UNSTEADY * median && median * topic.count as f64 >= COVERED * secs
+        }
         _ => true,
     };
     even && topic.state != State::Latched
+}
+
+/// The life of each topic's publishers together; of the topic itself where none is known.
+fn sent(elements: &Elements) -> Vec<(Option<Stamp>, Option<Stamp>)> {
+    let mut sent = vec![(None, None); elements.topics.len()];
+    for edge in elements.publishes.iter().filter(|e| e.first.is_some()) {
+        let (first, last): &mut (Option<Stamp>, Option<Stamp>) = &mut sent[edge.topic as usize];
+        *first = [*first, edge.first].into_iter().flatten().min();
+        *last = (*last).max(edge.last);
+    }
+    let own = elements.topics.iter().map(|t| (t.first, t.last));
+    sent.into_iter()
+        .zip(own)
+        .map(|(sent, own)| if sent.0.is_some() { sent } else { own })
+        .collect()
 }
 
 fn lifecycles(diff: &Diff, changes: &mut Vec<Change>) {
@@ -239,7 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rate_must_change_by_the_share_and_by_more_than_one_message() {
+    fn a_rate_must_change_by_the_share_and_by_more_than_two_messages() {
         assert!(rate_differs(15.0, 7.4, 10.0, 0.25));
         assert!(!rate_differs(15.0, 12.0, 10.0, 0.25));
         assert!(

@@ -9,6 +9,7 @@ use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
 use crate::collect::{self, Collected, Collector};
 use crate::diff::RATE_CHANGE;
 use crate::error::{Error, Result};
+use crate::evidence::Piece;
 use crate::evolution::{Evolution, Window, read_json};
 use crate::graph;
 use crate::notice::{Notice, NoticeKind, Notices};
@@ -54,18 +55,28 @@ impl Default for Reading {
 /// # Errors
 /// Where an input cannot be read at all or none holds a message, and for times that make no sense.
 pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Evolution> {
-    watch.stage(Stage::Read);
-    if let Some(path) = evolution_file(&reading.inputs)? {
-        return reread(path, reading);
-    }
-    let mission = Mission::read(reading, false, watch)?;
-    let mut evolution = build(mission, reading, watch)?;
-    if reading.verify {
+    let (mut evolution, _) = explain(reading, watch)?;
+    if reading.verify && evolution_file(&reading.inputs)?.is_none() {
         watch.stage(Stage::Verify);
         let second = build(Mission::read(reading, true, watch)?, reading, watch)?;
         compare(&mut evolution, &second);
     }
     Ok(evolution)
+}
+
+/// Reads the inputs into an evolution, with every piece of evidence on the elements that `reading` asks about, sorted
+/// by time. An evolution that is read holds no such pieces.
+///
+/// # Errors
+/// As [`read`].
+pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Evolution, Vec<Piece>)> {
+    watch.stage(Stage::Read);
+    if let Some(path) = evolution_file(&reading.inputs)? {
+        return Ok((reread(path, reading)?, Vec::new()));
+    }
+    let mission = Mission::read(reading, false, watch)?;
+    let pieces = mission.collected.why();
+    Ok((build(mission, reading, watch)?, pieces))
 }
 
 /// The path of the evolution that is the only input; `None` for bags.
