@@ -194,7 +194,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         )?],
         some => some
             .iter()
-            .map(|o| Output::parse(o, args.format.as_deref()))
+            .map(|o| Output::parse(o, args.format.as_deref().or(summary_format(o))))
             .collect::<Result<_, _>>()?,
     };
     outputs.extend(args.sequence.poster.as_deref().map(Output::poster));
@@ -208,7 +208,10 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             is_fitted: args.look.fit == "auto",
             engine: crate::layout::engine(&args.look.layout)?,
         },
-        sequence: look::sequence(&args.sequence)?,
+        sequence: crate::film::Options {
+            append_to: summary(),
+            ..look::sequence(&args.sequence)?
+        },
         outputs,
         captions: args.look.captions.clone(),
         is_filtered: args.view.filtered,
@@ -222,6 +225,17 @@ fn title(inputs: &[Input]) -> String {
         [one] => one.name(),
         [first, rest @ ..] => format!("{} and {} more", first.name(), rest.len()),
     }
+}
+
+/// The file that collects what a job of GitHub's wants to say; its name has no extension.
+fn summary() -> Option<PathBuf> {
+    std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
+}
+
+fn summary_format(output: &str) -> Option<&'static str> {
+    summary()
+        .is_some_and(|path| path == Path::new(output))
+        .then_some("md")
 }
 
 /// `out/<bag name>.gif`, the name without what tells the format.

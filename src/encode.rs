@@ -1,11 +1,13 @@
 //! Every output format behind one trait. Adding a format is one file below `encode/` and one row in [`FORMATS`].
 
+mod animated_svg;
 mod apng;
 mod csv;
 mod dot;
 mod gif;
 mod html;
 mod json;
+mod markdown;
 mod mermaid;
 mod pdf;
 mod png;
@@ -225,11 +227,11 @@ pub const FORMATS: &[Format] = &[
     },
     Format {
         word: "svg",
-        what: "a drawing per window with `{n}`, the only window, or the `--strip`",
+        what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
         is_limited: false,
         is_strip: false,
         check: None,
-        start: svg::start,
+        start: start_svg,
     },
     Format {
         word: "png",
@@ -296,6 +298,14 @@ pub const FORMATS: &[Format] = &[
         start: html::start,
     },
     Format {
+        word: "md",
+        what: "a report for a pull request or a job summary",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: markdown::start,
+    },
+    Format {
         word: "json",
         what: "the evolution as data, which can be read again",
         is_limited: false,
@@ -322,6 +332,16 @@ const POSTER: &Format = &Format {
     check: None,
     start: png::start_poster,
 };
+
+/// Drawings where that is what is asked for, else one that moves.
+fn start_svg<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
+    let is_sequence = film.view.frames.len() > 1 && film.options.strip.is_none();
+    if is_sequence && !target.is_numbered() {
+        animated_svg::start(film, target)
+    } else {
+        svg::start(film, target)
+    }
+}
 
 /// One output: what and where.
 #[derive(Clone, Debug)]

@@ -1,5 +1,7 @@
 //! The sequence as it is shown: which window when and for how long, and what draws it.
 
+use std::path::PathBuf;
+
 use crate::dot::Profile;
 mod choice;
 
@@ -34,6 +36,10 @@ pub struct Options {
     pub dot_profile: Profile,
     /// The windows of a film strip, if one was asked for: it takes the place of a sequence of drawings too.
     pub strip: Option<Choice>,
+    /// Links for the report: name and address.
+    pub links: Vec<(String, String)>,
+    /// A file that reports are appended to, where all others are written anew.
+    pub append_to: Option<PathBuf>,
 }
 
 impl Default for Options {
@@ -48,6 +54,8 @@ impl Default for Options {
             max_bytes: None,
             dot_profile: Profile::default(),
             strip: None,
+            links: Vec::new(),
+            append_to: None,
         }
     }
 }

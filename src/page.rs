@@ -3,6 +3,8 @@
 mod data;
 mod table;
 
+pub(crate) use table::bars;
+
 use std::fmt::Write as _;
 
 use crate::evolution::Evolution;
@@ -43,7 +45,7 @@ impl Page<'_> {
         let spells = Spells::of(self.view, crate::view::hertz);
         let still = busiest(self.view);
         let fonts = fonts();
-        let look = self.look();
+        let look = self.look(&spells);
         let script = squeezed(SCRIPT);
         let (data, data_type) = data::packed(&data::json(self, &spells));
         let policy = format!(
@@ -80,11 +82,14 @@ impl Page<'_> {
         })
     }
 
-    fn look(&self) -> String {
-        let mut out = stage::variables(self.style) + &stage::rules(self.style);
+    fn look(&self, spells: &Spells) -> String {
+        let mut words = spells.words();
+        // For the legend.
+        words.extend(["added", "removed", "changed", "silent"]);
+        let mut out = stage::variables(self.style) + &stage::rules(self.style, &words);
         if let Some(dark) = self.dark {
             // Paper is white.
-            let dark = stage::variables(dark) + &stage::rules(dark);
+            let dark = stage::variables(dark) + &stage::rules(dark, &words);
             let _ = write!(
                 out,
                 "@media screen and (prefers-color-scheme:dark){{{dark}}}"

@@ -1,7 +1,7 @@
 //! A mission as data for a page: per element one flat list of when it became what, so that any window is one search away.
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Serialize, Serializer};
 
@@ -92,6 +92,14 @@ impl Spells {
 }
 
 impl Spells {
+    /// All class words that occur.
+    pub fn words(&self) -> BTreeSet<&str> {
+        self.classes
+            .iter()
+            .flat_map(|class| class.split(' '))
+            .collect()
+    }
+
     /// How many elements have a mark of this class in each window in which there are any.
     pub fn counts(&self, class: &str) -> BTreeMap<u32, usize> {
         let has = |words: &String| words.split(' ').any(|word| word == class);

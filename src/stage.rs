@@ -3,7 +3,7 @@
 
 mod rules;
 
-pub use rules::{rules, variables};
+pub use rules::{base, rules, states, variables};
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -125,7 +125,8 @@ impl<'a> Stage<'a> {
         } else {
             what.split(' ').next().unwrap_or(what)
         };
-        let _ = write!(out, "<g class=\"{what} {}\"", dress.class());
+        let class = format!("{what} {}", dress.class());
+        let _ = write!(out, "<g class=\"{}\"", class.trim_end());
         if self.detail.has_names {
             for (key, value) in data {
                 let _ = write!(out, " data-{key}=\"");

@@ -97,6 +97,20 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<film::Options> {
         max_bytes: args.max_bytes,
         dot_profile: Profile::parse(&args.dot_profile)?,
         strip: strip.transpose()?,
+        links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
         ..film::Options::default()
     })
+}
+
+fn link(text: &str) -> Result<(String, String)> {
+    let parts = text
+        .split_once('=')
+        .filter(|(name, url)| !name.is_empty() && !url.is_empty());
+    let (name, url) = parts.ok_or_else(|| {
+        Error::usage(
+            format!("`--link {text}` is no name with an address"),
+            "write `--link player=https://…`",
+        )
+    })?;
+    Ok((name.to_owned(), url.to_owned()))
 }

@@ -27,7 +27,7 @@ pub(super) fn summary(view: &View) -> String {
 
 /// How much changed, window by window, as paths in a box 60 high and a window wide for each: what was added above the
 /// line in the middle, what was removed below it, what changed on the ground.
-pub(super) fn bars(spells: &Spells) -> String {
+pub(crate) fn bars(spells: &Spells) -> String {
     let mut out = String::new();
     for (kind, base, up) in [
         ("added", 30.0, -1.0),

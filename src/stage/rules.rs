@@ -1,17 +1,20 @@
 //! The style as rules for classes: what [`crate::picture`] paints, said once per class instead of once per element.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use crate::scene::Stroke;
 use crate::spells::{STEPS, decades};
 use crate::style::{Body, Change, Color, Quiet, Style};
 
-/// The rules of the graph: base, then how well known, how alive, what changed; a later one counts more.
-pub fn rules(style: &Style) -> String {
-    let mut out = String::new();
-    out.push_str(
-        "text{text-anchor:middle}use,.off,.c{visibility:hidden}:is(.faster,.slower)>.c{visibility:inherit}",
-    );
+/// The rules of the graph in every window: [`base`], then [`states`].
+pub fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
+    base(style) + &states(style, words)
+}
+
+/// How elements look that are active and did not change.
+pub fn base(style: &Style) -> String {
+    let mut out = String::from("text{text-anchor:middle}use,.c{visibility:hidden}");
     let cluster = &style.cluster;
     let _ = write!(
         out,
@@ -23,20 +26,55 @@ pub fn rules(style: &Style) -> String {
     body(&mut out, ".node", &style.node);
     body(&mut out, ".topic", &style.topic);
     edges(&mut out, style);
-    known(&mut out, style);
-    for (state, quiet) in [("declared", &style.declared), ("silent", &style.silent)] {
-        self::quiet(&mut out, state, quiet);
-    }
-    for (kind, change) in [
-        ("added", &style.added),
-        ("removed", &style.removed),
-        ("changed", &style.changed),
-    ] {
-        self::change(&mut out, kind, change);
-    }
     badges(&mut out, style);
     out
 }
+
+/// What classes change of that: how fast, how well known, how alive, what changed; a later rule counts more. Only
+/// these class words have rules.
+pub fn states(style: &Style, words: &BTreeSet<&str>) -> String {
+    let mut out = String::from(".off{visibility:hidden}");
+    for step in 1..=STEPS {
+        let word = format!("w{step}");
+        if words.contains(&*word) {
+            let edge = &style.edge;
+            let width = (edge.width + edge.per_decade * decades(step)).min(edge.most);
+            let _ = write!(out, ".{word} path{{stroke-width:{}}}", short(width));
+        }
+    }
+    if words.contains("inferred") {
+        known(&mut out, style);
+    }
+    let quiets = [("declared", &style.declared), ("silent", &style.silent)];
+    for (state, quiet) in quiets.iter().filter(|(word, _)| words.contains(word)) {
+        self::quiet(&mut out, state, quiet);
+    }
+    let changes = [
+        ("added", &style.added),
+        ("removed", &style.removed),
+        ("changed", &style.changed),
+    ];
+    for (kind, change) in changes.iter().filter(|(word, _)| words.contains(word)) {
+        self::change(&mut out, kind, change);
+    }
+    let badges = MARKS.iter().filter(|word| words.contains(*word));
+    let mut shown: Vec<String> = badges.map(|word| format!(".{word}>.{word}")).collect();
+    shown.push(":is(.faster,.slower)>.c".to_owned());
+    let _ = write!(out, "{}{{visibility:inherit}}", shown.join(","));
+    out
+}
+
+/// The class words of badges.
+const MARKS: [&str; 8] = [
+    "added",
+    "removed",
+    "faster",
+    "slower",
+    "handed-over",
+    "restarted",
+    "other",
+    "inside",
+];
 
 const FONT: &str = "Inter,Helvetica,Arial,sans-serif";
 
@@ -67,10 +105,6 @@ fn edges(out: &mut String, style: &Style) {
         edge.halo_width,
         c = edge.stroke,
     );
-    for step in 1..=STEPS {
-        let width = (edge.width + edge.per_decade * decades(step)).min(edge.most);
-        let _ = write!(out, ".w{step} path{{stroke-width:{}}}", short(width));
-    }
 }
 
 fn known(out: &mut String, style: &Style) {
@@ -111,24 +145,12 @@ fn change(out: &mut String, kind: &str, change: &Change) {
     );
 }
 
-/// A badge is seen while its element has its class; its colour is that of the kind of change.
+/// The colours of badges; they are hidden until their element has their class.
 fn badges(out: &mut String, style: &Style) {
-    let words = [
-        "added",
-        "removed",
-        "faster",
-        "slower",
-        "handed-over",
-        "restarted",
-        "other",
-        "inside",
-    ];
-    let seen: Vec<String> = words.iter().map(|w| format!(".{w}>use.{w}")).collect();
     let _ = write!(
         out,
-        "{}{{visibility:inherit}}defs .b{{stroke:{};stroke-width:1.2}}defs .p{{fill:none;stroke:{s};stroke-width:2}}\
-         defs .f{{fill:{s};stroke:none}}use{{fill:{}}}use.added{{fill:{}}}use.removed{{fill:{}}}",
-        seen.join(","),
+        ".b{{stroke:{};stroke-width:1.2}}.p{{fill:none;stroke:{s};stroke-width:2}}\
+         .f{{fill:{s};stroke:none}}use{{fill:{}}}use.added{{fill:{}}}use.removed{{fill:{}}}",
         style.badge.halo,
         style.changed.color,
         style.added.color,
