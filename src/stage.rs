@@ -14,6 +14,7 @@ use crate::scene::{Form, Group, Piece, Step};
 use crate::spells::word;
 use crate::style::Style;
 use crate::svg::escape;
+use crate::text::is_invisible;
 use crate::view::{Mark, View};
 
 /// How much is written.
@@ -130,7 +131,7 @@ impl<'a> Stage<'a> {
         if self.detail.has_names {
             for (key, value) in data {
                 let _ = write!(out, " data-{key}=\"");
-                escape(out, value);
+                attribute(out, value);
                 out.push('"');
             }
         }
@@ -231,6 +232,19 @@ impl<'a> Stage<'a> {
             }
         };
     }
+}
+
+/// A name as the value of an attribute that reads back as itself; what would hide or turn round the page's own text is
+/// written as a number.
+fn attribute(out: &mut String, name: &str) {
+    let mut rest = name;
+    while let Some(at) = rest.find(|c: char| is_invisible(c) && !c.is_control()) {
+        escape(out, &rest[..at]);
+        let hidden = rest[at..].chars().next().unwrap_or_default();
+        let _ = write!(out, "&#{};", u32::from(hidden));
+        rest = &rest[at + hidden.len_utf8()..];
+    }
+    escape(out, rest);
 }
 
 fn fine(out: &mut String, form: &Form, class: &str) {

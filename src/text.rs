@@ -221,7 +221,7 @@ pub fn visible(text: &str) -> Cow<'_, str> {
 }
 
 /// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
-fn is_invisible(c: char) -> bool {
+pub(crate) fn is_invisible(c: char) -> bool {
     c.is_control()
         || (c.is_whitespace() && c != ' ')
         || matches!(c, '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180e}' | '\u{200b}'..='\u{200f}'

@@ -101,7 +101,7 @@ function load() {
 }
 
 // A gesture moves the picture by X, Y and scale S; its end draws it anew.
-let X = 0, Y = 0, S = 1, idle, far, old;
+let X = 0, Y = 0, S = 1, far = 0, idle, old;
 const home = svg.getAttribute('viewBox'), fit = box => svg.setAttribute('viewBox', box);
 function zoom(by, dx = 0, dy = 0, x = stage.clientWidth / 2, y = stage.clientHeight / 2) {
 	X = x + (X - x) * by + dx;

@@ -11,6 +11,7 @@ const LAYERS: &[&str] = &[
     "geometry",
     "error",
     "notice",
+    "hash",
     "wire",
     "yaml",
     "decompress",
@@ -29,6 +30,7 @@ const LAYERS: &[&str] = &[
     "layout",
     "style",
     "dot",
+    "mermaid",
     "scene",
     "svg",
     "pixels",
@@ -36,8 +38,10 @@ const LAYERS: &[&str] = &[
     "palette",
     "output",
     "spells",
-    "hash",
+    "stage",
+    "page",
     "film",
+    "report",
     "encode",
     "reel",
     "pipeline",
@@ -54,13 +58,19 @@ const SIBLINGS: &[&str] = &["bag", "evidence", "encode", "layout"];
 /// Where a dependency may be named. What is not listed here may stand in one file only.
 const EXCEPTIONS: &[(&str, &[&str])] = &[
     // Its derives stand on the types that they describe.
-    ("serde", &["evolution/read.rs", "evolution/write.rs"]),
+    ("serde", &[
+            "evolution/read.rs",
+            "evolution/write.rs",
+            "spells.rs",
+            "page/data.rs",
+        ]),
     (
         "serde_json",
         &[
             "evolution/read.rs",
             "evolution/write.rs",
             "evolution/lines.rs",
+            "page/data.rs",
         ],
     ),
     // Plain functions on numbers, as the standard library's would be.

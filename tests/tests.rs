@@ -11,6 +11,7 @@
 mod cli;
 mod encode;
 mod layout;
+mod pages;
 mod properties;
 mod reading;
 mod ros2_example;

@@ -1,0 +1,257 @@
+"""Drives a page in headless Chromium: clicks, types, slides, and reads what it says and what the console says.
+
+usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg
+The page and the animation are of the evolution, whose every window is compared with them.
+"""
+
+import base64
+import html
+import json
+import pathlib
+import re
+import sys
+import tempfile
+import time
+import zlib
+
+import webdriver
+from webdriver import Browser
+
+SHIFT, LEFT, RIGHT, END, HOME, ENTER, ESC, CTRL = "\ue008", "\ue012", "\ue014", "\ue010", "\ue011", "\ue007", "\ue00c", "\ue009"
+
+
+def hertz(hz):
+    """As the program writes a rate."""
+    text = f"{hz:.0f}" if abs(hz) >= 99.95 else f"{hz:.1f}" if abs(hz) >= 0.95 else f"{hz:.2f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def data_of(page):
+    """What the page holds, unpacked."""
+    kind, text = re.search(r'<script id="data" type="([^"]*)">(.*?)</script>', page, re.S).groups()
+    return json.loads(zlib.decompress(base64.b64decode(text), -15) if kind == "deflated" else text)
+
+
+def at(spells, window):
+    start = value = 0
+    for step, next_value in zip(spells[::2], spells[1::2]):
+        start += step
+        if start > window:
+            break
+        value = next_value
+    return value
+
+
+def compare_data(page, evolution):
+    """Every value of every window: who is there, how alive, how fast."""
+    data, compared = data_of(page), 0
+    items = {}
+    for i, name in enumerate(data["names"]):
+        items.setdefault(name, []).append(i)
+    count = len(data["names"])
+    arrows = {(data["names"][a], data["names"][b]): count + k for k, (a, b) in enumerate(data["arrows"])}
+    for w, window in enumerate(evolution["windows"]):
+        there = set()
+        rows = [(items.get(e["name"], [None])[0], e) for e in window["nodes"]]
+        rows += [(items.get(e["name"], [None])[-1], e) for e in window["topics"]]
+        rows += [(arrows.get((e["node"], e["topic"])), e) for e in window["publishes"]]
+        rows += [(arrows.get((e["topic"], e["node"])), e) for e in window["subscribes"]]
+        for i, element in rows:
+            if i is None or "together" in " ".join(data["words"][f] for f in data["facts"][i]):
+                continue
+            words = data["classes"][at(data["lives"][i][0], w)].split()
+            label = data["labels"][at(data["lives"][i][1], w)]
+            assert words[0] == element["state"], (w, element, words)
+            if element["hz"] is not None:
+                assert label == hertz(element["hz"]), (w, element, label)
+            there.add(i)
+            compared += 1
+        for i, life in enumerate(data["lives"]):
+            words = data["classes"][at(life[0], w)].split()
+            grouped = "together" in " ".join(data["words"][f] for f in data["facts"][i])
+            ends = data["arrows"][i - count] if i >= count else []
+            grouped |= any("together" in " ".join(data["words"][f] for f in data["facts"][e]) for e in ends)
+            assert i in there or grouped or words == ["off"] or "removed" in words, (w, i, words)
+    assert compared > 1000, compared
+    print(f"  {compared} values of the data equal the evolution's")
+
+
+def check_console(b):
+    errors = [e for e in b.log("browser") if e["level"] in ("SEVERE", "WARNING")]
+    assert not errors, errors
+    for entry in b.log("performance"):
+        message = json.loads(entry["message"])["message"]
+        if message["method"] == "Network.requestWillBeSent":
+            url = message["params"]["request"]["url"]
+            assert url.startswith(("file:", "data:", "about:", "chrome")), url
+
+
+def window(b):
+    return int(b.js("return document.getElementById('seek').value"))
+
+
+def drive(url, evolution):
+    windows = evolution["windows"]
+    last = len(windows) - 1
+    with Browser() as b:
+        b.open(url)
+        assert window(b) == 0
+        b.keys(RIGHT)
+        assert window(b) == 1
+        b.keys((SHIFT, RIGHT))
+        assert window(b) == 11
+        b.keys(",", END)
+        assert window(b) == last
+        b.keys(HOME, "5")
+        assert window(b) == int(last / 2 + 0.5), window(b)
+        b.keys((CTRL, RIGHT))
+        assert window(b) == int(last / 2 + 0.5)
+        b.keys(HOME, "]")
+        first_change = next(i for i, w in enumerate(windows) if w["changes"])
+        assert window(b) == first_change, (window(b), first_change)
+        value = b.js("return document.getElementById('seek').ariaValueText")
+        assert f"window {first_change + 1} of {len(windows)}" in value, value
+        assert b.js("return document.getElementById('live').textContent")
+        print("  keys move through the mission")
+
+        b.js("const s = document.getElementById('seek'); s.value = 7; s.dispatchEvent(new Event('input'))")
+        assert window(b) == 7
+        live = b.js("return document.getElementById('live').textContent")
+        b.click("#play")
+        time.sleep(1.8)
+        assert window(b) > 7
+        assert b.js("return document.getElementById('live').textContent") == live, "it talks while playing"
+        b.click("#play")
+        assert b.js("return location.hash").startswith("#t=")
+        print("  the slider slides, play plays and keeps silent")
+
+        topic = windows[0]["topics"][0]["name"]
+        b.keys("/")
+        b.type("#q", topic.upper())
+        assert window(b) and b.js("return document.activeElement.id") == "q"
+        assert b.js("return document.querySelectorAll('#hits button').length") > 0
+        b.keys(ENTER)
+        assert topic in b.js("return document.getElementById('name').textContent")
+        assert b.js("return document.querySelectorAll('#graph .near').length") > 1
+        assert f"sel={topic}" in b.js("return location.hash"), b.js("return location.hash")
+        assert b.js("return document.getElementById('life').children.length") > 1
+        b.keys(ESC, ESC)
+        assert b.js("return document.getElementById('card').hidden")
+        node = windows[0]["nodes"][0]["name"]
+        b.js("document.querySelector('.node[data-name=\"%s\"] text').dispatchEvent(new MouseEvent('click', {bubbles: true}))" % node)
+        assert b.js("return document.getElementById('name').textContent") == node
+        b.keys("?")
+        assert b.js("return document.getElementById('help').open")
+        b.keys(ESC)
+        print("  search, selection and help")
+
+        start = b.js("return document.getElementById('graph').getAttribute('viewBox')")
+        b.keys("+")
+        time.sleep(0.4)
+        assert b.js("return document.getElementById('graph').getAttribute('viewBox')") != start
+        b.keys("f")
+
+        seconds = (windows[30]["start_ns"] - windows[0]["start_ns"]) / 1e9
+        b.open("about:blank")
+        b.open(f"{url}#t={seconds:g}&sel={node}")
+        assert window(b) == 30 and b.js("return document.getElementById('name').textContent") == node
+        b.js("location.hash = '#t=0&q=scan'")
+        time.sleep(0.2)
+        assert window(b) == 0 and b.js("return document.getElementById('q').value") == "scan"
+        print("  links lead where they say")
+
+        compare_drawing(b, windows)
+        check_console(b)
+
+
+def compare_drawing(b, windows):
+    """What is drawn in every window: classes of the boxes, and rates beside the arrows."""
+    b.keys(HOME, ESC)
+    read = """return [...document.querySelectorAll('#graph [data-name], #graph [data-from]')].map(g =>
+        [g.dataset.name || g.dataset.from + ' ' + g.dataset.to, g.getAttribute('class'), g.querySelector('.r')?.textContent])"""
+    b.js("document.activeElement.blur()")
+    for w, data in enumerate(windows):
+        state = {e["name"]: e["state"] for e in data["topics"]} | {e["name"]: e["state"] for e in data["nodes"]}
+        rates = {e["node"] + " " + e["topic"]: e["hz"] for e in data["publishes"]}
+        for name, words, told in b.js(read):
+            words = words.split()
+            if "off" in words or "removed" in words:
+                continue
+            if name in state and name.count("/") > 1:
+                assert state[name] in words, (w, name, words)
+            if rates.get(name) is not None and told:
+                assert told.endswith(hertz(rates[name]) + " Hz"), (w, name, told)
+        b.keys(RIGHT)
+    print("  every window is drawn as the evolution says")
+
+
+def hostile(url):
+    with Browser() as b:
+        b.open(url)
+        for key in (RIGHT, "]", RIGHT):
+            b.keys(key)
+        b.type("#q", "/")
+        b.keys(ENTER, ENTER, ENTER)
+        time.sleep(0.3)
+        assert b.js("return window.hit === undefined && document.querySelectorAll('img, script:not(#data):not([type=module])').length === 0")
+        text = b.js("return document.title + document.body.innerText + document.getElementById('live').textContent")
+        assert not re.search("[\u2028\u202a-\u202e\u2066-\u2069]", text)
+        sel = b.js("return location.hash + document.getElementById('name').textContent")
+        assert "<" not in b.js("return location.hash"), sel
+        check_console(b)
+    print("  hostile names stay names")
+
+
+def elsewhere(url, page):
+    """In the sandboxed frame of a notebook; without scripts; on paper."""
+    with tempfile.TemporaryDirectory() as folder, Browser() as b:
+        outer = pathlib.Path(folder, "outer.html")
+        outer.write_text(f'<!doctype html><iframe sandbox="allow-scripts" width="1000" height="700" srcdoc="{html.escape(page)}"></iframe>')
+        b.open(outer.as_uri())
+        b.frame(0)
+        b.click("[data-key='.']")
+        assert window(b) == 1
+        check_console(b)
+        b.cdp("Emulation.setScriptExecutionDisabled", value=True)
+        b.open(url)
+        b.cdp("Emulation.setScriptExecutionDisabled", value=False)
+        assert b.js("return document.querySelectorAll('tbody a').length") > 3
+        assert b.js("return document.querySelectorAll('#items > .node:not(.off)').length") > 3
+    print("  it works in a sandboxed frame, and says what changed without scripts")
+
+
+def animation(svg):
+    shots = {}
+    for flags in ((), ("--force-prefers-reduced-motion",)):
+        with tempfile.TemporaryDirectory() as folder, Browser(flags=flags) as b:
+            outer = pathlib.Path(folder, "outer.html")
+            outer.write_text(f'<!doctype html><img src="{pathlib.Path(svg).resolve().as_uri()}" width="1200">')
+            b.open(outer.as_uri())
+            time.sleep(0.5)
+            first = b.screenshot()
+            time.sleep(8)
+            shots[flags] = (first, b.screenshot())
+    moving, still = shots.values()
+    assert moving[0] != moving[1], "the animation stands still"
+    assert still[0] == still[1], "it moves although less motion is asked for"
+    print("  the animation runs in an <img>, and stands still where asked to")
+
+
+def main(page, evolution, hostile_page, svg):
+    reason = webdriver.missing()
+    if reason:
+        print(f"skipped: {reason}")
+        return
+    path = pathlib.Path(page).resolve()
+    text = path.read_text()
+    evolution = json.loads(pathlib.Path(evolution).read_text())
+    compare_data(text, evolution)
+    drive(path.as_uri(), evolution)
+    hostile(pathlib.Path(hostile_page).resolve().as_uri())
+    elsewhere(path.as_uri(), text)
+    animation(svg)
+    print("all well")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
