@@ -38,7 +38,7 @@ fn render(input: &Path, folder: &Path, extensions: &[&str]) {
 fn mission(names: &[&str], windows: usize) -> Value {
     let start = 1_700_000_000_000_000_000_i64;
     let window = |w: usize| {
-        let there = |i: &usize| i % 3 == 0 || !(w / 7 + i).is_multiple_of(4);
+        let there = |i: &usize| i.is_multiple_of(3) || !(w / 7 + i).is_multiple_of(4);
         let hz = |i: usize| {
             if i.is_multiple_of(5) && (w / 11) % 2 == 1 {
                 7.4

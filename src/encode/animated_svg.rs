@@ -90,16 +90,16 @@ impl Play<'_> {
              viewBox=\"0 0 {width:.0} {height:.0}\"><title>"
         );
         escape(&mut out, &visible(self.whole.title));
-        let _ = write!(out, "</title>\n<style>{}</style>\n", self.rules());
+        let _ = writeln!(out, "</title>\n<style>{}</style>", self.rules());
         let _ = write!(
             out,
             "<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>",
             style.background()
         );
         self.title(&mut out, width);
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "{}<g transform=\"translate({:.0} {:.0})\">\n",
+            "{}<g transform=\"translate({:.0} {:.0})\">",
             stage.signs(),
             (width - union.size.w) / 2.0,
             TOP + MARGIN
@@ -190,9 +190,9 @@ impl Play<'_> {
             return;
         };
         let whole = last.span.end.since(first.span.start) / 1_000_000_000 * 1_000_000_000;
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "</text><text class=\"u\" x=\"16\" y=\"45\">{} windows of {} · {}</text>\n",
+            "</text><text class=\"u\" x=\"16\" y=\"45\">{} windows of {} · {}</text>",
             self.windows,
             short(first.span.nanos()),
             offset(whole)
@@ -256,10 +256,10 @@ impl Play<'_> {
                 );
             }
         }
-        let _ = write!(
+        let _ = writeln!(
             out,
             "<rect class=\"head\" x=\"{left}\" y=\"{:.0}\" width=\"2.5\" height=\"34\" fill=\"{}\">\
-             <animate attributeName=\"x\" from=\"{left}\" to=\"{:.1}\" dur=\"{}s\" repeatCount=\"indefinite\"/></rect>\n",
+             <animate attributeName=\"x\" from=\"{left}\" to=\"{:.1}\" dur=\"{}s\" repeatCount=\"indefinite\"/></rect>",
             y - 32.0,
             style.head,
             left + wide,

@@ -148,7 +148,7 @@ fn facts_of(
     let elements = &page.evolution.elements;
     let mut facts = Vec::new();
     if let (true, [Element::Topic(_), ..]) = (is_item, members) {
-        let topics = members.iter().filter_map(|m| topic(elements, *m));
+        let mut topics = members.iter().filter_map(|m| topic(elements, *m));
         let mut types: Vec<&str> = topics
             .clone()
             .flat_map(|t| t.types.iter().map(|t| &**t))
@@ -156,7 +156,7 @@ fn facts_of(
         types.sort_unstable();
         types.dedup();
         facts.push(format!("type {}", types.join(", ")));
-        let qos: Option<&str> = topics.filter_map(|t| t.qos.as_deref()).next();
+        let qos: Option<&str> = topics.find_map(|t| t.qos.as_deref());
         facts.extend(qos.map(|q| format!("quality of service {q}")));
     }
     let proof = members

@@ -11,14 +11,14 @@ use crate::view::{Frame, View};
 /// More windows with changes than this are counted.
 const MOST_ROWS: usize = 200;
 
-fn is_told(frame: &&Frame) -> bool {
+fn is_told(frame: &Frame) -> bool {
     !frame.caption.is_empty()
 }
 
 /// How many windows there are, and how many of them have changes.
 pub(super) fn summary(view: &View) -> String {
     let all = view.frames.len();
-    match view.frames.iter().filter(is_told).count() {
+    match view.frames.iter().filter(|f| is_told(f)).count() {
         0 => format!("None in {all} windows."),
         n if n > MOST_ROWS => format!("In {n} of {all} windows; the first {MOST_ROWS}:"),
         n => format!("In {n} of {all} windows:"),
@@ -54,7 +54,7 @@ pub(super) fn rows(view: &View) -> String {
     let Some(start) = view.frames.first().map(|f| f.span.start) else {
         return out;
     };
-    for frame in view.frames.iter().filter(is_told).take(MOST_ROWS) {
+    for frame in view.frames.iter().filter(|f| is_told(f)).take(MOST_ROWS) {
         let at = frame.span.start.since(start);
         let millis = at / 1_000_000;
         let secs = millis as f64 / 1e3;
