@@ -4,8 +4,10 @@ set -eu
 cd "$(dirname "$0")"
 bag=../warehouse.bag
 printf '\\newcommand{\\version}{%s}\n' "$(bagreel --version)" > version.tex
-bagreel render "$bag" --period 30 --style paper --strip 2x3 --width 180mm -o strip.pdf
-bagreel render "$bag" --period 30 --style paper --ns-filter /robot1 --strip 1x3 --width 88mm -o column.pdf
+# The width of the page, the width of a column: bagreel says so if a text would be smaller than 6 pt there.
+bagreel render "$bag" --period 30 --style paper --mode nodes --collapse /robot1 --collapse /robot2 --collapse /fleet \
+    --strip 1x3 --width 180mm -o strip.pdf
+bagreel render "$bag" --period 30 --style paper --ns-filter '/robot1/*' --strip 1x3 --width 88mm -o column.pdf
 bagreel render "$bag" --period 30 --style paper -o mission.pdf
 pdflatex -interaction=nonstopmode -halt-on-error paper.tex
 # Once more for references and the animation.
