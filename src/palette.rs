@@ -13,25 +13,39 @@ const CANDIDATES: usize = 6000;
 /// Bits per channel of the cells that nearest colours are looked up in.
 const BITS: u32 = 4;
 
+/// A frame of opaque pixels as runs of equal ones: a drawing takes a fraction of its bytes.
+#[derive(Clone, Debug)]
+pub struct Packed(Vec<(Rgb, u32)>);
+
+impl Packed {
+    /// Packs RGBA bytes; transparency is not looked at.
+    pub fn new(rgba: &[u8]) -> Self {
+        Self(runs(rgba).collect())
+    }
+
+    /// The RGBA bytes again, opaque.
+    pub fn rgba(&self) -> Vec<u8> {
+        let length = |run: &(Rgb, u32)| run.1 as usize * 4;
+        let mut rgba = Vec::with_capacity(self.0.iter().map(length).sum());
+        for &([r, g, b], length) in &self.0 {
+            for _ in 0..length {
+                rgba.extend_from_slice(&[r, g, b, 255]);
+            }
+        }
+        rgba
+    }
+}
+
 /// Counts the colours of the frames that a palette is made from. Frames may come in any order.
 #[derive(Clone, Debug, Default)]
 pub struct Census(HashMap<Rgb, u64>);
 
 impl Census {
-    /// Counts the pixels of one frame of RGBA bytes; transparency is not looked at.
-    pub fn count(&mut self, rgba: &[u8]) {
-        for (colour, length) in runs(rgba) {
-            *self.0.entry(colour).or_default() += length;
+    /// Counts the pixels of one frame.
+    pub fn count(&mut self, frame: &Packed) {
+        for &(colour, length) in &frame.0 {
+            *self.0.entry(colour).or_default() += u64::from(length);
         }
-    }
-
-    /// Both counts together.
-    #[must_use]
-    pub fn and(mut self, other: Self) -> Self {
-        for (colour, count) in other.0.into_iter().collect::<Vec<_>>() {
-            *self.0.entry(colour).or_default() += count;
-        }
-        self
     }
 
     /// At most `most` (2..=256) colours: exactly those counted if they are so few, otherwise the most frequent ones
@@ -84,7 +98,7 @@ fn distance(a: Rgb, b: Rgb) -> u32 {
 }
 
 /// Runs of equal pixels in RGBA bytes: colour and length.
-fn runs(rgba: &[u8]) -> impl Iterator<Item = (Rgb, u64)> + '_ {
+fn runs(rgba: &[u8]) -> impl Iterator<Item = (Rgb, u32)> + '_ {
     let mut pixels = rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).peekable();
     std::iter::from_fn(move || {
         let colour = pixels.next()?;
@@ -132,7 +146,7 @@ impl Palette {
         let mut known: HashMap<Rgb, u8> = HashMap::new();
         for (colour, length) in runs(rgba) {
             let index = *known.entry(colour).or_insert_with(|| self.nearest(colour));
-            let end = indices.len() + usize::try_from(length).unwrap_or(0);
+            let end = indices.len() + length as usize;
             indices.resize(end, index);
         }
         indices
@@ -247,7 +261,7 @@ mod tests {
 
     fn palette_of(rgba: &[u8], most: usize) -> Palette {
         let mut census = Census::default();
-        census.count(rgba);
+        census.count(&Packed::new(rgba));
         census.palette(most)
     }
 
@@ -257,6 +271,12 @@ mod tests {
         let palette = palette_of(&rgba, 255);
         assert_eq!(palette.colours(), [[1, 2, 3], [200, 0, 9]]);
         assert_eq!(palette.map(&rgba), [0, 0, 1]);
+    }
+
+    #[test]
+    fn packing_loses_nothing() {
+        let rgba = [frame([[7, 7, 7]; 500]), ramp()].concat();
+        assert_eq!(Packed::new(&rgba).rgba(), rgba);
     }
 
     #[test]
@@ -278,7 +298,7 @@ mod tests {
         let counted = |frames: [&[u8]; 2]| {
             let mut census = Census::default();
             for frame in frames {
-                census.count(frame);
+                census.count(&Packed::new(frame));
             }
             census.palette(255).bytes()
         };

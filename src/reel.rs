@@ -1,5 +1,6 @@
 //! Runs a film once through all its outputs: each frame is drawn once, by all cores, and given to everyone in order.
 
+mod artists;
 mod shrink;
 
 use std::io;
@@ -7,23 +8,15 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use self::artists::{Artists, Drawn};
 use crate::encode::{Encoder, Frame, Needs, Output, Written};
 use crate::error::{Error, Result};
 use crate::film::{Film, Shot};
 use crate::output;
-use crate::palette::{Census, Palette};
-use crate::pixels::{Canvas, Pixels};
-use crate::scene::Scene;
+use crate::palette::Palette;
 
 /// Told after every batch of frames: how many are done, of how many. May break off the run.
 pub type Progress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
-
-/// At most this many bytes of frames are held at a time.
-const MOST_BYTES: usize = 256 << 20;
-/// At most this many frames per core are drawn in a row before the encoders get them.
-const MOST_IN_A_ROW: usize = 8;
-/// How many frames a palette is made from, at most.
-const SAMPLES: usize = 24;
 
 /// Writes every output, in the order given, and tells what was written. Each file appears when it is whole.
 ///
@@ -167,14 +160,6 @@ fn kind(error: &Error) -> Option<io::ErrorKind> {
     }
 }
 
-/// A frame, drawn.
-struct Drawn {
-    shot: Shot,
-    scene: Scene,
-    pixels: Pixels,
-    indices: Vec<u8>,
-}
-
 /// Draws all frames and hands them out: while the encoders take one batch, the next is drawn.
 fn play(film: &Film<'_>, works: &mut [Work<'_>], progress: &mut Progress<'_>) -> Result<()> {
     let mut shots = film.shots();
@@ -186,11 +171,8 @@ fn play(film: &Film<'_>, works: &mut [Work<'_>], progress: &mut Progress<'_>) ->
         .map(Work::needs)
         .max()
         .unwrap_or(Needs::Nothing);
-    let palette = match needs {
-        Needs::Indices => survey(film, &shots)?,
-        _ => Palette::new(Vec::new()),
-    };
-    let mut artists = Artists::new(film, needs, &palette);
+    let mut artists = Artists::new(film, needs, &shots)?;
+    let palette = artists.palette();
     let (mut done, mut ready) = (0, Vec::new());
     // The empty batch at the end lets the last one be taken.
     for batch in shots.chunks(artists.batch(&shots)).chain([&[][..]]) {
@@ -211,114 +193,4 @@ fn play(film: &Film<'_>, works: &mut [Work<'_>], progress: &mut Progress<'_>) ->
         ready = next?;
     }
     Ok(())
-}
-
-/// A canvas per core, each drawing frames that follow each other.
-struct Artists<'a> {
-    film: &'a Film<'a>,
-    needs: Needs,
-    palette: &'a Palette,
-    canvases: Vec<Canvas<'a>>,
-}
-
-impl<'a> Artists<'a> {
-    fn new(film: &'a Film<'a>, needs: Needs, palette: &'a Palette) -> Self {
-        let canvas = |_| Canvas::new(film.painter, film.options.scale);
-        let canvases = (0..rayon::current_num_threads()).map(canvas).collect();
-        Self {
-            film,
-            needs,
-            palette,
-            canvases,
-        }
-    }
-
-    /// How many frames to draw at a time.
-    fn batch(&self, shots: &[Shot]) -> usize {
-        let page = shots
-            .first()
-            .map(|s| self.film.picture.scene(s.window, s.phase).size);
-        let side = |length: f64| length * self.film.options.scale;
-        // Five bytes a pixel; one batch is drawn while the one before is written.
-        let bytes = page.map_or(0.0, |p| side(p.w) * side(p.h) * 10.0).max(1.0);
-        let cores = self.canvases.len();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "1 to 256 million"
-        )]
-        let fit = (MOST_BYTES as f64 / bytes) as usize;
-        cores * (fit / cores).clamp(1, MOST_IN_A_ROW)
-    }
-
-    fn draw(&mut self, shots: &[Shot]) -> Result<Vec<Drawn>> {
-        let in_a_row = shots.len().div_ceil(self.canvases.len()).max(1);
-        let (film, needs, palette) = (self.film, self.needs, self.palette);
-        let rows: Vec<Vec<Drawn>> = shots
-            .par_chunks(in_a_row)
-            .zip(&mut self.canvases)
-            .map(|(shots, canvas)| {
-                let draw = |shot: &Shot| draw(film, needs, palette, canvas, *shot);
-                shots.iter().map(draw).collect()
-            })
-            .collect::<Result<_>>()?;
-        Ok(rows.into_iter().flatten().collect())
-    }
-}
-
-fn draw(
-    film: &Film<'_>,
-    needs: Needs,
-    palette: &Palette,
-    canvas: &mut Canvas<'_>,
-    shot: Shot,
-) -> Result<Drawn> {
-    let scene = film.picture.scene(shot.window, shot.phase);
-    let mut drawn = Drawn {
-        shot,
-        pixels: Pixels {
-            width: 0,
-            height: 0,
-            rgba: Vec::new(),
-        },
-        indices: Vec::new(),
-        scene,
-    };
-    if needs >= Needs::Pixels {
-        drawn.pixels = canvas.draw(&drawn.scene)?;
-    }
-    if needs >= Needs::Indices {
-        drawn.indices = palette.map(&drawn.pixels.rgba);
-    }
-    Ok(drawn)
-}
-
-/// One palette from a few frames: some of those in which something changes, some of all.
-fn survey(film: &Film<'_>, shots: &[Shot]) -> Result<Palette> {
-    let changed = |s: &&Shot| crate::film::is_changed(film.view, s.window);
-    let mut sample = spread(
-        &shots.iter().filter(changed).collect::<Vec<_>>(),
-        SAMPLES / 2,
-    );
-    sample.extend(spread(&shots.iter().collect::<Vec<_>>(), SAMPLES / 2));
-    let scenes = sample
-        .par_iter()
-        .map(|s| film.picture.scene(s.window, s.phase));
-    let census = scenes.map(|scene| {
-        let mut census = Census::default();
-        census.count(&film.painter.paint(&scene, film.options.scale)?.rgba);
-        Ok(census)
-    });
-    let empty = || Ok(Census::default());
-    let census = census.reduce(empty, |a, b| Ok(a?.and(b?)))?;
-    Ok(census.palette(255))
-}
-
-/// At most `most` of `all`, evenly spread, the first and the last among them.
-fn spread<'a>(all: &[&'a Shot], most: usize) -> Vec<&'a Shot> {
-    let count = all.len().min(most);
-    let last = all.len().saturating_sub(1);
-    (0..count)
-        .map(|i| all[i * last / (count - 1).max(1)])
-        .collect()
 }
