@@ -1,7 +1,10 @@
 //! Takes in any number of bags: where every message lies in time, and what their contents claim.
 
-use std::collections::BTreeMap;
+mod belief;
+
 use std::io;
+
+use belief::believed;
 
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::error::{Error, Result};
@@ -280,34 +283,6 @@ fn widen(span: &mut Option<Span>, (first, last): (Stamp, Stamp)) {
     });
     all.start = all.start.min(first);
     all.end = all.end.max(last.plus(1));
-}
-
-const DAY: i64 = 86_400_000_000_000;
-/// Times further than this from all others are strangers.
-const FAR_DAYS: i64 = 365;
-/// Of so many messages at most one may be a stranger that is set aside.
-const RARE: u64 = 10;
-
-/// The times to believe, if a few messages lie far from the bulk; `None` to believe all.
-fn believed(days: &BTreeMap<i64, u64>) -> Option<Span> {
-    let mut clusters: Vec<(i64, i64, u64)> = Vec::new();
-    for (day, count) in days {
-        match clusters.last_mut() {
-            Some((_, last, sum)) if day - *last <= FAR_DAYS => {
-                *last = *day;
-                *sum += count;
-            }
-            _ => clusters.push((*day, *day, *count)),
-        }
-    }
-    let total: u64 = days.values().sum();
-    let (first, last, count) = clusters.iter().max_by_key(|c| c.2)?;
-    let strangers = total - count;
-    let rare = strangers <= (total / RARE).max(1) && strangers < *count;
-    (strangers > 0 && rare).then(|| Span {
-        start: Stamp(first.saturating_mul(DAY)),
-        end: Stamp((last + 1).saturating_mul(DAY)),
-    })
 }
 
 #[cfg(test)]

@@ -191,6 +191,16 @@ pub const SOURCES: &[Source] = &[
         conclude: &[rosout_rule::conclude],
         ..NOTHING
     },
+    Source {
+        word: "topology",
+        about: "a file of the user's that states nodes and edges (CSV, YAML, DOT)",
+        ..NOTHING
+    },
+    Source {
+        word: "launch",
+        about: "a launch file of the user's, which declares nodes",
+        ..NOTHING
+    },
 ];
 
 /// What a source hears, and where its claims go.

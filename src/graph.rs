@@ -6,6 +6,7 @@
 mod assemble;
 mod build;
 mod lives;
+mod proofs;
 mod rates;
 mod restarts;
 mod roles;
@@ -218,3 +219,6 @@ impl Elements {
         .unwrap_or_default()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -47,6 +47,7 @@ mod table;
 pub mod terminal;
 pub mod text;
 pub mod time;
+pub mod topology;
 mod trust;
 mod value;
 pub mod view;

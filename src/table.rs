@@ -1,6 +1,6 @@
 //! Tables as comma-separated values (RFC 4180).
 
-use csv::{Terminator, WriterBuilder};
+use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
 /// A table as text: the names of the columns, then a row a line.
 pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
@@ -14,6 +14,28 @@ pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> S
     }
     let bytes = writer.into_inner().unwrap_or_default();
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Every row of a text with its line, 1.., the head among them; rows may differ in length, and empty lines are none.
+///
+/// # Errors
+/// The line, and what is wrong there.
+pub(crate) fn records(text: &str) -> Result<Vec<(usize, Vec<String>)>, (usize, String)> {
+    let mut reader = ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+    let line = |position: Option<&csv::Position>| {
+        position.map_or(0, |p| usize::try_from(p.line()).unwrap_or(usize::MAX))
+    };
+    let rows = reader.records().map(|row| match row {
+        Ok(row) => Ok((
+            line(row.position()),
+            row.iter().map(ToOwned::to_owned).collect(),
+        )),
+        Err(error) => Err((line(error.position()), error.to_string())),
+    });
+    rows.collect()
 }
 
 #[cfg(test)]

@@ -441,24 +441,3 @@ fn every_layout_survives_any_cut() {
         assert!(collector.facts.list.is_empty(), "{len}");
     }
 }
-
-fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
-    let span = believed(&days.iter().copied().collect())?;
-    Some((span.start.0 / DAY, span.end.0 / DAY))
-}
-
-#[test]
-fn a_few_messages_far_from_the_bulk_are_set_aside() {
-    assert_eq!(kept(&[(0, 3), (20_000, 500)]), Some((20_000, 20_001)));
-    assert_eq!(kept(&[(0, 1), (20_000, 2)]), Some((20_000, 20_001)));
-    assert_eq!(kept(&[(0, 500), (20_000, 3)]), Some((0, 1)));
-}
-
-#[test]
-fn a_bag_that_is_one_piece_or_two_halves_is_kept_whole() {
-    assert_eq!(kept(&[(0, 500)]), None);
-    assert_eq!(kept(&[(20_000, 2), (20_006, 3)]), None);
-    assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
-    assert_eq!(kept(&[(0, 1), (20_000, 1)]), None);
-    assert_eq!(kept(&[]), None);
-}

@@ -1,0 +1,110 @@
+//! Everything that is known about a mission: what sources conclude and the user tells, under names in order.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use super::build::Options;
+use super::roles::role;
+use super::values::Values;
+use crate::collect::Collected;
+use crate::evidence::{Degree, SOURCES};
+use crate::facts::Name;
+use crate::proof::{Known, Proof, What, When};
+use crate::time::Stamp;
+use crate::topology::{Element, Entry};
+
+/// All proofs and stated values. Names are numbered anew in the order of their texts.
+pub(super) fn prove(
+    collected: &mut Collected,
+    options: &Options,
+) -> io::Result<(Vec<Proof>, Values)> {
+    let mut known = Known::new(&collected.streams, &mut collected.facts);
+    known.take_at_their_word();
+    for (row, source) in SOURCES.iter().enumerate() {
+        for conclude in source.conclude {
+            conclude(row, &mut known);
+        }
+    }
+    let start = collected.span.map_or(Stamp(0), |s| s.start);
+    let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
+    for entry in &options.topology {
+        told(&mut known, entry, (start, end));
+    }
+    if let Some(error) = known.failed {
+        return Err(error);
+    }
+    let mut proofs = known.proofs;
+    let roles = if options.roles {
+        fold(&mut proofs, collected)
+    } else {
+        BTreeMap::new()
+    };
+    let new = collected.facts.renumber();
+    let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
+    for proof in &mut proofs {
+        proof.rename(&to);
+    }
+    let roles: BTreeMap<Name, Name> = roles.into_iter().map(|(a, b)| (to(a), to(b))).collect();
+    let role = |name: Name| roles.get(&name).copied().unwrap_or(name);
+    for stream in &mut collected.streams {
+        stream.topic = to(stream.topic);
+        stream.publisher = stream.publisher.map(to);
+        stream.speaker = stream.publisher.map(role);
+    }
+    let values = Values::new(&mut collected.facts, role)?;
+    Ok((proofs, values))
+}
+
+/// Adds what the user's file says to what is known.
+fn told(known: &mut Known<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
+    let mut name = |text: &String| known.facts.name(text);
+    let what = match &entry.element {
+        Element::Node(node) => What::Node(name(node)),
+        Element::Topic(topic) => What::Topic(name(topic)),
+        Element::Publish(node, topic) => What::Publish(name(node), name(topic)),
+        Element::Subscribe(node, topic) => What::Subscribe(name(topic), name(node)),
+    };
+    let at = |offset: Option<i64>, without| offset.map_or(without, |ns| mission.0.plus(ns));
+    let when = match (entry.from_ns, entry.to_ns) {
+        (None, None) => When::Whole,
+        (from, to) => When::Signs {
+            signs: vec![at(from, mission.0), at(to, mission.1)],
+            ends: Vec::new(),
+            held: false,
+        },
+    };
+    let (word, degree) = match entry.declared {
+        true => ("launch", Degree::Declared),
+        false => ("topology", Degree::Stated),
+    };
+    let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
+    known.prove(Proof {
+        what,
+        source,
+        degree,
+        when,
+    });
+}
+
+/// Puts every node under the name of its role; tells which names changed.
+fn fold(proofs: &mut [Proof], collected: &mut Collected) -> BTreeMap<Name, Name> {
+    let mut roles = BTreeMap::new();
+    let mut to = |node: Name| {
+        let text = collected.facts.text(node);
+        match role(&text) {
+            same if *same == *text => node,
+            role => {
+                let role = collected.facts.name(role);
+                roles.insert(node, role);
+                role
+            }
+        }
+    };
+    for proof in proofs {
+        proof.what = proof.what.with_node(&mut to);
+        if let When::Like(other) = &mut proof.when {
+            *other = other.with_node(&mut to);
+        }
+    }
+    roles
+}

@@ -1,0 +1,238 @@
+//! Graphs from hand-made streams.
+
+use super::*;
+use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
+use crate::collect::Collector;
+use crate::time::Span;
+use crate::topology::Element::{Node, Subscribe};
+
+const SECOND: i64 = 1_000_000_000;
+
+/// One connection: topic, publisher, latching, and its messages' times in seconds.
+type Talk<'a> = (&'a str, Option<&'a str>, bool, &'a [i64]);
+
+fn connection(id: u32, topic: &str, publisher: Option<&str>, latching: bool) -> Connection {
+    Connection {
+        id: ConnectionId(id),
+        topic: topic.into(),
+        type_name: "std_msgs/String".into(),
+        definition: None,
+        type_hash: None,
+        publisher: publisher.map(Into::into),
+        latching,
+        qos: None,
+        encoding: Encoding::Ros1,
+    }
+}
+
+fn graphs(talks: &[Talk<'_>], period: i64) -> Built {
+    built(talks, period, &Options::default())
+}
+
+fn built(talks: &[Talk<'_>], period: i64, options: &Options) -> Built {
+    let mut collector = Collector::new(crate::collect::Options::default());
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    for (id, (topic, publisher, latching, times)) in (0..).zip(talks) {
+        bag.connection(&connection(id, topic, *publisher, *latching));
+        let stamps: Vec<_> = times.iter().map(|t| Stamp(t * SECOND)).collect();
+        bag.stamps(ConnectionId(id), &stamps, None);
+    }
+    let mut collected = collector.finish().unwrap();
+    let span = collected.span.unwrap();
+    let windows: Vec<_> = (0..1000)
+        .map(|n| Span {
+            start: span.start.plus(n * period * SECOND),
+            end: span.start.plus((n + 1) * period * SECOND),
+        })
+        .take_while(|w| w.start < span.end)
+        .collect();
+    build(&mut collected, &windows, options).unwrap()
+}
+
+/// The state of one node in each window, `-` where there is none.
+fn states(built: &Built, node: &str) -> Vec<&'static str> {
+    let id = built
+        .elements
+        .nodes
+        .iter()
+        .position(|n| n.name.as_str() == node);
+    let id = u32::try_from(id.unwrap()).unwrap();
+    let state = |g: &Graph| {
+        g.nodes
+            .iter()
+            .find(|n| n.id == id)
+            .map_or("-", |n| n.state.word())
+    };
+    built.graphs.iter().map(state).collect()
+}
+
+#[test]
+fn a_node_lives_from_its_first_message_to_its_last() {
+    let built = graphs(
+        &[
+            ("/a", Some("/x"), false, &[12, 35]),
+            ("/b", Some("/y"), false, &[0, 49]),
+        ],
+        10,
+    );
+    assert_eq!(
+        states(&built, "/x"),
+        ["-", "active", "silent", "active", "-"]
+    );
+    assert_eq!(built.messages, [1, 1, 0, 1, 1]);
+}
+
+#[test]
+fn a_latched_message_holds_its_node_to_the_end() {
+    let built = graphs(
+        &[
+            ("/map", Some("/x"), true, &[5]),
+            ("/b", Some("/y"), false, &[0, 29]),
+        ],
+        10,
+    );
+    assert_eq!(states(&built, "/x"), ["active", "latched", "latched"]);
+}
+
+#[test]
+fn a_topic_without_a_publisher_still_counts() {
+    let built = graphs(&[("/a", None, false, &[0, 1, 2, 3])], 10);
+    assert!(built.elements.nodes.is_empty());
+    let topic = &built.graphs[0].topics[0];
+    assert_eq!((topic.count, topic.median_period_s), (4, Some(1.0)));
+}
+
+#[test]
+fn elements_are_in_the_order_of_their_names() {
+    let built = graphs(
+        &[
+            ("/z", Some("/b"), false, &[1]),
+            ("/a", Some("/c"), false, &[0]),
+            ("/m", Some("/a"), false, &[2]),
+        ],
+        10,
+    );
+    let all = &built.elements;
+    assert!(all.nodes.is_sorted_by_key(|n| n.name.clone()));
+    assert!(all.topics.is_sorted_by_key(|t| t.name.clone()));
+    let edges: Vec<_> = all.publishes.iter().map(|e| (e.node, e.topic)).collect();
+    assert!(edges.is_sorted());
+    assert_eq!(all.nodes[0].name.as_str(), "/a");
+    assert_eq!(built.graphs[0].nodes[0].hz, Some(0.1));
+}
+
+#[test]
+fn grace_keeps_a_silent_node_for_some_windows() {
+    let talks: [Talk<'_>; 2] = [
+        ("/a", Some("/x"), false, &[5]),
+        ("/b", Some("/y"), false, &[0, 49]),
+    ];
+    let options = Options {
+        grace: 2,
+        ..Options::default()
+    };
+    let all = built(&talks, 10, &options);
+    assert_eq!(states(&all, "/x"), ["active", "silent", "silent", "-", "-"]);
+}
+
+#[test]
+fn a_node_whose_rhythm_breaks_off_is_not_held_by_its_latched_message() {
+    let all = graphs(
+        &[
+            ("/map", Some("/x"), true, &[0]),
+            ("/pose", Some("/x"), false, &[0, 2, 4, 6, 8, 10, 12]),
+            ("/b", Some("/y"), false, &[0, 49]),
+        ],
+        10,
+    );
+    assert_eq!(states(&all, "/x"), ["active", "active", "-", "-", "-"]);
+}
+
+#[test]
+fn a_latched_message_sent_again_after_a_silence_is_a_restart() {
+    let all = graphs(
+        &[
+            ("/map", Some("/x"), true, &[0, 31]),
+            ("/pose", Some("/x"), false, &[0, 1, 2, 3, 4, 5, 32, 33, 34]),
+            ("/b", Some("/y"), false, &[0, 39]),
+        ],
+        10,
+    );
+    assert_eq!(states(&all, "/x"), ["active", "-", "-", "active"]);
+    let times: Vec<_> = all
+        .restarts
+        .iter()
+        .map(|(_, time)| time.0 / SECOND)
+        .collect();
+    assert_eq!(times, [31]);
+}
+
+#[test]
+fn roles_fold_anonymous_nodes_into_one() {
+    let talks: [Talk<'_>; 2] = [
+        ("/a", Some("/probe_12_1795171273454"), false, &[0, 5]),
+        ("/a", Some("/probe_34_1795171318449"), false, &[20, 29]),
+    ];
+    let options = Options {
+        roles: true,
+        ..Options::default()
+    };
+    let all = built(&talks, 10, &options);
+    let names: Vec<_> = all.elements.nodes.iter().map(|n| n.name.as_str()).collect();
+    assert_eq!(names, ["/probe", "/rosout"]);
+    assert_eq!(states(&all, "/probe"), ["active", "silent", "active"]);
+    let plain = graphs(&talks, 10);
+    assert_eq!(&*plain.elements.nodes[0].role, "/probe");
+    assert_eq!(plain.elements.nodes.len(), 3);
+}
+
+#[test]
+fn what_the_user_tells_is_added_and_overwrites_nothing() {
+    let entry = |element, from_ns, to_ns| crate::topology::Entry {
+        element,
+        from_ns,
+        to_ns,
+        declared: false,
+        place: String::new(),
+    };
+    let options = Options {
+        topology: vec![
+            entry(Node("/x".to_owned()), None, None),
+            entry(
+                Subscribe("/z".to_owned(), "/a".to_owned()),
+                Some(10 * SECOND),
+                Some(15 * SECOND),
+            ),
+        ],
+        ..Options::default()
+    };
+    let talks: [Talk<'_>; 2] = [
+        ("/a", Some("/x"), false, &[0, 5]),
+        ("/b", Some("/y"), false, &[0, 29]),
+    ];
+    let all = built(&talks, 10, &options);
+    assert_eq!(states(&all, "/x"), ["active", "-", "-"]);
+    assert_eq!(states(&all, "/z"), ["-", "active", "-"]);
+    let words: Vec<_> = all.elements.subscribes[0].evidence.words().collect();
+    assert_eq!(words, ["topology"]);
+}
+
+#[test]
+fn windows_may_overlap() {
+    let mut collector = Collector::new(crate::collect::Options::default());
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    bag.connection(&connection(0, "/a", Some("/x"), false));
+    let stamps: Vec<_> = (0..40).map(|n| Stamp(n * SECOND)).collect();
+    bag.stamps(ConnectionId(0), &stamps, None);
+    let mut collected = collector.finish().unwrap();
+    let windows: Vec<_> = (0..4)
+        .map(|n| Span {
+            start: Stamp(n * 10 * SECOND),
+            end: Stamp((n * 10 + 20).min(40) * SECOND),
+        })
+        .collect();
+    let all = build(&mut collected, &windows, &Options::default()).unwrap();
+    assert_eq!(all.messages, [20, 20, 20, 10]);
+}
