@@ -19,6 +19,7 @@ use crate::pipeline::{
     Drawing, Reading, Render, Rendered, Watch as _, explain, is_survey, read, survey,
 };
 use crate::terminal::Terminal;
+use crate::topology;
 use crate::window::{Division, Length};
 use typed::{
     Command, EventsArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs, TimeArgs, Typed,
@@ -71,8 +72,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     })
 }
 
-fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Reading {
-    Reading {
+fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Reading, Error> {
+    Ok(Reading {
         inputs: inputs.bags.iter().map(|path| input(path)).collect(),
         verify: inputs.verify,
         division: Division {
@@ -90,9 +91,10 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Reading {
         graph: graph::Options {
             grace: graph.grace.unwrap_or(0) as usize,
             roles: graph.roles,
+            topology: topology::read_all(&graph.topology)?,
         },
         rate_change: graph.rate_change,
-    }
+    })
 }
 
 fn input(path: &Path) -> Input {
@@ -181,7 +183,7 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
 
 /// The work that `render` was asked to do.
 fn job(args: &RenderArgs) -> Result<Render, Error> {
-    let reading = reading(&args.inputs, &args.time, &args.graph);
+    let reading = reading(&args.inputs, &args.time, &args.graph)?;
     let title = args
         .look
         .title
@@ -249,7 +251,7 @@ fn default_output(inputs: &[Input]) -> String {
 }
 
 fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let evolution = read(&reading(&args.inputs, &args.time, &args.graph), terminal)?;
+    let evolution = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
     for event in crate::events::events(&evolution) {
         terminal.results(&format!(
             "{:>12}  {}\n",
@@ -266,7 +268,7 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
         period: Some(Length::Parts(PARTS)),
         ..TimeArgs::default()
     };
-    let reading = reading(&args.inputs, &time, &args.graph);
+    let reading = reading(&args.inputs, &time, &args.graph)?;
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
         && is_survey(input)
     {

@@ -16,11 +16,14 @@ pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> S
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
+/// A row with its line, 1...
+pub(crate) type Record = (usize, Vec<String>);
+
 /// Every row of a text with its line, 1.., the head among them; rows may differ in length, and empty lines are none.
 ///
 /// # Errors
 /// The line, and what is wrong there.
-pub(crate) fn records(text: &str) -> Result<Vec<(usize, Vec<String>)>, (usize, String)> {
+pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
     let mut reader = ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)

@@ -86,6 +86,20 @@ pub fn read(path: &Path) -> Result<Topology> {
     Ok(topology)
 }
 
+/// Reads several files into one topology.
+///
+/// # Errors
+/// As [`read`], for the first file that is wrong.
+pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
+    let mut all = Topology::default();
+    for path in paths {
+        let one = read(path.as_ref())?;
+        all.entries.extend(one.entries);
+        all.notices.extend(one.notices);
+    }
+    Ok(all)
+}
+
 /// The text of a file that is not too long.
 fn text(path: &Path) -> Result<String> {
     let length = fs::metadata(path).map_err(Error::io("read", path))?.len();

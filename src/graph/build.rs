@@ -19,7 +19,7 @@ use crate::facts::Name;
 use crate::notice::Notices;
 use crate::proof::{Proof, What, When};
 use crate::time::{Span, Stamp};
-use crate::topology::Entry;
+use crate::topology::Topology;
 
 /// How graphs are built.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub struct Options {
     /// Whether nodes whose names differ only in an anonymous suffix are one, under the name of their role.
     pub roles: bool,
     /// Nodes and edges that the user knows of.
-    pub topology: Vec<Entry>,
+    pub topology: Topology,
 }
 
 /// The graphs of a mission.
@@ -98,7 +98,11 @@ impl<'a> Builder<'a> {
                 grace: options.grace,
             },
         );
-        Ok(self.assemble(collected))
+        let mut built = self.assemble(collected);
+        built
+            .notices
+            .extend(options.topology.notices.iter().cloned());
+        Ok(built)
     }
 
     /// Counts messages, topic by topic.

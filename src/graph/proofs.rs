@@ -27,7 +27,7 @@ pub(super) fn prove(
     }
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
-    for entry in &options.topology {
+    for entry in &options.topology.entries {
         told(&mut known, entry, (start, end));
     }
     if let Some(error) = known.failed {
@@ -73,9 +73,10 @@ fn told(known: &mut Known<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
             held: false,
         },
     };
-    let (word, degree) = match entry.declared {
-        true => ("launch", Degree::Declared),
-        false => ("topology", Degree::Stated),
+    let (word, degree) = if entry.declared {
+        ("launch", Degree::Declared)
+    } else {
+        ("topology", Degree::Stated)
     };
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
     known.prove(Proof {

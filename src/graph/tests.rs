@@ -197,14 +197,17 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
         place: String::new(),
     };
     let options = Options {
-        topology: vec![
-            entry(Node("/x".to_owned()), None, None),
-            entry(
-                Subscribe("/z".to_owned(), "/a".to_owned()),
-                Some(10 * SECOND),
-                Some(15 * SECOND),
-            ),
-        ],
+        topology: crate::topology::Topology {
+            entries: vec![
+                entry(Node("/x".to_owned()), None, None),
+                entry(
+                    Subscribe("/z".to_owned(), "/a".to_owned()),
+                    Some(10 * SECOND),
+                    Some(15 * SECOND),
+                ),
+            ],
+            notices: Vec::new(),
+        },
         ..Options::default()
     };
     let talks: [Talk<'_>; 2] = [

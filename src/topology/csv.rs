@@ -78,7 +78,7 @@ fn seconds(cell: &str) -> Option<Option<i64>> {
         clippy::cast_possible_truncation,
         reason = "less than 2^63 by the check above"
     )]
-    sound.then(|| Some((seconds * 1e9) as i64))
+    sound.then_some(Some((seconds * 1e9) as i64))
 }
 
 /// The strings in `['a', "b"]`; an empty cell is an empty list, one bare name a list of one.

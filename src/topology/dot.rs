@@ -183,7 +183,7 @@ fn tokens(text: &str) -> Result<Vec<Token>, usize> {
     let mut line = 1;
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
-        let (taken, token) = match c {
+        let (length, token) = match c {
             '\n' => (1, None),
             c if c.is_whitespace() => (c.len_utf8(), None),
             '#' => (rest.find('\n').unwrap_or(rest.len()), None),
@@ -207,8 +207,8 @@ fn tokens(text: &str) -> Result<Vec<Token>, usize> {
             }
         };
         tokens.extend(token.map(|(text, word)| Token { line, text, word }));
-        line += rest[..taken].matches('\n').count();
-        rest = &rest[taken..];
+        line += rest[..length].matches('\n').count();
+        rest = &rest[length..];
     }
     Ok(tokens)
 }

@@ -206,9 +206,9 @@ fn substitute(text: &str, path: &Path, scope: &Scope) -> String {
             "arg" | "var" => done.push_str(scope.arguments.get(words).map_or("", String::as_str)),
             "anon" => done.push_str(words),
             "optenv" | "env" => {
-                done.push_str(words.split_once(' ').map_or("", |(_, default)| default))
+                done.push_str(words.split_once(' ').map_or("", |(_, default)| default));
             }
-            "dirname" => done.push_str("."),
+            "dirname" => done.push('.'),
             "find" | "find-pkg-share" | "find-pkg-prefix" => done.push_str(&package(path, words)),
             _ => {}
         }
@@ -239,9 +239,10 @@ mod tests {
 
     fn elements(text: &str) -> Vec<Element> {
         let path = Path::new("robot.launch");
-        let tree = match text.starts_with('<') {
-            true => tree::of_xml(path, text).unwrap(),
-            false => tree::of_yaml(path, text).unwrap().unwrap(),
+        let tree = if text.starts_with('<') {
+            tree::of_xml(path, text).unwrap()
+        } else {
+            tree::of_yaml(path, text).unwrap().unwrap()
         };
         let entries = read(path, &tree).unwrap().entries;
         entries.into_iter().map(|e| e.element).collect()

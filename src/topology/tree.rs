@@ -16,7 +16,7 @@ pub(super) struct Tree {
     pub(super) tag: String,
     /// Attributes in order.
     pub(super) attributes: Vec<(String, String)>,
-    pub(super) children: Vec<Tree>,
+    pub(super) children: Vec<Self>,
     /// Its line, 1..; 0 where not known.
     pub(super) line: usize,
 }
@@ -43,11 +43,7 @@ pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
             let at = usize::try_from(reader.buffer_position())
                 .unwrap_or(0)
                 .min(text.len());
-            text.as_bytes()[..at]
-                .iter()
-                .filter(|b| **b == b'\n')
-                .count()
-                + 1
+            text.get(..at).unwrap_or(text).matches('\n').count() + 1
         };
         let wrong = |line, reason: String| bad(path, line, reason, XML_HINT);
         let event = reader
