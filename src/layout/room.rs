@@ -276,12 +276,13 @@ impl<'a> Room<'a> {
     }
 }
 
-/// A stretch `(start, length)` made at least `wanted` long, to the right if there is room.
+/// A stretch `(start, length)` made at least `wanted` long: to its end if there is room, else to its start too.
 fn stretched((start, length): (f64, f64), wanted: f64, room: (f64, f64)) -> (f64, f64) {
     if length >= wanted {
         return (start, length);
     }
-    (start.min(room.1 - wanted).max(room.0.min(start)), wanted)
+    let end = room.1.max(start + length);
+    (start.min(end - wanted).max(room.0.min(start)), wanted)
 }
 
 /// A size on the page as along and across, or back.
@@ -289,5 +290,17 @@ pub(super) fn turned(size: Size, orientation: Orientation) -> Size {
     match orientation {
         Orientation::LeftRight => size,
         Orientation::TopBottom => Size::new(size.h, size.w),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_grows_without_leaving_what_it_held() {
+        assert_eq!(stretched((10.0, 30.0), 50.0, (0.0, 100.0)), (10.0, 50.0));
+        assert_eq!(stretched((10.0, 30.0), 50.0, (0.0, 45.0)), (0.0, 50.0));
+        assert_eq!(stretched((10.0, 30.0), 35.0, (0.0, 20.0)), (5.0, 35.0));
     }
 }
