@@ -4,10 +4,12 @@
 
 use std::collections::BTreeSet;
 
-use super::cut::{Lane, cut};
-use super::room::{Room, turned};
 use super::{Engine, Layers, Layout, Orientation, Part, Plan, Route, Rows, Wish};
 use super::{acyclic, fold, labels, order, pack, parts, place, rank, route};
+use super::{
+    cut::{Lane, cut},
+    room::{Room, turned},
+};
 use crate::error::Result;
 use crate::geometry::{Point, Rect, Size};
 
@@ -16,7 +18,7 @@ const PART_GAP: f64 = 20.0;
 /// A part with more edges is cut in one way only: the one that keeps it small.
 const MANY: usize = 300;
 /// How many edges the search for good orders may sweep, over all parts.
-const EFFORT: usize = 300_000;
+const EFFORT: usize = 120_000;
 
 /// The default engine.
 pub(super) struct Layered;
@@ -140,11 +142,11 @@ pub(super) struct Block {
     pub(super) clusters: Vec<Rect>,
 }
 
-/// How good a drawing is: the scale at which it fills the page, how small it is at all, how free of crossings.
+/// How good a drawing is: the scale at which it fills the page, above all; how small it is; how free of crossings.
 fn quality(size: Size, crossings: u64, links: usize, wish: &Wish) -> f64 {
     let small = (wish.page.w * wish.page.h / (size.w * size.h).max(1.0)).sqrt();
-    (pack::fit(size, wish.page) * small).sqrt()
-        / (1.0 + 0.5 * crossings as f64 / links.max(1) as f64)
+    let readable = libm::pow(pack::fit(size, wish.page), 0.8) * libm::pow(small, 0.2);
+    readable / (1.0 + 0.5 * crossings as f64 / links.max(1) as f64)
 }
 
 fn best_block(

@@ -10,11 +10,13 @@ use ::layout::std_shapes::shapes::{Element, ShapeKind};
 use ::layout::topo::layout::VisualGraph;
 use ::layout::topo::placer::Placer;
 
-use super::cut::{Lane, cut};
-use super::layered::{Block, assembled};
-use super::room::{Room, turned};
 use super::{Engine, Kind, Layers, Layout, Orientation, Part, Plan, Rows, Wish};
 use super::{acyclic, labels, order, parts, rank, route};
+use super::{
+    cut::{Lane, cut},
+    layered::{Block, assembled},
+    room::{Room, turned},
+};
 use crate::error::{Error, Result};
 use crate::geometry::{Rect, Size};
 

@@ -9,7 +9,7 @@ use crate::geometry::{Rect, Size};
 const BOX_GAP: f64 = 12.0;
 const EDGE_GAP: f64 = 7.0;
 /// The room between a cluster's border and what is inside, and outside.
-const PADDING: f64 = 8.0;
+const PADDING: f64 = 7.0;
 const MARGIN: f64 = 4.0;
 /// The room before and after a label between two layers.
 const LABEL_GAP: f64 = 12.0;
@@ -218,7 +218,7 @@ impl<'a> Room<'a> {
                 steepest = steepest.max((across[v] - across[u]).abs());
             }
         }
-        24.0 + (edges * 0.5_f64).min(16.0) + (steepest * 0.05).min(24.0)
+        20.0 + (edges * 0.4_f64).min(11.0) + (steepest * 0.04).min(16.0)
     }
 
     /// A box around each cluster, children inside their parents, all in their borders.

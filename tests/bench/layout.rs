@@ -123,7 +123,11 @@ fn report(name: &str, engine: &str, graph: &Graph, layout: &Layout, took: Durati
         found.bends,
         found.overlaps,
         found.through,
-        found.foreign,
+        if engine.starts_with("dot") {
+            "–".to_owned()
+        } else {
+            found.foreign.to_string()
+        },
         found.labels,
         found.label_overlaps,
         took.as_secs_f64() * 1e3,
