@@ -152,6 +152,18 @@ fn write_shape(out: &mut String, shape: &Shape) {
                 ],
             );
         }
+        Form::Path(steps) if is_polygon(steps) => {
+            out.push_str("<polygon points=\"");
+            for (at, step) in steps.iter().enumerate() {
+                if let Step::Move(p) | Step::Line(p) = step {
+                    out.push_str(if at > 0 { " " } else { "" });
+                    number(out, p.x);
+                    out.push(',');
+                    number(out, p.y);
+                }
+            }
+            out.push('"');
+        }
         Form::Path(steps) => {
             out.push_str("<path d=\"");
             write_steps(out, steps);
@@ -161,6 +173,11 @@ fn write_shape(out: &mut String, shape: &Shape) {
     let _ = write!(out, " fill=\"{}\"", shape.fill);
     write_stroke(out, &shape.stroke);
     out.push_str("/>");
+}
+
+/// Whether a path is one closed run of straight lines: heads of arrows and signs, which tools should not take for routes.
+fn is_polygon(steps: &[Step]) -> bool {
+    matches!(steps, [Step::Move(_), lines @ .., Step::Close] if lines.iter().all(|s| matches!(s, Step::Line(_))))
 }
 
 fn write_steps(out: &mut String, steps: &[Step]) {

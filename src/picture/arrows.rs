@@ -134,7 +134,7 @@ impl Arrows<'_> {
         let color = stroke.color;
         let path = Form::Path(steps);
         if look.glow != Color::NONE {
-            let width = stroke.width + 2.0 * self.style.badge.glow * scale;
+            let width = stroke.width + 1.2 * self.style.badge.glow * scale;
             group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
         }
         group.shape(Shape::line(path, stroke));

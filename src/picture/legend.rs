@@ -45,12 +45,8 @@ pub(super) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
     let all = [
         (kind(ItemKind::Node), Sign::Node, "node"),
         (kind(ItemKind::Topic), Sign::Topic, "topic"),
-        (kind(ItemKind::Group), Sign::Group, "topics grouped"),
-        (
-            kind(ItemKind::Namespace),
-            Sign::Namespace,
-            "namespace collapsed",
-        ),
+        (kind(ItemKind::Group), Sign::Group, "group"),
+        (kind(ItemKind::Namespace), Sign::Namespace, "namespace"),
         (mark(&[Mark::Added]), Sign::Change(Mark::Added), "added"),
         (
             mark(&[Mark::Removed]),
@@ -60,7 +56,7 @@ pub(super) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
         (
             mark(&[Mark::Faster, Mark::Slower]),
             Sign::Change(Mark::Slower),
-            &*format!("rate changed (≥ {percent} %)"),
+            &*format!("rate ± {percent} %"),
         ),
         (
             mark(&[Mark::HandedOver]),
@@ -108,9 +104,9 @@ pub(super) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
 }
 
 /// How wide a sign is, before its words.
-const SIGN: f64 = 26.0;
+const SIGN: f64 = 24.0;
 const GAP: f64 = 6.0;
-const AFTER: f64 = 18.0;
+const AFTER: f64 = 14.0;
 
 /// The signs in rows that fit the page's width.
 pub(super) fn rows(

@@ -87,7 +87,7 @@ pub(super) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
         let width = match mark {
             Mark::Removed => change.width * 0.8,
             // As wide as its rate asks for, but never mistaken for one that did not change.
-            _ => (change.width * 0.8).max(width_of(style, shown.hz)),
+            _ => (change.width * 0.65).max(width_of(style, shown.hz)),
         };
         return ArrowLook {
             stroke: line(change.color, width, &change.dash),

@@ -1,0 +1,204 @@
+//! How fast frames are drawn: `cargo bench --bench drawing -- MISSION.json [FRAMES]`.
+//!
+//! Draws the mission (an evolution as JSON) at 1280×720 and prints a table: everything included on one core and on two,
+//! drawing alone, drawing over the last frame where less than a tenth of the elements changed, frames of a tween, and
+//! a long run with its memory. What was measured last stands in `drawing.md`.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    missing_docs,
+    reason = "a benchmark for people"
+)]
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use bagreel::picture::{Picture, Sketch, Wish};
+use bagreel::pixels::{Canvas, Painter, Pixels};
+use bagreel::scene::Scene;
+use bagreel::style::Style;
+use bagreel::text::Fonts;
+use bagreel::view::{View, ViewOptions, view};
+use bagreel::{evolution, layout};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _};
+use rayon::prelude::*;
+
+fn main() {
+    let mut words = std::env::args().skip(1).filter(|a| a != "--bench");
+    let Some(mission) = words.next() else {
+        println!("usage: cargo bench --bench drawing -- MISSION.json [FRAMES]");
+        return;
+    };
+    let frames: usize = words.next().map_or(3600, |n| n.parse().unwrap());
+    let path = Path::new(&mission);
+    let mut evolution =
+        evolution::read_json(&std::fs::read_to_string(path).unwrap(), path).unwrap();
+    evolution.find_changes(0.25, &[]);
+    let (view, _) = view(&evolution, &ViewOptions::default());
+    let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
+    let sketch = Sketch::new(&view, &style, &fonts, Wish::default());
+    let picture = sketch.laid_out(layout::engine("layered").unwrap());
+    let painter = Painter::new(&fonts);
+    println!(
+        "{} boxes, {} arrows, {} windows",
+        view.items.len(),
+        view.arrows.len(),
+        picture.len()
+    );
+    println!("| what | frames | ms/frame | frames/s |\n|---|---|---|---|");
+
+    let cold = Painter::new(&fonts);
+    row(
+        "first frame, nothing known",
+        1,
+        timed(|| drop(cold.paint(&picture.scene(0), 1.0).unwrap())),
+    );
+    let all: Vec<usize> = (0..picture.len()).collect();
+    row(
+        "scenes alone",
+        all.len(),
+        timed(|| all.iter().for_each(|k| drop(picture.scene(*k)))),
+    );
+    row(
+        "drawn anew",
+        all.len(),
+        timed(|| {
+            for k in &all {
+                painter.paint(&picture.scene(*k), 1.0).unwrap();
+            }
+        }),
+    );
+    let long: Vec<usize> = (0..240).map(|k| k % picture.len()).collect();
+    let one = timed(|| drop(run(&picture, &painter, &long, 1)));
+    row("everything with PNG, one core", long.len(), one);
+    let two = timed(|| drop(run(&picture, &painter, &long, 2)));
+    row("everything with PNG, two cores", long.len(), two);
+    println!(
+        "two cores are {:.2} times as fast",
+        one.as_secs_f64() / two.as_secs_f64()
+    );
+
+    over_the_last(&picture, &painter, &view);
+    tweens(&picture, &painter);
+    let before = peak_mb();
+    let many: Vec<usize> = (0..frames).map(|k| k % picture.len()).collect();
+    row(
+        "a long run, two cores",
+        many.len(),
+        timed(|| drop(run(&picture, &painter, &many, 2))),
+    );
+    println!(
+        "memory at its peak: {before} MB before the long run, {} MB after",
+        peak_mb()
+    );
+}
+
+/// Draws and encodes each frame as a PNG, in chunks as the program does; returns the bytes.
+fn run(picture: &Picture<'_>, painter: &Painter, frames: &[usize], threads: usize) -> usize {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap();
+    let chunk = |chunk: &[usize]| -> usize {
+        let mut canvas = Canvas::new(painter, 1.0);
+        chunk
+            .iter()
+            .map(|k| png(&canvas.draw(&picture.scene(*k)).unwrap()))
+            .sum()
+    };
+    pool.install(|| frames.par_chunks(30).map(chunk).sum())
+}
+
+fn png(pixels: &Pixels) -> usize {
+    let mut out = Vec::new();
+    let rgb: Vec<u8> = pixels
+        .rgba
+        .chunks_exact(4)
+        .flat_map(|p| [p[0], p[1], p[2]])
+        .collect();
+    PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(&rgb, pixels.width, pixels.height, ExtendedColorType::Rgb8)
+        .unwrap();
+    out.len()
+}
+
+/// Frames in which less than a tenth of the elements differ from the frame before.
+fn over_the_last(picture: &Picture<'_>, painter: &Painter, view: &View) {
+    let few = view.items.len() + view.arrows.len();
+    let mut canvas = Canvas::new(painter, 1.0);
+    let (mut time, mut drawing, mut count) = (Duration::ZERO, Duration::ZERO, 0);
+    let mut last = picture.scene(0);
+    canvas.draw(&last).unwrap();
+    for k in 1..picture.len() {
+        let start = Instant::now();
+        let scene = picture.scene(k);
+        let between = Instant::now();
+        let pixels = canvas.draw(&scene).unwrap();
+        let end = Instant::now();
+        assert!(pixels == painter.paint(&scene, 1.0).unwrap(), "window {k}");
+        if differing(&last, &scene) * 10 < few {
+            time += end - start;
+            drawing += end - between;
+            count += 1;
+        }
+        last = scene;
+    }
+    row(
+        "over the last frame, < 10 % changed, with the scene",
+        count,
+        time,
+    );
+    row(
+        "over the last frame, < 10 % changed, pixels alone",
+        count,
+        drawing,
+    );
+}
+
+fn differing(a: &Scene, b: &Scene) -> usize {
+    let old: std::collections::BTreeMap<&str, _> =
+        a.groups.iter().map(|g| (g.id.as_str(), g)).collect();
+    let elements = b.groups.iter().filter(|g| !g.data.is_empty());
+    elements
+        .filter(|g| old.get(g.id.as_str()) != Some(g))
+        .count()
+}
+
+fn tweens(picture: &Picture<'_>, painter: &Painter) {
+    let mut canvas = Canvas::new(painter, 1.0);
+    let steps: Vec<(usize, f64)> = (1..picture.len())
+        .flat_map(|k| [0.2, 0.4, 0.6, 0.8, 1.0].map(|p| (k, p)))
+        .collect();
+    let time = timed(|| {
+        for (k, phase) in &steps {
+            canvas.draw(&picture.between(*k, *phase)).unwrap();
+        }
+    });
+    row("tween, five a window", steps.len(), time);
+}
+
+fn timed(work: impl FnOnce()) -> Duration {
+    let start = Instant::now();
+    work();
+    start.elapsed()
+}
+
+fn row(what: &str, frames: usize, time: Duration) {
+    let each = time.as_secs_f64() / frames.max(1) as f64;
+    println!(
+        "| {what} | {frames} | {:.2} | {:.0} |",
+        each * 1000.0,
+        1.0 / each
+    );
+}
+
+/// The most memory this process ever held; 0 where the system does not tell.
+fn peak_mb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|l| l.starts_with("VmHWM"));
+    let kb = line
+        .and_then(|l| l.split_whitespace().nth(1))
+        .and_then(|n| n.parse::<u64>().ok());
+    kb.unwrap_or(0) / 1024
+}
