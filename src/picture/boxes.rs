@@ -118,9 +118,9 @@ impl Boxes<'_> {
     /// The middle of what hangs on a box and its font size: over the lower edge, clear of the name, and at most as far
     /// down as boxes are apart.
     fn below(&self, place: Rect) -> (Point, f64) {
-        let size = self.style.edge.size * self.fit.scale;
+        let size = self.style.edge.size * self.fit.scale * 0.95;
         (
-            Point::new(place.centre().x, place.bottom() + size * 0.38),
+            Point::new(place.centre().x, place.bottom() + size * 0.2),
             size,
         )
     }
