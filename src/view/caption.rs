@@ -51,7 +51,11 @@ impl<'a> Speaker<'a> {
         let name = |item: &Item| {
             let short = spoken(item);
             let single = last_parts.get(&(item.kind.word(), short)) == Some(&1);
-            clip(if single { short } else { &item.name })
+            let name = clip(if single { short } else { whole(item).0 });
+            match (item.kind, whole(item).1) {
+                (ItemKind::Group, Some(what)) => format!("{name} {what}"),
+                _ => name,
+            }
         };
         let mut node_names: BTreeMap<&str, usize> = BTreeMap::new();
         for node in &elements.nodes {
@@ -75,7 +79,7 @@ impl<'a> Speaker<'a> {
         for (mark, verb) in [(Mark::Added, "appeared"), (Mark::Removed, "vanished")] {
             self.topics_alone(frame, mark, verb, &mut phrases);
         }
-        self.rates(frame, changes, &mut phrases);
+        self.rates(frame, &mut phrases);
         self.connections(frame, changes, &mut phrases);
         let inside = marked(&frame.items, Mark::Inside);
         let inside: Vec<String> = inside
@@ -186,20 +190,17 @@ impl<'a> Speaker<'a> {
         named_or_counted(alone, &format!("topics {verb}"), phrases);
     }
 
-    /// Rates that changed, the largest factor first.
-    fn rates(&self, frame: &Frame, changes: &[Change], phrases: &mut Vec<String>) {
+    /// Rates that changed, the largest factor first; between nodes, those of the arrows' topics.
+    fn rates(&self, frame: &Frame, phrases: &mut Vec<String>) {
         let mut rates: BTreeMap<String, (f64, f64)> = BTreeMap::new();
-        for change in changes {
-            let Change::Rate {
-                what: Element::Topic(topic),
-                from_hz,
-                to_hz,
-            } = change
-            else {
-                continue;
-            };
-            if let Some(name) = self.topic_name(frame, *topic) {
-                rates.insert(name, (*from_hz, *to_hz));
+        let told = |shown: &Shown| Some((shown.from_hz?, shown.hz?));
+        for shown in frame.items.iter().filter(|s| told(s).is_some()) {
+            rates.extend(told(shown).map(|rate| (self.name(shown.id).to_owned(), rate)));
+        }
+        for shown in &frame.arrows {
+            let arrow = self.cast.arrows.get(shown.id as usize);
+            if let Some(ArrowKind::Direct(topic)) = arrow.map(|a| &a.kind) {
+                rates.extend(told(shown).map(|rate| (clip(topic), rate)));
             }
         }
         let factor = |(from, to): &(f64, f64)| from.max(*to) / from.min(*to).max(1e-9);
@@ -315,12 +316,27 @@ impl<'a> Speaker<'a> {
 
 /// The short name of an item: its last part, but the full name of a topic at the root.
 fn spoken(item: &Item) -> &str {
-    let is_root = item.name.rfind('/') == Some(0);
+    let (name, _) = whole(item);
+    let is_root = name.rfind('/') == Some(0);
     match item.kind {
-        ItemKind::Node | ItemKind::Namespace => last_part(&item.name),
-        ItemKind::Topic if !is_root => last_part(&item.name),
-        ItemKind::Topic | ItemKind::Group => &item.name,
+        ItemKind::Topic if is_root => name,
+        ItemKind::Group if item.members.len() == 1 => name,
+        _ => last_part(name),
     }
+}
+
+/// The name of an item, and what a group is a group of: `/nav`, `action`.
+fn whole(item: &Item) -> (&str, Option<&'static str>) {
+    let kinds = [
+        ("/action_topics", "action"),
+        ("/image_topics", "image"),
+        ("/service_events", "services"),
+    ];
+    let is_group = item.kind == ItemKind::Group;
+    let mut kinds = kinds.into_iter().filter(|_| is_group);
+    kinds
+        .find_map(|(suffix, what)| Some((item.name.strip_suffix(suffix)?, Some(what))))
+        .unwrap_or((&item.name, None))
 }
 
 fn clip(name: &str) -> String {

@@ -7,7 +7,8 @@ use super::cast::Cast;
 use super::news::{News, Told, alone};
 use super::present::{Present, present};
 use super::tally::tally;
-use super::{Frame, Mark, Shown, ViewOptions};
+use super::{Frame, Mark, Shown, ViewOptions, hertz};
+use crate::diff::RATE_CHANGE;
 use crate::evolution::Evolution;
 
 /// The windows one after the other.
@@ -60,16 +61,31 @@ fn marked(before: &Present, now: &Present, news: &BTreeMap<u32, Told>) -> Vec<Sh
             count: Some(0),
             ..before.clone()
         }),
-        (Some(_), Some(now)) => {
-            let news = news.get(&now.id);
+        (Some(before), Some(now)) => {
+            let told = match news.get(&now.id) {
+                Some((Mark::Faster | Mark::Slower, None)) => summed(before.hz, now.hz),
+                news => news.copied(),
+            };
             Some(Shown {
-                mark: news.map(|(mark, _)| *mark),
-                from_hz: news.and_then(|(_, from_hz)| *from_hz),
+                mark: told.map(|(mark, _)| mark),
+                from_hz: told.and_then(|(_, from_hz)| from_hz),
                 ..now.clone()
             })
         }
     };
     before.iter().zip(now).filter_map(one).collect()
+}
+
+/// Whether the rate of several together changed, when the rate of one of them did.
+fn summed(from: Option<f64>, to: Option<f64>) -> Option<Told> {
+    let (from, to) = (from?, to?);
+    let differs = (to - from).abs() > RATE_CHANGE * from && hertz(from) != hertz(to);
+    let mark = if to > from {
+        Mark::Faster
+    } else {
+        Mark::Slower
+    };
+    differs.then_some((mark, Some(from)))
 }
 
 #[cfg(test)]
@@ -159,14 +175,32 @@ mod tests {
     }
 
     #[test]
+    fn the_rate_of_a_group_is_that_of_its_sum() {
+        let go = |feedback: u32| {
+            let rest = ["goal", "cancel", "result"].map(|t| format!("/a>/go/{t}@0"));
+            format!(
+                "/a>/go/status@10 /a>/go/feedback@{feedback} {}",
+                rest.join(" ")
+            )
+        };
+        let windows = [go(10), go(14), go(40)];
+        let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
+        let got = seen(&windows, &ViewOptions::default());
+        assert_eq!(got[1], "/a /go/action_topics /a>/go/action_topics");
+        assert_eq!(got[2], "/a ^/go/action_topics ^/a>/go/action_topics");
+        let (view, _) = view(&evolution(&windows), &ViewOptions::default());
+        assert_eq!(view.frames[2].caption, ["go action 24 → 50 Hz"]);
+    }
+
+    #[test]
     fn nodes_only_draws_an_arrow_per_topic() {
         let options = ViewOptions {
             mode: Mode::Nodes,
             ..ViewOptions::default()
         };
         let windows = [
-            "/a>/t@1 /b</t /a>/u /b</u /c>/u",
-            "/a>/t@3 /b</t /c>/u /b</u",
+            "/a>/t@10 /b</t /a>/u /b</u /c>/u",
+            "/a>/t@30 /b</t /c>/u /b</u",
         ];
         let want = ["/a /b /c /a>/b /a>/b /c>/b", "-/a /b"];
         let got = seen(&windows, &options);

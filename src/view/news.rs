@@ -2,9 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Mark;
 use super::cast::{Cast, Place};
-use super::present::is_single;
+use super::{ItemKind, Mark, hertz};
 use crate::diff::Change;
 use crate::graph::{Element, Elements, Graph, TopicId};
 
@@ -32,7 +31,7 @@ impl News {
                     what,
                     from_hz,
                     to_hz,
-                } => {
+                } if hertz(*from_hz) != hertz(*to_hz) => {
                     let faster = to_hz > from_hz;
                     let mark = if faster { Mark::Faster } else { Mark::Slower };
                     news.add(cast, *what, mark, Some(*from_hz));
@@ -44,6 +43,8 @@ impl News {
                         news.add_carriers(cast, *what, mark, *from_hz);
                     }
                 }
+                // What reads the same is no change to a reader.
+                Change::Rate { .. } => {}
                 Change::HandedOver { topic, .. } => {
                     news.add(cast, Element::Topic(*topic), Mark::HandedOver, None);
                 }
@@ -76,18 +77,17 @@ impl News {
         from_hz: Option<f64>,
     ) {
         if let Some(Some(id)) = item {
-            let single = is_single(cast, *id);
-            keep(&mut self.items, *id, single, mark, from_hz);
+            let reach = Reach::of_item(cast, *id);
+            keep(&mut self.items, *id, reach, mark, from_hz);
         }
     }
 
     fn add_edge(&mut self, cast: &Cast, place: Option<Place>, mark: Mark, from_hz: Option<f64>) {
         match place {
-            Some(Place::Inside(item)) => keep(&mut self.items, item, false, mark, None),
+            Some(Place::Inside(item)) => keep(&mut self.items, item, Reach::Inside, mark, None),
             Some(Place::Arrow(id)) => {
-                let arrow = cast.arrows.get(id as usize);
-                let single = arrow.is_some_and(|a| a.members.len() == 1);
-                keep(&mut self.arrows, id, single, mark, from_hz);
+                let reach = Reach::of_arrow(cast, id);
+                keep(&mut self.arrows, id, reach, mark, from_hz);
             }
             Some(Place::Hidden) | None => {}
         }
@@ -96,12 +96,8 @@ impl News {
     /// A change of rate shows on the arrows from the publisher too.
     fn add_carriers(&mut self, cast: &Cast, what: Element, mark: Mark, from_hz: f64) {
         for id in cast.carriers.get(&what).into_iter().flatten() {
-            let arrow = cast.arrows.get(*id as usize);
-            let single = match cast.pairs.get(*id as usize) {
-                Some(pairs) => pairs.len() == 1,
-                None => arrow.is_some_and(|a| a.members.len() == 1),
-            };
-            keep(&mut self.arrows, *id, single, mark, Some(from_hz));
+            let reach = Reach::of_arrow(cast, *id);
+            keep(&mut self.arrows, *id, reach, mark, Some(from_hz));
         }
     }
 }
@@ -120,12 +116,40 @@ pub(super) fn alone(graph: &Graph, elements: &Elements) -> BTreeSet<TopicId> {
     once
 }
 
-/// Notes a change; of several on the same thing the more telling one stays. What stands for several elements is marked
-/// as changed inside, and a single one that came or went is told by its presence.
-fn keep(all: &mut BTreeMap<u32, Told>, id: u32, single: bool, mark: Mark, from_hz: Option<f64>) {
-    let new = match mark {
-        Mark::Added | Mark::Removed if single => return,
-        _ if single => (mark, from_hz),
+/// How what a change happened to relates to its box or arrow.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reach {
+    /// It is all there is in it.
+    Whole,
+    /// One of several that are drawn as one, with their rates summed.
+    Part,
+    /// Somewhere inside a collapsed namespace.
+    Inside,
+}
+
+impl Reach {
+    fn of_item(cast: &Cast, id: u32) -> Self {
+        match cast.items.get(id as usize) {
+            Some(item) if item.kind == ItemKind::Namespace => Self::Inside,
+            Some(item) if item.members.len() > 1 => Self::Part,
+            _ => Self::Whole,
+        }
+    }
+
+    fn of_arrow(cast: &Cast, id: u32) -> Self {
+        let members = cast.arrows.get(id as usize).map_or(0, |a| a.members.len());
+        let joined = cast.pairs.get(id as usize).map_or(members, Vec::len);
+        if joined > 1 { Self::Part } else { Self::Whole }
+    }
+}
+
+/// Notes a change; of several on the same thing the more telling one stays. A single thing that came or went is told
+/// by its presence; whether the summed rate of several changed is decided where it is known.
+fn keep(all: &mut BTreeMap<u32, Told>, id: u32, reach: Reach, mark: Mark, from_hz: Option<f64>) {
+    let new = match (reach, mark) {
+        (Reach::Whole, Mark::Added | Mark::Removed) => return,
+        (Reach::Whole, _) => (mark, from_hz),
+        (Reach::Part, Mark::Faster | Mark::Slower) => (mark, None),
         _ => (Mark::Inside, None),
     };
     let old = all.entry(id).or_insert(new);
@@ -138,7 +162,7 @@ fn weight(mark: Mark) -> u8 {
     match mark {
         Mark::HandedOver | Mark::Restarted => 3,
         Mark::Changed => 2,
-        Mark::Faster | Mark::Slower => 1,
-        Mark::Inside | Mark::Added | Mark::Removed => 0,
+        Mark::Inside => 1,
+        Mark::Faster | Mark::Slower | Mark::Added | Mark::Removed => 0,
     }
 }
