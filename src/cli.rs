@@ -86,6 +86,7 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
         skip_unchanged: time.skip_unchanged,
         collect: collect::Options {
             sizes: graph.bytes,
+            infer_stamps: graph.infer.is_some(),
             ..collect::Options::default()
         },
         graph: graph::Options {

@@ -8,7 +8,7 @@ use belief::believed;
 
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::error::{Error, Result};
-use crate::evidence::{self, Heard, Piece, Read, SOURCES};
+use crate::evidence::{self, Heard, Piece, Read, SOURCES, equal_stamps};
 use crate::facts::{Facts, SourceId};
 use crate::notice::{Notice, NoticeKind, Notices};
 use crate::proof::{Stream, Trust};
@@ -24,6 +24,8 @@ pub struct Options {
     pub sizes: bool,
     /// Keep every piece of evidence on the elements with all of these names (one: a node or topic; two: an edge).
     pub why: Vec<String>,
+    /// Infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
+    pub infer_stamps: bool,
 }
 
 /// Takes in bags, one after another.
@@ -33,6 +35,8 @@ pub struct Collector {
     streams: Vec<Stream>,
     /// Who reads the messages of each stream.
     readers: Vec<Vec<(SourceId, Read)>>,
+    /// Whether the header stamps of each stream are wanted.
+    stamped: Vec<bool>,
     messages: Stamps,
     facts: Facts,
     notices: Notices,
@@ -80,6 +84,16 @@ impl Collector {
     /// Lets the sources that know its layout read a message.
     fn read(&mut self, place: usize, message: &Message<'_>) {
         let stream = &self.streams[place];
+        if self.stamped[place] {
+            let mut heard = Heard {
+                facts: &mut self.facts,
+                stream,
+                place,
+                source: 0,
+                time: Some(message.time),
+            };
+            equal_stamps::hear(&mut heard, message.data);
+        }
         for (source, read) in &self.readers[place] {
             let mut heard = Heard {
                 facts: &mut self.facts,
@@ -181,14 +195,17 @@ impl Sink for BagSink<'_> {
             all.notices
                 .add(undecodable(&stream, "its definition is not the known one"));
         }
-        let want = match (readers.is_empty(), all.options.sizes) {
-            (false, _) => Want::Payload,
-            (true, true) => Want::Sizes,
-            (true, false) => Want::Stamps,
+        let stamped = all.options.infer_stamps && equal_stamps::is_stamped(connection);
+        let want = match (readers.is_empty(), stamped, all.options.sizes) {
+            (false, ..) => Want::Payload,
+            (true, true, _) => Want::Head(equal_stamps::HEAD),
+            (true, false, true) => Want::Sizes,
+            (true, false, false) => Want::Stamps,
         };
         self.streams.push(all.streams.len());
         all.streams.push(stream);
         all.readers.push(readers);
+        all.stamped.push(stamped);
         all.announced();
         want
     }
@@ -235,6 +252,7 @@ impl Collected {
     pub fn why(&self) -> Vec<Piece> {
         let mut pieces = self.facts.pieces.clone();
         pieces.sort_unstable();
+        pieces.dedup();
         pieces
     }
 

@@ -9,6 +9,7 @@ mod connection;
 mod diagnostics;
 mod discovery;
 mod dynamic_reconfigure;
+pub(crate) mod equal_stamps;
 mod lifecycle;
 mod links;
 mod metrics;
@@ -177,6 +178,12 @@ pub const SOURCES: &[Source] = &[
         word: "only_publisher",
         about: "messages that name no publisher, of topics that one node is known to publish",
         conclude: &[only_publisher::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "equal_stamps",
+        about: "header stamps passed on from input to output (with `--infer stamps`)",
+        conclude: &[equal_stamps::conclude],
         ..NOTHING
     },
     Source {

@@ -168,6 +168,8 @@ pub(crate) struct Facts {
     pub(crate) pieces: Vec<Piece>,
     /// The sequence numbers of streams, by the streams' places; kept as if they were sizes.
     pub(crate) sequences: BTreeMap<usize, SeriesId>,
+    /// The header stamps of streams, by the streams' places; log times are kept as if they were sizes.
+    pub(crate) headers: BTreeMap<usize, SeriesId>,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
     places: HashMap<(Claim, SourceId, Option<Name>), usize>,
@@ -214,19 +216,23 @@ impl Facts {
         time: Option<Stamp>,
         words: impl FnOnce() -> String,
     ) {
-        if self.watched.is_empty() || self.pieces.len() >= MOST {
-            return;
+        if self.is_watched(said.claim.names()) && self.pieces.len() < MOST {
+            let text = words();
+            if !text.is_empty() {
+                self.pieces.push(Piece {
+                    time,
+                    source,
+                    degree: said.degree,
+                    text,
+                });
+            }
         }
-        let names = said.claim.names();
+    }
+
+    /// Whether somebody asked about something with these names.
+    pub(crate) fn is_watched(&self, names: [Option<Name>; 2]) -> bool {
         let about = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
-        if self.watched.iter().all(about) {
-            self.pieces.push(Piece {
-                time,
-                source,
-                degree: said.degree,
-                text: words(),
-            });
-        }
+        !self.watched.is_empty() && self.watched.iter().all(about)
     }
 
     /// Takes in a sequence number of the stream at `place`.
@@ -237,6 +243,13 @@ impl Facts {
             .entry(place)
             .or_insert_with(|| times.series());
         self.times.add(id, &[time], Some(&[number]));
+    }
+
+    /// Takes in a header stamp of the stream at `place`.
+    pub(crate) fn header(&mut self, place: usize, stamp: Stamp, log_time: u32) {
+        let times = &mut self.times;
+        let id = *self.headers.entry(place).or_insert_with(|| times.series());
+        self.times.add(id, &[stamp], Some(&[log_time]));
     }
 
     /// Takes in that `source` claims something, at `time` if it is a matter of time.

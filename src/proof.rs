@@ -51,6 +51,14 @@ pub(crate) enum What {
 }
 
 impl What {
+    /// The names in it.
+    pub(crate) fn names(self) -> [Option<Name>; 2] {
+        match self {
+            Self::Node(a) | Self::Topic(a) => [Some(a), None],
+            Self::Publish(a, b) | Self::Subscribe(a, b) => [Some(a), Some(b)],
+        }
+    }
+
     /// The same element with its node under another name.
     pub(crate) fn with_node(self, to: &mut impl FnMut(Name) -> Name) -> Self {
         match self {

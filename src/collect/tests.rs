@@ -441,3 +441,73 @@ fn every_layout_survives_any_cut() {
         assert!(collector.facts.list.is_empty(), "{len}");
     }
 }
+
+/// A collector with a camera, a detector that passes its stamps on, and a lidar that does not.
+fn flow() -> Collector {
+    let mut collector = Collector::new(Options {
+        infer_stamps: true,
+        why: vec!["/detector".into(), "/image".into()],
+        ..Options::default()
+    });
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    let talks = [
+        ("/image", "/camera", 0),
+        ("/boxes", "/detector", 30),
+        ("/scan", "/lidar", 40),
+    ];
+    for (id, (topic, node, _)) in (0..).zip(talks) {
+        let want = bag.connection(&Connection {
+            id: ConnectionId(id),
+            topic: topic.into(),
+            type_name: "sensor_msgs/Image".into(),
+            definition: None,
+            type_hash: None,
+            publisher: Some(node.into()),
+            latching: false,
+            qos: None,
+            encoding: Encoding::Ros1,
+        });
+        assert_eq!(want, Want::Head(equal_stamps::HEAD));
+    }
+    for n in 0..20_u32 {
+        for (id, (_, node, delay_ms)) in (0..).zip(talks) {
+            let own = u32::from(node == "/lidar");
+            let head = Payload::ros1().u32(n).u32(100 + n).u32(own).u32(0);
+            let time = Stamp::from_ros(100 + n, delay_ms * 1_000_000);
+            bag.stamps(ConnectionId(id), &[time], None);
+            bag.message(Message {
+                connection: ConnectionId(id),
+                time,
+                data: &head.bytes,
+                size: 99,
+            });
+        }
+    }
+    collector
+}
+
+#[test]
+fn a_node_that_passes_stamps_on_subscribes_their_source() {
+    let mut collected = flow().finish().unwrap();
+    let span = collected.span.unwrap();
+    let options = crate::graph::Options::default();
+    let built = crate::graph::build(&mut collected, &[span], &options).unwrap();
+    let all = &built.elements;
+    let inferred = all
+        .subscribes
+        .iter()
+        .filter(|e| e.evidence.words().any(|w| w == "equal_stamps"));
+    let names = inferred.map(|e| {
+        let (topic, node) = (&all.topics[e.topic as usize], &all.nodes[e.node as usize]);
+        format!("{} {}", topic.name, node.name)
+    });
+    assert_eq!(names.collect::<Vec<_>>(), ["/image /detector"]);
+    let texts: Vec<_> = collected
+        .why()
+        .into_iter()
+        .map(|piece| piece.text)
+        .collect();
+    let text = "20 of 20 messages of /boxes carry the stamp of a message of /image just before";
+    assert!(texts.iter().any(|t| t == text), "{texts:?}");
+}

@@ -7,9 +7,10 @@ use super::build::Options;
 use super::roles::role;
 use super::values::Values;
 use crate::collect::Collected;
-use crate::evidence::{Degree, SOURCES};
+use crate::evidence::{Degree, Piece, SOURCES};
 use crate::facts::Name;
 use crate::proof::{Known, Proof, What, When};
+use crate::stamps::Stamps;
 use crate::time::Stamp;
 use crate::topology::{Element, Entry};
 
@@ -30,6 +31,7 @@ pub(super) fn prove(
     for entry in &options.topology.entries {
         told(&mut known, entry, (start, end));
     }
+    explain(&mut known, &collected.messages);
     if let Some(error) = known.failed {
         return Err(error);
     }
@@ -53,6 +55,57 @@ pub(super) fn prove(
     }
     let values = Values::new(&mut collected.facts, role)?;
     Ok((proofs, values))
+}
+
+/// Puts into words what rests on no single message, for elements that somebody asked about.
+fn explain(known: &mut Known<'_>, messages: &Stamps) {
+    let name = |name: Name| known.facts.text(name);
+    let told = |what| match what {
+        What::Node(node) => format!("{} lives", name(node)),
+        What::Topic(topic) => format!("{} exists", name(topic)),
+        What::Publish(node, topic) => format!("{} publishes {}", name(node), name(topic)),
+        What::Subscribe(topic, node) => format!("{} subscribes {}", name(node), name(topic)),
+    };
+    let mut pieces = Vec::new();
+    for proof in &known.proofs {
+        let (Some(source), true) = (
+            SOURCES.get(proof.source),
+            known.facts.is_watched(proof.what.names()),
+        ) else {
+            continue;
+        };
+        let (time, text) = match &proof.when {
+            When::Messages(at) | When::First(at) => {
+                let times = known.streams[*at].times;
+                let first = messages.bounds(times).map(|(first, _)| first);
+                (
+                    first,
+                    format!(
+                        "{}: {} messages from here on",
+                        told(proof.what),
+                        messages.count(times)
+                    ),
+                )
+            }
+            When::Like(other) => {
+                let text = format!(
+                    "{}: as long as {} ({})",
+                    told(proof.what),
+                    told(*other),
+                    source.about
+                );
+                (None, text)
+            }
+            When::Signs { .. } | When::Whole => continue,
+        };
+        pieces.push(Piece {
+            time,
+            source: source.word,
+            degree: proof.degree,
+            text,
+        });
+    }
+    known.facts.pieces.extend(pieces);
 }
 
 /// Adds what the user's file says to what is known.
@@ -79,6 +132,14 @@ fn told(known: &mut Known<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
         ("topology", Degree::Stated)
     };
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
+    if known.facts.is_watched(what.names()) {
+        known.facts.pieces.push(Piece {
+            time: None,
+            source: word,
+            degree,
+            text: entry.place.clone(),
+        });
+    }
     known.prove(Proof {
         what,
         source,
