@@ -210,6 +210,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             is_sized: args.look.size.is_some(),
             is_fitted: args.look.fit == "auto",
             engine: crate::layout::engine(&args.look.layout)?,
+            kept: look::kept(args.look.layout_from.as_deref())?,
         },
         sequence: crate::film::Options {
             append_to: summary(),

@@ -239,8 +239,8 @@ impl Plan {
 }
 
 impl Layout {
-    /// Nothing at all.
-    fn empty() -> Self {
+    /// The layout of nothing at all.
+    pub fn empty() -> Self {
         Self {
             orientation: Orientation::LeftRight,
             size: Size::default(),

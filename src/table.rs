@@ -3,7 +3,7 @@
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
 /// A table as text: the names of the columns, then a row a line.
-pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = WriterBuilder::new()
         .terminator(Terminator::Any(b'\n'))
         .from_writer(Vec::new());

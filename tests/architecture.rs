@@ -11,41 +11,49 @@ const LAYERS: &[&str] = &[
     "geometry",
     "error",
     "notice",
-    "hash",
-    "wire",
     "yaml",
+    "table",
     "decompress",
     "source",
     "bag",
+    "wire",
     "stamps",
+    "value",
+    "definition",
+    "facts",
+    "proof",
+    "trust",
     "evidence",
+    "collect",
     "window",
     "graph",
     "topology",
     "diff",
     "evolution",
     "events",
+    "info",
     "view",
     "text",
     "layout",
     "style",
-    "dot",
-    "mermaid",
     "scene",
     "svg",
     "pixels",
     "picture",
     "palette",
+    "strip",
     "output",
     "spells",
+    "hash",
     "stage",
-    "page",
     "film",
+    "dot",
+    "mermaid",
     "report",
+    "page",
     "encode",
     "reel",
     "pipeline",
-    "info",
     "terminal",
     "cli",
     "main",
@@ -53,26 +61,27 @@ const LAYERS: &[&str] = &[
 ];
 
 /// Folders whose files do not know each other.
-const SIBLINGS: &[&str] = &["bag", "evidence", "encode", "layout"];
+const SIBLINGS: &[&str] = &["bag", "evidence", "encode"];
 
 /// Where a dependency may be named. What is not listed here may stand in one file only.
 const EXCEPTIONS: &[(&str, &[&str])] = &[
     // Its derives stand on the types that they describe.
-    ("serde", &[
-            "evolution/read.rs",
-            "evolution/write.rs",
-            "spells.rs",
-            "page/data.rs",
-        ]),
+    ("serde", &[]),
+    // The evolution, the summary and the page are JSON; YAML becomes its values.
     (
         "serde_json",
         &[
+            "evidence/qos.rs",
+            "evolution/lines.rs",
             "evolution/read.rs",
             "evolution/write.rs",
-            "evolution/lines.rs",
+            "info.rs",
             "page/data.rs",
+            "yaml.rs",
         ],
     ),
+    // Temporary files: of outputs, of decompressed bags, of stamps beyond what memory may hold.
+    ("tempfile", &["output/sink.rs", "source.rs", "stamps.rs"]),
     // Plain functions on numbers, as the standard library's would be.
     ("libm", &[]),
 ];
@@ -100,10 +109,15 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
         let path = entry.unwrap().path();
         if path.is_dir() {
             walk(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
+        } else if path.extension().is_some_and(|e| e == "rs") && !is_test(&path) {
             found.push(path);
         }
     }
+}
+
+fn is_test(path: &Path) -> bool {
+    path.file_stem()
+        .is_some_and(|stem| stem == "tests" || stem == "testing")
 }
 
 fn file(src: &Path, path: &Path) -> File {
@@ -251,7 +265,7 @@ fn files_are_rooms_not_halls() {
     let long: Vec<_> = files()
         .into_iter()
         .map(|f| (f.code.lines().count(), f.path))
-        .filter(|(lines, _)| *lines > 450)
+        .filter(|(lines, _)| *lines > 500)
         .collect();
     assert!(long.is_empty(), "{long:#?}");
 }

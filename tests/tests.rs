@@ -8,7 +8,9 @@
     reason = "tests say what went wrong by panicking"
 )]
 
+mod architecture;
 mod cli;
+mod docs;
 mod encode;
 mod layout;
 mod pages;

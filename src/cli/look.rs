@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::typed::{LookArgs, SequenceArgs, ViewArgs};
 use crate::dot::Profile;
 use crate::error::{Error, Result};
+use crate::evolution::{Places, read_json};
 use crate::film;
 use crate::geometry::Size;
 use crate::layout::Orientation;
@@ -113,4 +114,17 @@ fn link(text: &str) -> Result<(String, String)> {
         )
     })?;
     Ok((name.to_owned(), url.to_owned()))
+}
+
+/// The places of an earlier run's JSON.
+pub(super) fn kept(file: Option<&Path>) -> Result<Option<Places>> {
+    let Some(path) = file else { return Ok(None) };
+    let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let places = read_json(&text, path)?.layout;
+    places.map(Some).ok_or_else(|| Error::BadFile {
+        path: path.to_owned(),
+        line: 0,
+        reason: "it holds no layout".to_owned(),
+        hint: "write it beside a picture: `bagreel render BAG -o x.gif -o x.json`".to_owned(),
+    })
 }

@@ -18,7 +18,7 @@ use crate::wire::Cursor;
 /// # Errors
 /// [`Error::BadFile`] with the line for a line that is no caption; [`Error::Usage`] if there is neither such a file nor
 /// such a topic.
-pub fn phases(evolution: &Evolution, inputs: &[Input], from: &str) -> Result<Vec<String>> {
+pub(super) fn phases(evolution: &Evolution, inputs: &[Input], from: &str) -> Result<Vec<String>> {
     let path = Path::new(from);
     let captions = if path.is_file() {
         from_file(

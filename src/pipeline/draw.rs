@@ -1,11 +1,12 @@
 //! From the evolution to the picture: choose what is shown, and make it readable on its page.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Stage, Watch};
 use crate::evolution::{Evolution, Place, Places};
-use crate::geometry::Size;
-use crate::layout::{Engine, Layout, lay_out};
+use crate::geometry::{Rect, Size};
+use crate::layout::{Engine, Layout, extend, lay_out};
 use crate::notice::{Notice, NoticeKind, Notices};
 use crate::picture::{self, Sketch, Wish};
 use crate::style::Style;
@@ -29,6 +30,8 @@ pub struct Drawing {
     pub is_fitted: bool,
     /// What lays out.
     pub engine: &'static (dyn Engine + Sync),
+    /// Places of an earlier drawing, which are kept; what is new finds room beside them.
+    pub kept: Option<Places>,
 }
 
 /// The smallest text that `--fit auto` accepts, in pixels.
@@ -77,6 +80,17 @@ pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn 
     }
 }
 
+/// What is shown where nothing is drawn: everything asked for, without places.
+pub(super) fn unplaced(evolution: &Evolution, drawing: &Drawing) -> Composed {
+    Composed {
+        view: view(evolution, &drawing.view).0,
+        options: drawing.view.clone(),
+        wish: drawing.wish.clone(),
+        layout: Layout::empty(),
+        notices: Notices::new(),
+    }
+}
+
 /// A layout of what some options show.
 struct Attempt {
     layout: Layout,
@@ -89,7 +103,11 @@ impl Attempt {
         // The widest labels depend on rates, so that the windows are needed too.
         let (view, _) = view(evolution, options);
         let sketch = Sketch::new(&view, &drawing.style, &drawing.fonts, wish.clone());
-        let layout = lay_out(sketch.plan(), &sketch.layout_wish(), drawing.engine);
+        let (plan, page) = (sketch.plan(), sketch.layout_wish());
+        let layout = match &drawing.kept {
+            None => lay_out(plan, &page, drawing.engine),
+            Some(kept) => extend(plan, &page, drawing.engine, &known(&view, kept)),
+        };
         let text = sketch.text_px(&layout);
         Self { layout, text }
     }
@@ -174,6 +192,19 @@ fn told(collapsed: &[Arc<str>], asked: &Wish, got: &Wish) -> Vec<Notice> {
         notices.push(Notice::new(NoticeKind::Hidden, text));
     }
     notices
+}
+
+/// Where an earlier drawing had each item; `None` for those that are new.
+fn known(view: &View, kept: &Places) -> Vec<Option<Rect>> {
+    let places: BTreeMap<(&str, &str), Rect> = kept
+        .boxes
+        .iter()
+        .map(|b| ((b.what.as_str(), b.name.as_str()), b.rect))
+        .collect();
+    view.items
+        .iter()
+        .map(|item| places.get(&(item.kind.word(), &*item.name)).copied())
+        .collect()
 }
 
 /// The places of a layout, for the JSON.

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::draw::{Composed, compose, places};
+use super::draw::{Composed, compose, places, unplaced};
 use super::{Drawing, Reading, Stage, Watch, captions, read};
 use crate::bag::Input;
 use crate::encode::{self, Output, Written};
@@ -74,18 +74,24 @@ pub fn show(job: &Render, mut evolution: Evolution, watch: &mut dyn Watch) -> Re
     if let Some(from) = &job.captions {
         drawing.wish.phases = captions::phases(&evolution, &job.reading.inputs, from)?;
     }
-    // What is not drawn need not be made to fit a page.
-    drawing.is_fitted &= job.outputs.iter().any(|o| o.format.is_drawn());
+    // What is not drawn needs no places.
+    let is_drawn = job.outputs.iter().any(|o| o.format.is_drawn());
     let Composed {
         view,
         options,
         wish,
         layout,
         notices,
-    } = compose(&evolution, &drawing, watch);
+    } = if is_drawn {
+        compose(&evolution, &drawing, watch)
+    } else {
+        unplaced(&evolution, &drawing)
+    };
     evolution.notices.extend(notices.iter());
-    evolution.layout = Some(places(&view, &layout));
-    let picture = Sketch::new(&view, &drawing.style, &drawing.fonts, wish).with(layout);
+    evolution.layout = is_drawn.then(|| places(&view, &layout));
+    let nothing = View::default();
+    let drawn = if is_drawn { &view } else { &nothing };
+    let picture = Sketch::new(drawn, &drawing.style, &drawing.fonts, wish).with(layout);
     let strip = side_by_side(job, &evolution, &view, &picture)?;
     for remark in strip.iter().flat_map(|s| &s.remarks) {
         let notice = Notice::new(NoticeKind::Note, remark.clone());
