@@ -80,8 +80,8 @@ fn every_command_of_the_readme_runs() {
             .map(|word| word.trim_matches('\''));
         let words = words.map(|word| match word {
             "run7.bag" => root.join("examples/warehouse.bag").display().to_string(),
-            "run7/" => root.join("examples/patrol").display().to_string(),
-            "run7.mcap" => root.join("examples/patrol.mcap").display().to_string(),
+            "run7/" => root.join("examples/courier").display().to_string(),
+            "run7.mcap" => root.join("examples/courier.mcap").display().to_string(),
             "bags/" => root.join("examples").display().to_string(),
             "/planner" => "/robot1/planner".to_owned(),
             "/plan" => "/robot1/plan".to_owned(),
