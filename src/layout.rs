@@ -3,6 +3,7 @@
 //! An engine sees sizes and connections only, never colours, rates or changes.
 
 mod acyclic;
+mod crude;
 mod cut;
 mod detour;
 mod fold;
@@ -142,6 +143,9 @@ pub trait Engine {
     fn lay_out(&self, plan: &Plan, wish: &Wish) -> Result<Layout>;
 }
 
+/// Clusters are nested at most this deep; what is deeper is drawn in its ancestor.
+const DEEPEST: usize = 16;
+
 /// Every engine: its word on the command line, and itself. The first is the default.
 pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[
     ("layered", &layered::Layered),
@@ -210,6 +214,7 @@ impl Plan {
             cluster.title = sane_size(cluster.title);
             cluster.parent = cluster.parent.filter(|parent| *parent < at);
         }
+        plan.flatten();
         let clusters = plan.clusters.len();
         for vertex in &mut plan.vertices {
             vertex.size = sane_size(vertex.size);
@@ -219,6 +224,25 @@ impl Plan {
             link.label = link.label.map(sane_size);
         }
         plan
+    }
+
+    /// Makes the members of clusters nested deeper than [`DEEPEST`] members of the last cluster that is not.
+    fn flatten(&mut self) {
+        let mut depth = vec![0_usize; self.clusters.len()];
+        let mut stand_in: Vec<usize> = (0..self.clusters.len()).collect();
+        for at in 0..self.clusters.len() {
+            if let Some(parent) = self.clusters[at].parent {
+                depth[at] = depth[parent] + 1;
+                if depth[at] > DEEPEST {
+                    stand_in[at] = stand_in[parent];
+                }
+            }
+        }
+        for vertex in &mut self.vertices {
+            vertex.cluster = vertex
+                .cluster
+                .map(|c| stand_in.get(c).copied().unwrap_or(c));
+        }
     }
 
     /// This plan as if no cluster were there.

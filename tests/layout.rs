@@ -170,6 +170,38 @@ fn is_at(plan: &Plan, layout: &Layout, v: usize, p: Point) -> bool {
 }
 
 #[test]
+fn a_graph_too_large_for_layers_is_laid_out_all_the_same() {
+    // A chain with every tenth vertex linked back to its start, in namespaces nested ever deeper.
+    let n = 2000;
+    let vertex = |v| Vertex {
+        size: Size::new(60.0, 20.0),
+        outline: Outline::Box,
+        cluster: Some(v / 4),
+    };
+    let link = |from, to| Link {
+        from,
+        to,
+        label: None,
+    };
+    let plan = Plan {
+        vertices: (0..n).map(vertex).collect(),
+        links: (1..n)
+            .map(|v| link(v - 1, v))
+            .chain((1..n).step_by(10).map(|v| link(0, v)))
+            .collect(),
+        clusters: (0..n / 4)
+            .map(|c: usize| Cluster {
+                parent: c.checked_sub(1),
+                title: Size::new(40.0, 14.0),
+            })
+            .collect(),
+    };
+    let layout = laid_out(&plan, None);
+    assert_eq!(layout.remarks.len(), 1, "{:?}", layout.remarks);
+    assert_eq!(measure::measure(&plan, &layout).overlaps, 0);
+}
+
+#[test]
 fn nothing_needs_no_room() {
     for (word, _) in layout::ENGINES {
         let layout = layout::lay_out(&Plan::default(), &wish(None), layout::engine(word).unwrap());

@@ -39,6 +39,21 @@ pub(super) fn cut(part: &Part, rank: &[usize], lane: Lane) -> Layers {
     layers
 }
 
+/// How many items the layers would have.
+pub(super) fn items(part: &Part, rank: &[usize]) -> usize {
+    let bends = part
+        .ends
+        .iter()
+        .map(|&(from, to)| rank[from].abs_diff(rank[to]).saturating_sub(1))
+        .sum::<usize>();
+    let borders = spans(part, rank)
+        .iter()
+        .skip(1)
+        .map(|(low, high)| 2 * (high - low + 1))
+        .sum::<usize>();
+    part.vertices.len() + bends + borders
+}
+
 /// The first and last rank in each cluster.
 fn spans(part: &Part, rank: &[usize]) -> Vec<(usize, usize)> {
     let mut span = vec![(usize::MAX, 0); part.parent.len()];

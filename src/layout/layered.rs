@@ -5,9 +5,9 @@
 use std::collections::BTreeSet;
 
 use super::{Engine, Layers, Layout, Orientation, Part, Plan, Route, Rows, Wish};
-use super::{acyclic, fold, labels, order, pack, parts, place, rank, route};
+use super::{acyclic, crude, fold, labels, order, pack, parts, place, rank, route};
 use super::{
-    cut::{Lane, cut},
+    cut::{Lane, cut, items},
     room::{Room, turned},
 };
 use crate::error::Result;
@@ -17,6 +17,8 @@ use crate::geometry::{Point, Rect, Size};
 const PART_GAP: f64 = 20.0;
 /// A part with more edges is cut in one way only: the one that keeps it small.
 const MANY: usize = 300;
+/// Layers with more items than this are not laid out.
+const MOST: usize = 150_000;
 /// How many edges the search for good orders may sweep, over all parts.
 const EFFORT: usize = 120_000;
 
@@ -37,6 +39,11 @@ pub(super) fn lay_out(plan: &Plan, wish: &Wish) -> Layout {
         .iter()
         .map(|part| drafts(plan, part, aspect))
         .collect();
+    if drafts.iter().any(Vec::is_empty) {
+        let mut layout = crude::lay_out(plan, wish);
+        labels::place(plan, &mut layout);
+        return layout;
+    }
     let both = [Orientation::LeftRight, Orientation::TopBottom];
     let wished = both
         .into_iter()
@@ -83,9 +90,10 @@ struct Draft {
     crossings: u64,
 }
 
-/// The drafts of a part: every way of ranking, with long edges led outside and inside of clusters.
+/// The drafts of a part, none if it is too large: every way of ranking, with long edges led outside and inside of clusters.
 fn drafts(plan: &Plan, part: &Part, aspect: f64) -> Vec<Draft> {
-    let ways = rankings(part, aspect);
+    let mut ways = rankings(part, aspect);
+    ways.retain(|rank| items(part, rank) <= MOST);
     let mut lanes = vec![Lane::Inside];
     if part.ends.len() <= MANY && !part.clusters.is_empty() {
         lanes.push(Lane::Outside);
