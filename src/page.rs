@@ -42,7 +42,7 @@ pub struct Page<'a> {
 impl Page<'_> {
     /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
     pub fn write(&self) -> String {
-        let spells = Spells::of(self.view, crate::view::hertz);
+        let spells = Spells::of(self.view, |hz| crate::view::hertz(hz) + " Hz");
         let still = busiest(self.view);
         let fonts = fonts();
         let look = self.look(&spells);
@@ -183,14 +183,9 @@ impl Dress for Still<'_> {
     }
 
     fn text(&self) -> String {
-        let label = |list| self.spells.labels[at(list, self.window) as usize].clone();
-        if !self.life.lifecycles.is_empty() {
-            return label(&self.life.lifecycles);
-        }
-        match label(&self.life.rates) {
-            hz if hz.is_empty() => hz,
-            hz => hz + " Hz",
-        }
+        let lists = [&self.life.lifecycles, &self.life.rates];
+        let list = lists[usize::from(lists[0].is_empty())];
+        self.spells.labels[at(list, self.window) as usize].clone()
     }
 }
 

@@ -34,7 +34,7 @@ pub struct Life {
 pub struct Spells {
     /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`: not there.
     pub classes: Vec<String>,
-    /// Rates in hertz and lifecycle states as they are written; the first is empty: not known.
+    /// Rates and lifecycle states as they are written; the first is empty: not known.
     pub labels: Vec<String>,
     /// A life per item of the view.
     pub items: Vec<Life>,

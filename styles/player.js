@@ -8,33 +8,32 @@ const N = names.length, W = starts.length, last = W - 1, svg = $.graph, stage = 
 const name = names.concat(arrows.map(ends => ends.map(i => names[i]).join(' → '))), about = facts.map(list => list.map(f => words[f]).join('\n'));
 const ends = i => i < N ? arrows.flatMap((a, k) => a.includes(i) ? N + k : []) : arrows[i - N];
 
-// Spells: windows since the last one, value, …
+// Spells: windows since the last, value, …
 for (const list of lives.flat()) for (let i = 2; i < list.length; i += 2) list[i] += list[i - 2];
 const at = (list, w, lo = 0, hi = list.length) => {
 	while (lo < hi) { const mid = (lo + hi >> 2) * 2; list[mid] <= w ? lo = mid + 2 : hi = mid; }
 	return lo && list[lo - 1];
 };
-const hz = (i, w) => labels[at(lives[i][1], w)].replace(/.$/, '$& Hz');
-const KINDS = ['added', 'removed', 'changed'], mark = classes.map(c => KINDS.findIndex(k => c.includes(k)));
+const KINDS = ['added', 'removed', 'changed'], mark = classes.map(c => KINDS.findIndex(k => c.includes(k))), turns = classes.map(c => /ster|wer/.test(c));
 const counts = KINDS.map(() => starts.map(() => 0)), each = f => KINDS.map((k, m) => f(k, counts[m], m)).join('');
 for (const [list] of lives) list.forEach((k, i) => i % 2 && mark[k] >= 0 && counts[mark[k]][list[i - 1]]++);
 const iso = (s, from, to) => new Date(s * 1e3).toISOString().slice(from, to), clock = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
-const list = (id, all) => $[id].replaceChildren(...all.slice(0, 99).map(i => Object.assign(document.createElement('button'), { textContent: name[i], className: classes[cur[i]], onclick: () => pick(i, 1) })));
+const list = (id, all) => $[id].replaceChildren(...all.slice(0, 50).map(i => Object.assign(document.createElement('button'), { textContent: name[i], className: classes[cur[i]], onclick: () => pick(i, 1) })));
 
 // A window.
-let now = 0, sel = -1, near = new Set(), timer = 0, hits = [], news = [];
-const cur = els.map(() => -1), base = els.map(e => e.classList[0] + ' ');
+let now = 0, sel = -1, near = new Set(), timer = 0, later, hits = [], news = [];
+const cur = els.map(() => -1), base = els.map(e => e.classList[0] + ' '), live = els.map(e => e.querySelector('.r'));
 const dress = i => els[i]?.setAttribute('class', base[i] + classes[cur[i]] + (near.has(i) ? ' near' : ''));
 function seek(w, quiet) {
 	w = Math.max(0, Math.min(last, w));
 	const moved = [], time = clock(starts[w]), place = `window ${w + 1} of ${W}`;
 	news = [];
-	els.forEach((e, i) => {
-		const k = at(lives[i][0], w), text = e.r ??= e.querySelector('.r') || 0;
+	els.forEach((_, i) => {
+		const [life, rates, cycle] = lives[i], k = at(life, w), text = live[i];
 		if (k != cur[i]) { cur[i] = k; dress(i); moved.push(i); }
 		if (mark[k] >= 0) news.push(i);
 		if (!k || !text) return;
-		const told = labels[at(lives[i][2], w)] || (/ster|wer/.test(classes[k]) ? hz(i, w - 1).replace('Hz', '→ ') : '') + hz(i, w);
+		const told = cycle[0] + 1 ? labels[at(cycle, w)] : (turns[k] ? labels[at(rates, w - 1)].replace('Hz', '→ ') : '') + labels[at(rates, w)];
 		if (text.told != told) text.textContent = text.told = told;
 	});
 	if ((w - now) ** 2 == 1 && moved.length < 41 && !matchMedia('(prefers-reduced-motion)').matches) moved.forEach(i => els[i].animate({ opacity: [.2, 1] }, 250));
@@ -51,8 +50,8 @@ function seek(w, quiet) {
 	save();
 }
 function play(on) {
-	clearInterval(timer);
-	timer = on && setInterval(() => now < last ? seek(now + 1, 1) : play(0), 1e3 / $.speed.value);
+	clearTimeout(timer);
+	timer = on && setTimeout(() => { seek(now + 1, 1); play(now < last); }, 1e3 / $.speed.value);
 	say('play', on ? 'Pause' : 'Play');
 	if (on && now == last) seek(0, 1);
 	save();
@@ -60,7 +59,7 @@ function play(on) {
 const go = w => { play(0); seek(w); };
 const jump = by => { let w = now; do w += by; while (counts[0][w] + counts[1][w] + counts[2][w] === 0); go(w); };
 
-// The selection and its card.
+// The selection.
 function pick(i, look) {
 	const old = near;
 	sel = i;
@@ -73,10 +72,10 @@ function pick(i, look) {
 }
 function card() {
 	if ($.card.hidden = sel < 0) return;
-	const [life, , cycle] = lives[sel], bit = (c, x, to = W) => `<rect class="${c}" x=${x} width=${to - x} height=9 />`;
+	const [life, rates, cycle] = lives[sel], bit = (c, x, to = W) => `<rect class="${c}" x=${x} width=${to - x} height=9 />`;
 	say('name', name[sel]);
 	$.life.innerHTML = life.map((k, i) => i % 2 && k ? bit(classes[k], life[i - 1], life[i + 1]) : '').join('') + bit('head', now, now + 1 + W / 200);
-	say('facts', `${classes[cur[sel]].replace(/ w\d/, '')} ${hz(sel, now)} ${labels[at(cycle, now)]}\n` + about[sel]);
+	say('facts', `${classes[cur[sel]].replace(/ w\d/, '')} ${labels[at(rates, now)]} ${labels[at(cycle, now)]}\n` + about[sel]);
 	list('ends', ends(sel));
 }
 function search() {
@@ -90,7 +89,8 @@ function search() {
 // The link.
 function save() {
 	const add = (k, v = '') => v && `&${k}=` + encodeURIComponent(v).replace(/%2F/g, '/');
-	if (!timer) try { history.replaceState(0, '', '#t=' + starts[now] + add('sel', name[sel]) + add('q', $.q.value)); } catch {}
+	clearTimeout(later);
+	later = setTimeout(() => { if (!timer) try { history.replaceState(0, '', '#t=' + starts[now] + add('sel', name[sel]) + add('q', $.q.value)); } catch {} }, 50);
 }
 function load() {
 	const link = new URLSearchParams(location.hash.slice(1));
@@ -100,9 +100,9 @@ function load() {
 	search();
 }
 
-// A gesture moves the picture by X, Y and scale S; its end draws it anew.
+// A gesture moves the picture by X, Y, S; its end draws it anew.
 let X = 0, Y = 0, S = 1, far = 0, idle, old;
-const home = svg.getAttribute('viewBox'), fit = box => svg.setAttribute('viewBox', box);
+const home = svg.attributes.viewBox.value, fit = box => svg.setAttribute('viewBox', box);
 function zoom(by, dx = 0, dy = 0, x = stage.clientWidth / 2, y = stage.clientHeight / 2) {
 	X = x + (X - x) * by + dx;
 	Y = y + (Y - y) * by + dy;
@@ -150,9 +150,8 @@ onkeydown = e => {
 		press(key, shiftKey ? 10 : 1);
 	}
 };
-document.querySelectorAll('[data-key]').forEach(b => b.onclick = () => press(b.dataset.key, 1));
+onclick = ({ target: { dataset: { key } } }) => key && press(key, 1);
 $.seek.oninput = () => go(+$.seek.value);
-$.speed.onchange = () => timer && play(1);
 $.q.oninput = search;
 onhashchange = load;
 load();

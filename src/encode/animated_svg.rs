@@ -128,8 +128,7 @@ impl Play<'_> {
             "{}.t{{text-anchor:start;font:600 17px {f};fill:{}}}.u{{text-anchor:start;font:12.5px {f};fill:{}}}\
              .x{{font:12px {f};fill:{}}}.k,.head{{visibility:hidden}}.k{{text-anchor:end;font:13px {f};fill:{}}}\
              path.added{{fill:{}}}path.removed{{fill:{}}}path.changed{{fill:{}}}\
-             @media(prefers-reduced-motion:no-preference){{{}:is(.silent,.declared,.removed) .r{{visibility:hidden}}\
-             .on,.head{{visibility:visible}}}}",
+             @media(prefers-reduced-motion:no-preference){{{}.on,.head{{visibility:visible}}}}",
             stage::base(style),
             page.text,
             page.quiet,

@@ -33,7 +33,10 @@ pub fn base(style: &Style) -> String {
 /// What classes change of that: how fast, how well known, how alive, what changed; a later rule counts more. Only
 /// these class words have rules.
 pub fn states(style: &Style, words: &BTreeSet<&str>) -> String {
-    let mut out = String::from(".off{visibility:hidden}");
+    // What is silent has no rate worth a place.
+    let mut out = String::from(
+        ".off,:is(.edge,.topic):is(.silent,.latched,.declared,.removed)>.r{visibility:hidden}",
+    );
     for step in 1..=STEPS {
         let word = format!("w{step}");
         if words.contains(&*word) {

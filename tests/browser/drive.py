@@ -63,7 +63,7 @@ def compare_data(page, evolution):
             label = data["labels"][at(data["lives"][i][1], w)]
             assert words[0] == element["state"], (w, element, words)
             if element["hz"] is not None:
-                assert label == hertz(element["hz"]), (w, element, label)
+                assert label == hertz(element["hz"]) + " Hz", (w, element, label)
             there.add(i)
             compared += 1
         for i, life in enumerate(data["lives"]):
@@ -133,6 +133,7 @@ def drive(url, evolution):
         b.keys(ENTER)
         assert topic in b.js("return document.getElementById('name').textContent")
         assert b.js("return document.querySelectorAll('#graph .near').length") > 1
+        time.sleep(0.2)
         assert f"sel={topic}" in b.js("return location.hash"), b.js("return location.hash")
         assert b.js("return document.getElementById('life').children.length") > 1
         b.keys(ESC, ESC)
