@@ -20,7 +20,6 @@ for (const [list] of lives) list.forEach((k, i) => i % 2 && mark[k] >= 0 && coun
 const iso = (s, from, to) => new Date(s * 1e3).toISOString().slice(from, to), clock = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
 const list = (id, all) => $[id].replaceChildren(...all.slice(0, 50).map(i => Object.assign(document.createElement('button'), { textContent: name[i], className: classes[cur[i]], onclick: () => pick(i, 1) })));
 
-// A window.
 let now = 0, sel = -1, near = new Set(), timer = 0, later, hits = [], news = [];
 const cur = els.map(() => -1), base = els.map(e => e.classList[0] + ' '), live = els.map(e => e.querySelector('.r'));
 const dress = i => els[i]?.setAttribute('class', base[i] + classes[cur[i]] + (near.has(i) ? ' near' : ''));
