@@ -199,7 +199,15 @@ impl<'a> Title<'a> {
         group.shape(Shape {
             form: Form::Rect(place, place.h / 2.0),
             fill: paint.0,
-            stroke: Stroke::solid(paint.1, 0.0),
+            // Of the bar's own colour, as on paper, it would not be seen.
+            stroke: Stroke::solid(
+                paint.1,
+                if paint.0 == self.style.title.fill {
+                    unit
+                } else {
+                    0.0
+                },
+            ),
         });
         group.text(Text {
             at: Point::new(place.centre().x, place.centre().y + size * 0.36),
