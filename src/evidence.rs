@@ -40,6 +40,8 @@ pub struct Source {
     pub about: &'static str,
     /// The layouts of the messages that it reads.
     pub(crate) reads: &'static [(Shape, Read)],
+    /// Whether what it claims holds until it is taken back, though nobody repeats it.
+    pub(crate) lasting: bool,
     /// What the announcement of a connection says.
     pub(crate) announced: Option<fn(&mut Heard<'_>)>,
     /// What follows from the whole mission; run in the order of the rows.
@@ -54,6 +56,7 @@ const NOTHING: Source = Source {
     word: "",
     about: "",
     reads: &[],
+    lasting: false,
     announced: None,
     conclude: &[],
 };
@@ -85,18 +88,21 @@ pub const SOURCES: &[Source] = &[
             (rosgraph::SHAPE, rosgraph::read),
             (rosgraph::OLD_SHAPE, rosgraph::read),
         ],
+        lasting: true,
         ..NOTHING
     },
     Source {
         word: "discovery",
         about: "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)",
         reads: &[(discovery::SHAPE, discovery::read)],
+        lasting: true,
         ..NOTHING
     },
     Source {
         word: "lifecycle",
         about: "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)",
         reads: &[(lifecycle::SHAPE, lifecycle::read)],
+        lasting: true,
         ..NOTHING
     },
     Source {
@@ -116,6 +122,7 @@ pub const SOURCES: &[Source] = &[
         word: "parameter_events",
         about: "`rcl_interfaces/msg/ParameterEvent`",
         reads: &[(parameter_events::SHAPE, parameter_events::read)],
+        lasting: true,
         ..NOTHING
     },
     Source {
@@ -143,6 +150,7 @@ pub const SOURCES: &[Source] = &[
         about: "`/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`)",
         reads: &[(metrics::SHAPE, metrics::read)],
         conclude: &[metrics::conclude],
+        lasting: true,
         ..NOTHING
     },
     Source {

@@ -118,12 +118,54 @@ impl Proof {
     }
 }
 
+/// Whether something that is heard now and then has a rhythm, and whether that broke off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Rhythm {
+    beat: Option<Stamp>,
+    last: Option<Stamp>,
+    beats: u32,
+    longest: i64,
+}
+
+impl Rhythm {
+    /// Fewer beats than this are no rhythm.
+    const FEWEST: u32 = 5;
+    /// What is heard sooner after a beat is the same beat; a burst at a start is no rhythm.
+    const BEAT_NS: i64 = 1_000_000_000;
+    /// Less silence than this is none: a recorder stops writing topics up to a second apart.
+    const SILENCE_NS: i64 = 2_000_000_000;
+
+    /// Hears something; times do not go back.
+    pub(crate) fn hear(&mut self, time: Stamp) {
+        self.longest = self
+            .longest
+            .max(self.last.map_or(0, |last| time.since(last)));
+        self.last = Some(time);
+        if self
+            .beat
+            .is_none_or(|beat| time.since(beat) >= Self::BEAT_NS)
+        {
+            self.beat = Some(time);
+            self.beats += 1;
+        }
+    }
+
+    /// Whether the silence before `end` is far longer than any before it.
+    pub(crate) fn broke_off(&self, end: Stamp) -> bool {
+        let silence = self.last.map_or(0, |last| end.since(last));
+        let usual = self.longest.saturating_mul(3).max(Self::SILENCE_NS);
+        self.beats >= Self::FEWEST && silence > usual
+    }
+}
+
 /// Everything known about a mission once all bags are read, and what follows from it so far.
 #[derive(Debug)]
 pub(crate) struct Known<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: &'a mut Facts,
     pub(crate) proofs: Vec<Proof>,
+    /// The mission's last moment.
+    end: Stamp,
     /// Why times could not be read, if so.
     pub(crate) failed: Option<io::Error>,
     publishers: BTreeMap<Name, BTreeSet<Name>>,
@@ -131,8 +173,9 @@ pub(crate) struct Known<'a> {
 }
 
 impl<'a> Known<'a> {
-    pub(crate) fn new(streams: &'a [Stream], facts: &'a mut Facts) -> Self {
+    pub(crate) fn new(streams: &'a [Stream], facts: &'a mut Facts, end: Stamp) -> Self {
         Self {
+            end,
             streams,
             facts,
             proofs: Vec::new(),
@@ -251,8 +294,19 @@ impl<'a> Known<'a> {
         facts.into_iter().map(times).collect()
     }
 
-    /// What the claims say without any rule: nodes, topics, publications and subscriptions.
-    pub(crate) fn take_at_their_word(&mut self) {
+    /// Whether something that is told now and then still holds after the last time: unless it was told in a rhythm
+    /// that broke off.
+    pub(crate) fn lasts(&self, signs: &[Stamp]) -> bool {
+        let mut rhythm = Rhythm::default();
+        for sign in signs {
+            rhythm.hear(*sign);
+        }
+        !rhythm.broke_off(self.end)
+    }
+
+    /// What the claims say without any rule: nodes, topics, publications and subscriptions. `lasting` tells whether
+    /// what a source claims holds until it is taken back.
+    pub(crate) fn take_at_their_word(&mut self, lasting: impl Fn(SourceId) -> bool) {
         let endings = self.endings();
         for fact in self.facts.list.clone() {
             let what = match fact.claim {
@@ -263,15 +317,12 @@ impl<'a> Known<'a> {
                 _ => continue,
             };
             let (signs, ends) = self.signs_and_ends(&fact, &endings);
+            let held = lasting(fact.source) && (fact.snapshot.is_some() || self.lasts(&signs));
             self.prove(Proof {
                 what,
                 source: fact.source,
                 degree: fact.degree,
-                when: When::Signs {
-                    signs,
-                    ends,
-                    held: false,
-                },
+                when: When::Signs { signs, ends, held },
             });
         }
     }
@@ -316,5 +367,30 @@ impl<'a> Known<'a> {
         ends.sort_unstable();
         ends.dedup();
         (signs, ends)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn broke_off(times: &[i64], end: i64) -> bool {
+        let mut rhythm = Rhythm::default();
+        for time in times {
+            rhythm.hear(Stamp(time * 100_000_000));
+        }
+        rhythm.broke_off(Stamp(end * 100_000_000))
+    }
+
+    #[test]
+    fn a_rhythm_breaks_off_when_silence_is_longer_than_ever() {
+        let steady = [0, 20, 40, 60, 80];
+        assert!(broke_off(&steady, 150));
+        assert!(!broke_off(&steady, 130));
+    }
+
+    #[test]
+    fn a_burst_at_the_start_is_no_rhythm() {
+        assert!(!broke_off(&[0, 1, 2, 3, 4, 5, 6], 900));
     }
 }

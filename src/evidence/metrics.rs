@@ -48,16 +48,12 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
 pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     for (fact, signs, ends) in known.claims(source) {
         if let Claim::Reports(node, topic) = fact.claim {
-            let node = known.meant(node);
+            let (node, held) = (known.meant(node), known.lasts(&signs));
             known.prove(Proof {
                 what: What::Publish(node, topic),
                 source,
                 degree: fact.degree,
-                when: When::Signs {
-                    signs,
-                    ends,
-                    held: false,
-                },
+                when: When::Signs { signs, ends, held },
             });
         }
     }

@@ -70,6 +70,7 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
         let node = owner(&logger, &nodes);
         nodes.insert(node.into());
         let what = What::Publish(known.facts.name(node), topic);
+        let held = known.lasts(&signs);
         known.prove(Proof {
             what,
             source,
@@ -77,7 +78,7 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
             when: When::Signs {
                 signs,
                 ends: Vec::new(),
-                held: false,
+                held,
             },
         });
     }

@@ -19,15 +19,15 @@ pub(super) fn prove(
     collected: &mut Collected,
     options: &Options,
 ) -> io::Result<(Vec<Proof>, Values)> {
-    let mut known = Known::new(&collected.streams, &mut collected.facts);
-    known.take_at_their_word();
+    let start = collected.span.map_or(Stamp(0), |s| s.start);
+    let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
+    let mut known = Known::new(&collected.streams, &mut collected.facts, end);
+    known.take_at_their_word(|source| SOURCES.get(source).is_some_and(|s| s.lasting));
     for (row, source) in SOURCES.iter().enumerate() {
         for conclude in source.conclude {
             conclude(row, &mut known);
         }
     }
-    let start = collected.span.map_or(Stamp(0), |s| s.start);
-    let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
     for entry in &options.topology.entries {
         told(&mut known, entry, (start, end));
     }

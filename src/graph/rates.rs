@@ -5,6 +5,7 @@ use std::io;
 
 use super::windows::Windows;
 use crate::collect::Collected;
+use crate::proof::Rhythm;
 use crate::time::Stamp;
 
 /// What one topic did in one window.
@@ -33,9 +34,7 @@ pub(super) struct Rates {
 pub(super) struct Trace {
     pub(super) first: Stamp,
     pub(super) last: Stamp,
-    pub(super) count: u64,
-    /// The longest time between two of them in nanoseconds.
-    pub(super) longest_gap: i64,
+    rhythm: Rhythm,
 }
 
 impl Trace {
@@ -43,25 +42,17 @@ impl Trace {
         let all = trace.get_or_insert(Self {
             first: time,
             last: time,
-            count: 0,
-            longest_gap: 0,
+            rhythm: Rhythm::default(),
         });
-        all.longest_gap = all.longest_gap.max(time.since(all.last));
+        all.rhythm.hear(time);
         all.last = time;
-        all.count += 1;
     }
 
-    /// Whether it spoke often enough to say that it has fallen silent before `end`.
+    /// Whether it had a rhythm that broke off before `end`.
     pub(super) fn ceased(&self, end: Stamp) -> bool {
-        let silence = end.since(self.last);
-        self.count >= SPOKE_OFTEN && silence > self.longest_gap.saturating_mul(3).max(SILENCE_NS)
+        self.rhythm.broke_off(end)
     }
 }
-
-/// Fewer messages than this tell no rhythm.
-const SPOKE_OFTEN: u64 = 5;
-/// Less silence than this is none: a recorder stops writing topics up to a second apart.
-const SILENCE_NS: i64 = 2_000_000_000;
 
 /// A window that messages still fall into.
 struct Open {
