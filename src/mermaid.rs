@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn a_window_is_a_flow_chart() {
         let (view, _) = view(
-            &evolution(&["/n/a>/t@2", "/n/a>/t@2 /b\"</t"]),
+            &evolution(&["/n/a>/n/t@2", "/n/a>/n/t@2 /b\"</n/t"]),
             &ViewOptions::default(),
         );
         let text = chart(&view, &Style::builtin("light").unwrap(), &view.frames[1]);
@@ -145,10 +145,10 @@ mod tests {
             "flowchart LR",
             "  subgraph s0[\"/n\"]",
             "    i1([\"/n/a\"]):::node",
+            "    i2[\"/n/t\"]:::topic",
             "  end",
             "  i0([\"/b#34;\"]):::node",
             "  class i0 added",
-            "  i2[\"/t\"]:::topic",
             "  i1 -->|\"2 Hz\"| i2",
             "  i2 --> i0",
         ];

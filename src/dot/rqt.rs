@@ -329,7 +329,10 @@ mod tests {
 
     #[test]
     fn nodes_and_topics_are_written_as_rqt_graph_does() {
-        let file = file(&["/ns/a>/t@12.5 /b</t /a>/tf"], &ViewOptions::default());
+        let file = file(
+            &["/ns/a>/t@12.5 /b</t /a>/tf /ns/c"],
+            &ViewOptions::default(),
+        );
         assert!(line(&file, "n___b [").contains(r#"label="/b", shape=ellipse, pos=""#));
         assert!(line(&file, "n___b [").contains(r#"tooltip="/b", URL="__b""#));
         assert!(line(&file, "t___t [").contains(r#"label="/t", shape=box, pos=""#));

@@ -12,7 +12,7 @@ const DEEPEST: usize = 16;
 ///
 /// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item stands in the box of its first N parts, or of
 /// its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are drawn, but a
-/// namespace that holds nothing but one other is folded into it.
+/// namespace around a single thing is left out.
 pub(super) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespace> {
     let levels = depth.unwrap_or(DEEPEST).min(DEEPEST);
     let homes: Vec<String> = items.iter().map(|item| home(&item.name, levels)).collect();
@@ -26,21 +26,20 @@ pub(super) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespac
         fold(&mut spaces, &homes);
     }
     let places: BTreeMap<&str, usize> = spaces.iter().copied().zip(0..).collect();
-    for (item, home) in items.iter_mut().zip(&homes) {
-        item.cluster = places.get(home.as_str()).copied();
-    }
-    let around = |space: &str| {
-        let mut up = parent(space);
-        while !up.is_empty() && !places.contains_key(up) {
-            up = parent(up);
+    let innermost = |mut space| {
+        while !str::is_empty(space) && !places.contains_key(space) {
+            space = parent(space);
         }
-        places.get(up).copied()
+        places.get(space).copied()
     };
+    for (item, home) in items.iter_mut().zip(&homes) {
+        item.cluster = innermost(home.as_str());
+    }
     spaces
         .iter()
         .map(|space| Namespace {
             name: Arc::from(*space),
-            parent: around(space),
+            parent: innermost(parent(space)),
         })
         .collect()
 }
@@ -65,14 +64,22 @@ fn parent(space: &str) -> &str {
         .unwrap_or_default()
 }
 
-/// Drops namespaces whose only content is one other namespace.
+/// Drops namespaces around a single thing, which then stands in the one around them.
 fn fold(spaces: &mut BTreeSet<&str>, homes: &[String]) {
-    let mut children: BTreeMap<&str, usize> = BTreeMap::new();
-    for space in spaces.iter().copied() {
-        *children.entry(parent(space)).or_default() += 1;
+    let mut things: BTreeMap<&str, usize> = BTreeMap::new();
+    for home in homes {
+        *things.entry(home).or_default() += 1;
     }
-    let lived_in: BTreeSet<&str> = homes.iter().map(String::as_str).collect();
-    spaces.retain(|space| lived_in.contains(space) || children.get(space) != Some(&1));
+    let mut kept = BTreeSet::new();
+    // Backwards, a namespace comes after those inside it.
+    for space in spaces.iter().rev().copied() {
+        let inside = things.get(space).copied().unwrap_or_default();
+        if inside > 1 {
+            kept.insert(space);
+        }
+        *things.entry(parent(space)).or_default() += inside.min(1);
+    }
+    *spaces = kept;
 }
 
 #[cfg(test)]
@@ -124,14 +131,12 @@ mod tests {
     }
 
     #[test]
-    fn all_levels_are_drawn_but_empty_ones_are_folded() {
-        let want = [
-            "/a/b/x in /a/b",
-            "/a/b/c/d/x in /a/b/c/d",
-            "/a/b < -",
-            "/a/b/c/d < /a/b",
-        ];
+    fn all_levels_are_drawn_but_not_around_a_single_thing() {
+        let want = ["/a/b/x in /a/b", "/a/b/c/d/x in /a/b", "/a/b < -"];
         assert_eq!(boxes(&["/a/b/x", "/a/b/c/d/x"], None), want);
+        let got = boxes(&["/a/x", "/a/b/c/x", "/a/b/c/y"], None);
+        assert_eq!(got[3..], ["/a < -", "/a/b/c < /a"].map(str::to_owned));
+        assert_eq!(boxes(&["/a/x"], None), ["/a/x in -"]);
     }
 
     #[test]
@@ -139,7 +144,7 @@ mod tests {
         let slashes = "/".repeat(10_000);
         assert_eq!(boxes(&[&slashes, "", "a/b/c", "/"], None).len(), 4);
         let deep = "/a".repeat(10_000);
-        assert_eq!(boxes(&[&deep, "/b/x"], None).len(), 4);
+        assert_eq!(boxes(&[&deep, "/b/x"], None).len(), 2);
         assert!(boxes(&[&deep], Some(usize::MAX)).len() <= DEEPEST + 1);
     }
 }

@@ -236,8 +236,8 @@ mod tests {
     #[test]
     fn a_collapsed_namespace_holds_what_does_not_leave_it() {
         let windows = [
-            "/n/a>/n/t@2 /n/b</n/t /n/b>/n/out@3 /c</n/out /n>/x /n</n/in",
-            "/n/a>/n/t@4 /n/b</n/t /n/b>/n/out@3 /c</n/out /n>/x /n</n/in",
+            "/n/a>/n/t@20 /n/b</n/t /n/b>/n/out@3 /c</n/out /n>/x /n</n/in",
+            "/n/a>/n/t@40 /n/b</n/t /n/b>/n/out@3 /c</n/out /n>/x /n</n/in",
         ];
         let options = ViewOptions {
             collapse: vec!["/n/".into()],
@@ -252,7 +252,7 @@ mod tests {
             .iter()
             .position(|i| i.kind == ItemKind::Namespace)
             .unwrap();
-        assert_eq!(view.frames[0].items[space].hz, Some(5.0));
+        assert_eq!(view.frames[0].items[space].hz, Some(23.0));
         let open = ViewOptions {
             expand: vec!["/n".into()],
             ..options
