@@ -35,7 +35,7 @@ pub fn base(style: &Style) -> String {
 pub fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     // What is silent has no rate worth a place.
     let mut out = String::from(
-        ".off,:is(.edge,.topic):is(.silent,.latched,.declared,.removed)>.r{visibility:hidden}",
+        ".off,:is(.edge,.topic):is(.silent,.latched,.declared,.removed):not(.changed)>.r{visibility:hidden}",
     );
     for step in 1..=STEPS {
         let word = format!("w{step}");
