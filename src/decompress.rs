@@ -59,6 +59,29 @@ impl Compression {
     }
 }
 
+/// How much may be unpacked of one bag, so that a small file cannot keep a reader busy for hours.
+#[derive(Debug, Default)]
+pub(crate) struct Allowance {
+    spent: u64,
+}
+
+impl Allowance {
+    /// What may still be unpacked, in bytes, when `packed` bytes have been read: 4 GiB, and a thousand for each.
+    pub(crate) fn left(&self, packed: u64) -> u64 {
+        let all = packed.saturating_mul(1000).saturating_add(4 << 30);
+        all.saturating_sub(self.spent)
+    }
+
+    /// Takes note that `plain` bytes were unpacked.
+    pub(crate) fn spend(&mut self, plain: u64) {
+        self.spent = self.spent.saturating_add(plain);
+    }
+}
+
+/// What is said of a bag that spent its [`Allowance`].
+pub(crate) const UNFOLDS: &str =
+    "a chunk was left out: the bag unfolds to more than a thousand times its size";
+
 /// The largest look-back that a Zstandard frame may ask for, as a power of two: 8 MiB, what every decoder must offer.
 const LARGEST_WINDOW: u32 = 23;
 

@@ -568,6 +568,95 @@ fn no_damage_makes_a_reader_panic_hang_or_invent() {
     }
 }
 
+/// A described bag with the number behind `field` replaced wherever `which` says so.
+fn with_number(bytes: &[u8], field: &[u8], value: &[u8]) -> Vec<Vec<u8>> {
+    let places = (0..bytes.len()).filter(|at| bytes[*at..].starts_with(field));
+    let changed = places.map(|at| {
+        let mut bytes = bytes.to_vec();
+        let start = at + field.len();
+        bytes[start..start + value.len()].copy_from_slice(value);
+        bytes
+    });
+    changed.take(4).collect()
+}
+
+#[test]
+fn numbers_that_lie_are_read_around_or_told() {
+    let recording = support::small();
+    let bag = rosbag1::write(&recording, Pack::Lz4, 20_000);
+    let huge = [0xff; 8];
+    let mut cases = Vec::new();
+    for field in ["index_pos=", "chunk_pos=", "start_time=", "end_time="] {
+        cases.extend(with_number(&bag, field.as_bytes(), &huge));
+        cases.extend(with_number(&bag, field.as_bytes(), &[0; 8]));
+        cases.extend(with_number(&bag, field.as_bytes(), &5000u64.to_le_bytes()));
+    }
+    for field in ["count=", "conn=", "size=", "ver="] {
+        cases.extend(with_number(&bag, field.as_bytes(), &huge[..4]));
+        cases.extend(with_number(&bag, field.as_bytes(), &[0; 4]));
+    }
+    for bytes in cases {
+        let (_dir, path) = placed("x.bag", &bytes);
+        for options in [OpenOptions::default(), OpenOptions { verify: true }] {
+            let (report, kept) = read_as(&path, Want::Payload, None, &options).unwrap();
+            let all = kept.stamps.len() == recording.messages.len();
+            assert!(
+                all || !report.complete,
+                "{} messages and no word",
+                kept.stamps.len()
+            );
+        }
+    }
+}
+
+#[test]
+fn offsets_of_an_mcap_summary_are_not_believed() {
+    let recording = support::small();
+    let bytes = mcap::write(&recording, &mcap::Options::default());
+    let footer = bytes.len() - 8 - 20;
+    let start = usize::try_from(u64::from_le_bytes(
+        bytes[footer..footer + 8].try_into().unwrap(),
+    ))
+    .unwrap();
+    // Every eight bytes of the summary in turn, as the largest number.
+    for at in (start..footer).step_by(23) {
+        let mut bytes = bytes.clone();
+        bytes[at..at + 8].fill(0xff);
+        let (_dir, path) = placed("x.mcap", &bytes);
+        let (report, kept) = read(&path, Want::Payload).unwrap();
+        let all = kept.counts() == recording.counts();
+        // What a channel is called stands in the summary alone, if one relies on it.
+        let renamed = kept.stamps.len() == recording.messages.len();
+        assert!(
+            all || renamed || !report.complete,
+            "at {at}: {} messages and no word",
+            kept.stamps.len()
+        );
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_bomb_takes_no_memory() {
+    let mut recording = Recording::default();
+    let bomb = recording.publisher("/bomb", "/bomb", "std_msgs/String");
+    recording.send(bomb, (0, 1), 1, &vec![0; 500 << 20]);
+    let bag = rosbag1::write(&recording, Pack::Lz4, 1);
+    for bytes in [rosbag1::unindexed(&bag), bag] {
+        let (_dir, path) = placed("bomb.bag", &bytes);
+        let limited = format!(
+            "ulimit -v 400000; exec {} info {}",
+            env!("CARGO_BIN_EXE_bagreel"),
+            path.display()
+        );
+        let run = std::process::Command::new("sh")
+            .args(["-c", &limited])
+            .output()
+            .unwrap();
+        assert!(matches!(run.status.code(), Some(0 | 3)), "{run:?}");
+    }
+}
+
 /// Messages per topic by the crates `rosbag` and `mcap`, and by SQL: none of it our code. `None` where they refuse.
 fn independent(path: &Path) -> Option<BTreeMap<String, u64>> {
     let mut counts = BTreeMap::new();

@@ -1,11 +1,11 @@
 //! An MCAP file record by record from the front: without a summary, cut, unchunked, or from a pipe.
 
 use std::collections::BTreeSet;
-use std::io;
+use std::io::{self, Read as _};
 
 use super::records::{self, Table, op};
 use crate::bag::{Gather, Sink, Want, hand_over, nameless, pass};
-use crate::decompress::Compression;
+use crate::decompress::{Allowance, Compression, UNFOLDS};
 use crate::notice::{Notice, NoticeKind};
 use crate::source::Stream;
 
@@ -24,6 +24,7 @@ struct Walk<'s> {
     wants: Vec<Want>,
     gather: Gather,
     found: Found,
+    allowance: Allowance,
     total: u64,
 }
 
@@ -38,6 +39,7 @@ pub(super) fn read(stream: &mut Stream<'_>, total: u64, sink: &mut dyn Sink) -> 
             complete: true,
             ..Found::default()
         },
+        allowance: Allowance::default(),
         total,
     };
     let told = walk.outside(stream);
@@ -110,9 +112,16 @@ impl Walk<'_> {
         let told = if how == Compression::None {
             self.inside(stream, stream.position().saturating_add(compressed))
         } else {
-            let packed = io::Read::take(&mut *stream, compressed);
-            let mut plain = Stream::of_reader(how.reader(packed)?);
-            self.inside(&mut plain, u64::MAX)
+            let most = self.allowance.left(end);
+            if most == 0 {
+                self.damage(NoticeKind::Damaged, UNFOLDS);
+                return pass(stream, len - head.skip);
+            }
+            let packed = stream.by_ref().take(compressed);
+            let mut plain = Stream::of_reader(how.reader(packed)?.take(most));
+            let told = self.inside(&mut plain, u64::MAX);
+            self.allowance.spend(plain.position());
+            told
         };
         self.gather.flush(self.sink);
         let left = end.saturating_sub(stream.position());

@@ -201,12 +201,20 @@ fn from_the_front(source: &Source, reason: &Unindexed, sink: &mut dyn Sink) -> R
     let mut stream = Stream::of_file(source, 0, source.len(), FAR);
     sink.notice(Notice::new(
         NoticeKind::Downgraded,
-        format!("read from the front, since {}", reason.0),
+        format!("read from the front, since {}", reason.why),
     ));
-    let found = forwards(&mut stream, source.len(), sink);
+    let mut found = forwards(&mut stream, source.len(), sink);
+    if reason.cut && found.complete {
+        // Cut where a record ends, so that only the head knows.
+        found.complete = false;
+        sink.notice(Notice::new(
+            NoticeKind::Truncated,
+            "the end of the bag is missing",
+        ));
+    }
     Report {
         complete: found.complete,
-        tier_reason: Some(reason.0.clone()),
+        tier_reason: Some(reason.why.clone()),
         bytes_read: source.bytes_read(),
         file_bytes: source.len(),
         ..report(file_name(source.path()), Tier::Forward, &found.compression)

@@ -1,10 +1,11 @@
 //! A ROS 1 bag record by record from the front: without an index, cut, still open, or from a pipe.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read as _;
 
 use super::records::{self, Record, Stop, Table};
 use crate::bag::{Gather, MOST_PAYLOAD, Sink, Want, hand_over, nameless, pass};
-use crate::decompress::Compression;
+use crate::decompress::{Allowance, Compression, UNFOLDS};
 use crate::notice::{Notice, NoticeKind};
 use crate::source::Stream;
 use crate::time::Stamp;
@@ -39,6 +40,7 @@ struct Walk<'s> {
     gather: Gather,
     early: Early,
     found: Found,
+    allowance: Allowance,
     /// The compression of a chunk that was never closed; its data goes on to the end.
     open: Option<Compression>,
     total: u64,
@@ -56,6 +58,7 @@ pub(super) fn read(stream: &mut Stream<'_>, total: u64, sink: &mut dyn Sink) -> 
             complete: true,
             ..Found::default()
         },
+        allowance: Allowance::default(),
         open: None,
         total,
     };
@@ -127,9 +130,16 @@ impl Walk<'_> {
         let inside = if how == Compression::None {
             self.inside(stream, end)
         } else {
-            let packed = std::io::Read::take(&mut *stream, u64::from(len));
-            let mut plain = Stream::of_reader(how.reader(packed)?);
-            self.inside(&mut plain, u64::MAX)
+            let most = self.allowance.left(end);
+            if most == 0 {
+                self.damage(UNFOLDS);
+                return Ok(pass(stream, u64::from(len))?);
+            }
+            let packed = stream.by_ref().take(u64::from(len));
+            let mut plain = Stream::of_reader(how.reader(packed)?.take(most));
+            let stop = self.inside(&mut plain, u64::MAX);
+            self.allowance.spend(plain.position());
+            stop
         };
         self.gather.flush(self.sink);
         match inside {

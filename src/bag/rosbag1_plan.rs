@@ -23,7 +23,20 @@ pub(super) struct Plan {
 
 /// Why a bag cannot be read by its index.
 #[derive(Clone, Debug)]
-pub(super) struct Unindexed(pub(super) String);
+pub(super) struct Unindexed {
+    pub(super) why: String,
+    /// The head says that there was more.
+    pub(super) cut: bool,
+}
+
+impl Unindexed {
+    fn because<T>(why: impl Into<String>) -> Result<T, Self> {
+        Err(Self {
+            why: why.into(),
+            cut: false,
+        })
+    }
+}
 
 /// More chunks than this are not planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
 const MOST_CHUNKS: usize = 1 << 20;
@@ -37,7 +50,7 @@ pub(super) fn of(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
     let (record, len) = match records::next(&mut stream) {
         Ok(found) => found,
         Err(Stop::Io(e)) => return Err(e),
-        Err(_) => return Ok(Err(Unindexed("its head is damaged".to_owned()))),
+        Err(_) => return Ok(Unindexed::because("its head is damaged")),
     };
     let Record::Bag {
         index_pos,
@@ -46,11 +59,12 @@ pub(super) fn of(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
         encryptor,
     } = record
     else {
-        return Ok(Err(Unindexed("it has no head".to_owned())));
+        return Ok(Unindexed::because("it has no head"));
     };
     let body = stream.position() + u64::from(len);
-    if let Some(reason) = misplaced(index_pos, body, source.len()) {
-        return Ok(Err(Unindexed(reason)));
+    if let Some(why) = misplaced(index_pos, body, source.len()) {
+        let cut = index_pos > source.len();
+        return Ok(Err(Unindexed { why, cut }));
     }
     let mut plan = Plan {
         table: Table::default(),
@@ -63,7 +77,7 @@ pub(super) fn of(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
     match told {
         Ok(()) => Ok(plan.settle().map(|()| plan)),
         Err(Stop::Io(e)) => Err(e),
-        Err(_) => Ok(Err(Unindexed("its index is cut or damaged".to_owned()))),
+        Err(_) => Ok(Unindexed::because("its index is cut or damaged")),
     }
 }
 
@@ -122,12 +136,19 @@ impl Plan {
                 return Err(Stop::Cut);
             }
         }
-        Ok(())
+        // The head may lie as well as the tail.
+        match records::next(&mut stream) {
+            Ok((Record::ChunkInfo { .. }, _)) => Err(Stop::Broken),
+            _ => Ok(()),
+        }
     }
 
     /// Orders the chunks and tells each where it ends.
     fn settle(&mut self) -> Result<(), Unindexed> {
         let (body, index_pos) = (self.body, self.index_pos);
+        if self.chunks.is_empty() && index_pos > body {
+            return Unindexed::because("its index names no chunks");
+        }
         self.chunks.sort_by_key(|c| c.pos);
         self.chunks.dedup_by_key(|c| c.pos);
         let mut end = index_pos;
@@ -137,9 +158,7 @@ impl Plan {
         }
         let outside = |c: &Chunk| c.pos < body || c.pos >= index_pos;
         if self.chunks.iter().any(outside) {
-            return Err(Unindexed(
-                "its index names chunks outside the bag".to_owned(),
-            ));
+            return Unindexed::because("its index names chunks outside the bag");
         }
         Ok(())
     }

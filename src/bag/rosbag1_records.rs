@@ -87,7 +87,8 @@ pub(super) fn next_as_stated(stream: &mut Stream<'_>) -> Result<(Record, u32), S
         return Err(Stop::End);
     }
     let header_len = u32_at(head, 0).ok_or(Stop::Cut)? as usize;
-    if header_len > LONGEST_HEADER {
+    // No record is without fields; where the disk was full, zeros stand.
+    if header_len == 0 || header_len > LONGEST_HEADER {
         return Err(Stop::Broken);
     }
     let whole = stream.peek(header_len + 8)?;
