@@ -221,7 +221,7 @@ impl Ros1<'_> {
         pos: u64,
         messages: &[(usize, i64)],
     ) {
-        let mut counts = Vec::new();
+        let mut counts: Vec<u8> = Vec::new();
         for (id, entries) in index {
             let (id, count) = (
                 (*id as u32).to_le_bytes(),
