@@ -257,7 +257,9 @@ fn better(best: &mut Degree, degree: Degree) {
 
 fn counted(degrees: &[Degree]) -> Degrees {
     let mut all = Degrees::default();
-    degrees.iter().for_each(|d| all.add(*d));
+    for degree in degrees {
+        all.add(*degree);
+    }
     all
 }
 

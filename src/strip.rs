@@ -149,12 +149,11 @@ impl Page {
         let natural = bare.scene(0).size;
         let columns = columns(choice, panels, natural);
         let (mut width, mut caption) = (width, CAPTION.1);
-        match width_mm {
-            Some(mm) => (width, caption) = (mm * PX_PER_MM, CAPTION.0),
-            None => {
-                let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
-                width = width.max((legible + GAP) * columns as f64 + GAP);
-            }
+        if let Some(mm) = width_mm {
+            (width, caption) = (mm * PX_PER_MM, CAPTION.0);
+        } else {
+            let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
+            width = width.max((legible + GAP) * columns as f64 + GAP);
         }
         let wide = ((width - GAP * (columns as f64 + 1.0)) / columns as f64).max(1.0);
         let scale = wide / natural.w.max(1.0);

@@ -112,7 +112,9 @@ impl Terminal {
             .iter()
             .map(|(stage, time)| format!("{:>9.3} s  {}", time.as_secs_f64(), stage.word()))
             .collect();
-        lines.iter().for_each(|line| self.say(line));
+        for line in &lines {
+            self.say(line);
+        }
     }
 
     fn line(&self, colour: &str, label: &str, text: &str) {

@@ -71,7 +71,7 @@ mod tests {
         let mut text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_owned();
         for i in 1..12 {
             let one = format!("*a{}, ", i - 1).repeat(10);
-            text += &format!("a{i}: &a{i} [{one}]\n");
+            text = format!("{text}a{i}: &a{i} [{one}]\n");
         }
         assert!(parse(&text).is_err());
         assert!(parse(&"[".repeat(100_000)).is_err());

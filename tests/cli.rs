@@ -215,7 +215,9 @@ fn two_runs_write_the_same_bytes() {
     let run = |name: &str| {
         let outputs = ["gif", "json", "dot"].map(|e| format!("{name}.{e}"));
         let mut args = vec!["render", WAREHOUSE, "--size", "640x360", "--fit", "none"];
-        outputs.iter().for_each(|o| args.extend(["-o", o]));
+        for output in &outputs {
+            args.extend(["-o", output]);
+        }
         let output = bagreel(dir.path(), &args);
         assert_eq!(code(&output), Some(0), "{}", errors(&output));
         outputs.map(|o| fs::read(dir.path().join(o)).unwrap())

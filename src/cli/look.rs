@@ -57,7 +57,8 @@ pub(super) fn style(name: &str) -> Result<Style> {
 
 /// The built-in styles, one a line.
 pub(super) fn styles() -> String {
-    BUILTIN.iter().map(|row| format!("{}\n", row.0)).collect()
+    let names: Vec<&str> = BUILTIN.iter().map(|row| row.0).collect();
+    names.join("\n") + "\n"
 }
 
 /// The bundled font, with a file of the user's for what it lacks.

@@ -46,7 +46,7 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
     writeln!(
         out,
         "{} of mission, {} messages\n",
-        offset((info.duration_s * 1e3).round_ties_even() as i64 * 1_000_000),
+        offset((info.end_ns - 1).saturating_sub(info.start_ns) / 1_000_000 * 1_000_000),
         info.messages
     )
 }

@@ -56,15 +56,15 @@ fn elements(evolution: &Evolution, names: &[String]) -> Vec<(Element, String)> {
         found.extend(topics.map(|(id, t)| (Element::Topic(id), format!("topic {}", t.name))));
         return found;
     }
-    let named = |edge: &&Edge| names.iter().all(|n| n == node(edge) || n == topic(edge));
-    let publishes = (0..).zip(&all.publishes).filter(|(_, e)| named(e));
+    let is_asked = |edge: &&Edge| names.iter().all(|n| n == node(edge) || n == topic(edge));
+    let publishes = (0..).zip(&all.publishes).filter(|(_, e)| is_asked(e));
     found.extend(publishes.map(|(id, e)| {
         (
             Element::Publish(id),
             format!("{} publishes {}", node(e), topic(e)),
         )
     }));
-    let subscribes = (0..).zip(&all.subscribes).filter(|(_, e)| named(e));
+    let subscribes = (0..).zip(&all.subscribes).filter(|(_, e)| is_asked(e));
     found.extend(subscribes.map(|(id, e)| {
         (
             Element::Subscribe(id),
