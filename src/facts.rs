@@ -57,6 +57,8 @@ pub(crate) enum Claim {
     Publish(Name, Name),
     /// This node subscribes this topic.
     Subscribe(Name, Name),
+    /// This node has just begun to subscribe this topic.
+    Joins(Name, Name),
     /// This node no longer subscribes this topic.
     Unsubscribe(Name, Name),
     /// This node names this topic as its own, as publisher or as subscriber.
@@ -92,6 +94,7 @@ impl Claim {
             | Self::Snapshot(a) => [Some(a), None],
             Self::Publish(a, b)
             | Self::Subscribe(a, b)
+            | Self::Joins(a, b)
             | Self::Unsubscribe(a, b)
             | Self::Lists(a, b)
             | Self::Carries(a, b)
@@ -114,6 +117,7 @@ impl Claim {
             Self::Appears(a) => Self::Appears(to(a)),
             Self::Publish(a, b) => Self::Publish(to(a), to(b)),
             Self::Subscribe(a, b) => Self::Subscribe(to(a), to(b)),
+            Self::Joins(a, b) => Self::Joins(to(a), to(b)),
             Self::Unsubscribe(a, b) => Self::Unsubscribe(to(a), to(b)),
             Self::Lists(a, b) => Self::Lists(to(a), to(b)),
             Self::Carries(a, b) => Self::Carries(to(a), to(b)),

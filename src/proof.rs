@@ -93,10 +93,14 @@ pub(crate) enum When {
         ends: Vec<Stamp>,
         held: bool,
     },
+    /// From a beginning to the next end.
+    Begins { signs: Vec<Stamp>, ends: Vec<Stamp> },
     /// As long as this other element lives.
     Like(What),
-    /// For the whole mission.
+    /// For the whole mission, unless signs tell when.
     Whole,
+    /// For the whole mission, whatever signs there are.
+    Always,
 }
 
 /// One reason to believe in an element.
@@ -313,7 +317,9 @@ impl<'a> Known<'a> {
                 Claim::Node(node) => What::Node(node),
                 Claim::Topic(topic) => What::Topic(topic),
                 Claim::Publish(node, topic) => What::Publish(node, topic),
-                Claim::Subscribe(node, topic) => What::Subscribe(topic, node),
+                Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
+                    What::Subscribe(topic, node)
+                }
                 _ => continue,
             };
             let (signs, ends) = self.signs_and_ends(&fact, &endings);
@@ -322,7 +328,10 @@ impl<'a> Known<'a> {
                 what,
                 source: fact.source,
                 degree: fact.degree,
-                when: When::Signs { signs, ends, held },
+                when: match fact.claim {
+                    Claim::Joins(..) => When::Begins { signs, ends },
+                    _ => When::Signs { signs, ends, held },
+                },
             });
         }
     }
@@ -348,7 +357,9 @@ impl<'a> Known<'a> {
         let mut ends = Vec::new();
         let ending = match fact.claim {
             Claim::Node(node) => Some(Claim::NodeGone(node)),
-            Claim::Subscribe(node, topic) => Some(Claim::Unsubscribe(node, topic)),
+            Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
+                Some(Claim::Unsubscribe(node, topic))
+            }
             _ => None,
         };
         for end in ending.iter().filter_map(|e| endings.get(e)).flatten() {

@@ -12,6 +12,7 @@ mod architecture;
 mod cli;
 mod docs;
 mod encode;
+mod evidence;
 mod layout;
 mod pages;
 mod properties;

@@ -23,12 +23,16 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
     if let Some(link) = link(text).filter(|_| roscpp) {
         let node = heard.name(link.node.unwrap_or(name));
         let topic = heard.name(link.topic);
-        let claim = if link.ends {
-            Claim::Unsubscribe(node, topic)
+        let words = || format!("{name} logs: {text}");
+        if link.ends {
+            // It was there until now.
+            heard.claim(Claim::Node(node), Degree::Stated, words);
+            heard.claim(Claim::Unsubscribe(node, topic), Degree::Stated, words);
+        } else if link.node.is_some() {
+            heard.claim(Claim::Joins(node, topic), Degree::Stated, words);
         } else {
-            Claim::Subscribe(node, topic)
-        };
-        heard.claim(claim, Degree::Stated, || format!("{name} logs: {text}"));
+            heard.claim(Claim::Subscribe(node, topic), Degree::Stated, words);
+        }
     }
     Ok(())
 }

@@ -25,7 +25,7 @@ pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
             known.prove(rule(What::Publish(node, log), When::Like(What::Node(node))));
         }
     }
-    known.prove(rule(What::Node(log), When::Whole));
-    known.prove(rule(What::Publish(log, all), When::Whole));
-    known.prove(rule(What::Subscribe(log, log), When::Whole));
+    known.prove(rule(What::Node(log), When::Always));
+    known.prove(rule(What::Publish(log, all), When::Always));
+    known.prove(rule(What::Subscribe(log, log), When::Always));
 }

@@ -151,7 +151,7 @@ impl<'a> Builder<'a> {
                         && let Some(place) = streams.iter().position(|s| s == at)
                         && let Some(trace) = rates.traces[place]
                     {
-                        track.sign_all(&[trace.first], &[], proof.degree, &self.windows);
+                        track.begin_all(&[trace.first], &[], proof.degree, &self.windows);
                     }
                 }
                 When::Signs { signs, ends, held } => {
@@ -161,8 +161,15 @@ impl<'a> Builder<'a> {
                     track.sign_all(signs, &ends, proof.degree, &self.windows);
                     track.held |= held;
                 }
+                When::Begins { signs, ends } => {
+                    let mut ends = ends.clone();
+                    ends.extend(&deaths);
+                    ends.sort_unstable();
+                    track.begin_all(signs, &ends, proof.degree, &self.windows);
+                }
                 When::Like(_) => {}
                 When::Whole => track.whole = true,
+                When::Always => track.always = true,
             }
         }
         for (node, restarts) in &self.restarts {

@@ -7,6 +7,9 @@ use super::windows::Windows;
 use crate::evidence::{Degree, Evidence};
 use crate::time::{Span, Stamp};
 
+/// A node has registered its topics this long after its first sign.
+const REGISTRATION_NS: i64 = 1_000_000_000;
+
 /// One stretch of being alive, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Life {
@@ -24,6 +27,8 @@ pub(super) struct Track {
     pub(super) quiet: Degree,
     /// Signs that bound lives: sorted later.
     pub(super) signs: Vec<Stamp>,
+    /// Those of the signs by which somebody states what holds already.
+    pub(super) stated: Vec<Stamp>,
     /// Proofs of an end.
     pub(super) ends: Vec<Stamp>,
     /// Whether it lives on after its last sign.
@@ -36,6 +41,8 @@ pub(super) struct Track {
     pub(super) active: BTreeMap<usize, Degree>,
     /// Known for the whole mission from a header or a file.
     pub(super) whole: bool,
+    /// The same, whatever its signs say.
+    pub(super) always: bool,
     pub(super) lives: Vec<Life>,
 }
 
@@ -45,12 +52,14 @@ impl Default for Track {
             evidence: Evidence::NONE,
             quiet: Degree::Declared,
             signs: Vec::new(),
+            stated: Vec::new(),
             ends: Vec::new(),
             held: false,
             ceased: false,
             latched: None,
             active: BTreeMap::new(),
             whole: false,
+            always: false,
             lives: Vec::new(),
         }
     }
@@ -63,8 +72,22 @@ impl Track {
         *best = degree.min(*best);
     }
 
-    /// Adds signs, sorted, that mark their windows; of those with no end between them only the outer two are kept.
+    /// Adds signs, sorted, that mark their windows and state what holds already; of those with no end between them only
+    /// the outer two are kept.
     pub(super) fn sign_all(
+        &mut self,
+        signs: &[Stamp],
+        ends: &[Stamp],
+        degree: Degree,
+        windows: &Windows<'_>,
+    ) {
+        let before = self.signs.len();
+        self.begin_all(signs, ends, degree, windows);
+        self.stated.extend(&self.signs[before..]);
+    }
+
+    /// The same for signs that are beginnings.
+    pub(super) fn begin_all(
         &mut self,
         signs: &[Stamp],
         ends: &[Stamp],
@@ -119,7 +142,7 @@ impl Track {
                 (false, false) => linger(life.spoke),
             };
         }
-        if self.whole && self.signs.is_empty() {
+        if self.always || (self.whole && self.signs.is_empty()) {
             self.lives = vec![Life {
                 from: mission.0,
                 spoke: mission.1,
@@ -129,13 +152,15 @@ impl Track {
     }
 
     /// Works out the lives of an edge inside those of its node: whoever has advertised or subscribed a topic does so
-    /// until it ends, unless something else is known; and from the start, unless the topic was seen to be absent.
-    pub(super) fn live_within(&mut self, node: &[Life], absent: &[Stamp]) {
+    /// until it ends, unless something else is known. What somebody states was so before he said it, unless its absence
+    /// is known; a first message, in contrast, is a beginning.
+    pub(super) fn live_within(&mut self, node: &[Life]) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
         self.ends.dedup();
-        if self.signs.is_empty() {
-            self.lives = if self.whole {
+        self.stated.sort_unstable();
+        if self.always || self.signs.is_empty() {
+            self.lives = if self.whole || self.always {
                 node.to_vec()
             } else {
                 Vec::new()
@@ -147,14 +172,16 @@ impl Track {
             let from = self.signs.partition_point(|s| *s < around.from);
             let to = self.signs.partition_point(|s| *s <= around.to);
             let mut inside = lives(&self.signs[from..to], &self.ends);
-            if let Some(first) = inside.first_mut() {
-                let gone = |times: &[Stamp]| {
-                    times[..times.partition_point(|t| *t < first.from)]
-                        .last()
-                        .copied()
-                };
-                let since = gone(&self.ends).max(gone(absent)).unwrap_or(Stamp::MIN);
-                first.from = since.plus(1).max(around.from).min(first.from);
+            if let Some(first) = inside.first_mut()
+                && self.stated.binary_search(&first.from).is_ok()
+            {
+                let next = self.ends.partition_point(|end| *end < first.from);
+                let absent = next.checked_sub(1).map(|at| self.ends[at].plus(1));
+                let since = around
+                    .from
+                    .plus(REGISTRATION_NS)
+                    .max(absent.unwrap_or(Stamp::MIN));
+                first.from = since.min(first.from);
             }
             if let Some(last) = inside.last_mut() {
                 let ended = self.ends.iter().find(|end| **end >= last.spoke);

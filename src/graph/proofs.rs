@@ -96,7 +96,8 @@ fn explain(known: &mut Known<'_>, messages: &Stamps) {
                 );
                 (None, text)
             }
-            When::Signs { .. } | When::Whole => continue,
+            When::Always => (None, format!("{} ({})", told(proof.what), source.about)),
+            When::Signs { .. } | When::Begins { .. } | When::Whole => continue,
         };
         pieces.push(Piece {
             time,

@@ -34,6 +34,9 @@ pub(super) fn restarts(collected: &mut Collected, proofs: &[Proof]) -> io::Resul
     let mut all = Restarts::new();
     for (node, streams) in own_streams(collected) {
         let mut breaks = fallen_back(collected, &streams)?;
+        if breaks.is_empty() && !streams.iter().any(|s| may_be_sent_again(collected, *s)) {
+            continue;
+        }
         let times = streams
             .iter()
             .map(|s| collected.messages.times(collected.streams[*s].times));
@@ -72,7 +75,7 @@ fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
     });
     of_node
         .flat_map(|proof| match &proof.when {
-            When::Signs { signs, .. } => &signs[..],
+            When::Signs { signs, .. } | When::Begins { signs, .. } => &signs[..],
             _ => &[],
         })
         .copied()
@@ -118,8 +121,7 @@ fn sent_again(
         .collect();
     let mut found = Vec::new();
     for (stream, latched) in streams.iter().zip(times) {
-        let few = latched.len() as u64 <= LATCHED;
-        if !collected.streams[*stream].latched || !few || rhythms.is_empty() {
+        if !may_be_sent_again(collected, *stream) || rhythms.is_empty() {
             continue;
         }
         for again in latched.iter().skip(1) {
@@ -131,6 +133,12 @@ fn sent_again(
         }
     }
     found
+}
+
+/// Whether a latched stream has few messages, but more than one.
+fn may_be_sent_again(collected: &Collected, stream: usize) -> bool {
+    let stream = &collected.streams[stream];
+    stream.latched && (2..=LATCHED).contains(&collected.messages.count(stream.times))
 }
 
 /// Since when a stream with a rhythm is silent at `at`, if that is long for it and it spoke before and after.

@@ -35,7 +35,7 @@ pub(super) fn settle(tracks: &mut BTreeMap<What, Track>, proofs: &[Proof], frame
     for (what, mut track) in edges(tracks) {
         let (node, topic) = ends(what);
         let around = tracks.get(&What::Node(node)).map_or(&[][..], |t| &t.lives);
-        track.live_within(around, &[]);
+        track.live_within(around);
         of_topics.entry(topic).or_default().extend(&track.lives);
         tracks.insert(what, track);
     }

@@ -1,0 +1,297 @@
+//! What bags say about the graph, against what really happened where that is known.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
+use bagreel::collect::{Collector, Options};
+use bagreel::graph::{self, Built};
+use bagreel::notice::Notice;
+use bagreel::time::{Span, Stamp};
+
+const SECOND: i64 = 1_000_000_000;
+
+/// A file of the shared data, or a line that says why the test is skipped.
+fn shared(file: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/data")
+        .join(file);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("skipped: {file} is not there");
+    None
+}
+
+fn windows(span: Span, period: i64) -> Vec<Span> {
+    let starts = (0..10_000).map(|n| span.start.plus(n * period));
+    let starts = starts.take_while(|start| *start < span.end);
+    starts
+        .map(|start| Span {
+            start,
+            end: start.plus(period).min(span.end),
+        })
+        .collect()
+}
+
+/// The graphs of a bag in windows of ten seconds.
+fn graphs(path: &Path) -> (Built, Vec<Span>) {
+    let mut collector = Collector::new(Options::default());
+    let mut progress = |_, _| ();
+    let mut reader = bag::open(&Input::Path(path.to_owned()), &OpenOptions::default()).unwrap();
+    reader
+        .read(None, &mut collector.bag(&mut progress))
+        .unwrap();
+    built(collector)
+}
+
+fn built(collector: Collector) -> (Built, Vec<Span>) {
+    let mut collected = collector.finish().unwrap();
+    let windows = windows(collected.span.unwrap(), 10 * SECOND);
+    let options = graph::Options::default();
+    (
+        graph::build(&mut collected, &windows, &options).unwrap(),
+        windows,
+    )
+}
+
+/// Names of nodes, or of both ends of edges, in one window.
+type Names = BTreeSet<Vec<String>>;
+
+/// Nodes, publications and subscriptions of one window, in the words of the truth.
+fn names(built: &Built, window: usize) -> [Names; 3] {
+    let (all, graph) = (&built.elements, &built.graphs[window]);
+    let node = |id: u32| all.nodes[id as usize].name.as_str().to_owned();
+    let topic = |id: u32| all.topics[id as usize].name.as_str().to_owned();
+    let publishes = graph
+        .publishes
+        .iter()
+        .map(|e| &all.publishes[e.id as usize]);
+    let subscribes = graph
+        .subscribes
+        .iter()
+        .map(|e| &all.subscribes[e.id as usize]);
+    [
+        graph.nodes.iter().map(|n| vec![node(n.id)]).collect(),
+        publishes
+            .map(|e| vec![node(e.node), topic(e.topic)])
+            .collect(),
+        subscribes
+            .map(|e| vec![topic(e.topic), node(e.node)])
+            .collect(),
+    ]
+}
+
+/// Precision and F1 of nodes, publications and subscriptions over all windows of ten seconds.
+fn scores(bag: &str, truth: &str) -> Option<[(f64, f64); 3]> {
+    let (bag, truth) = (shared(bag)?, shared(truth)?);
+    let truth: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(truth).unwrap()).unwrap();
+    let (built, windows) = graphs(&bag);
+    let is_tool = |names: &Vec<String>| names.iter().any(|name| name.starts_with("/record_"));
+    let mut counts = [(0_u32, 0_u32, 0_u32); 3];
+    for real in truth["periods"]["10"].as_array().unwrap() {
+        let start = real["start_ns"].as_i64().unwrap();
+        let near = |w: &Span| w.start.since(Stamp(start)).abs() <= 5 * SECOND;
+        let found = windows
+            .iter()
+            .position(near)
+            .map(|w| names(&built, w))
+            .unwrap_or_default();
+        for ((found, kind), count) in found
+            .iter()
+            .zip(["nodes", "publishes", "subscribes"])
+            .zip(&mut counts)
+        {
+            let name = |value: &serde_json::Value| match value.as_array() {
+                Some(list) => list
+                    .iter()
+                    .map(|v| v.as_str().unwrap().to_owned())
+                    .collect(),
+                None => vec![value.as_str().unwrap().to_owned()],
+            };
+            let real: Names = real[kind].as_array().unwrap().iter().map(name).collect();
+            let sift = |names: &Names| {
+                names
+                    .iter()
+                    .filter(|n| !is_tool(n))
+                    .cloned()
+                    .collect::<Names>()
+            };
+            let (found, real) = (sift(found), sift(&real));
+            count.0 += u32::try_from(found.intersection(&real).count()).unwrap();
+            count.1 += u32::try_from(found.difference(&real).count()).unwrap();
+            count.2 += u32::try_from(real.difference(&found).count()).unwrap();
+        }
+    }
+    Some(counts.map(|(hits, wrong, missed)| {
+        let [hits, wrong, missed] = [hits, wrong, missed].map(f64::from);
+        (
+            hits / (hits + wrong),
+            2.0 * hits / (2.0 * hits + wrong + missed),
+        )
+    }))
+}
+
+#[test]
+fn a_real_mission_is_seen_as_it_was() {
+    let score = scores("warehouse/warehouse.bag", "warehouse/truth_windows.json");
+    let Some([nodes, publishes, subscribes]) = score else {
+        return;
+    };
+    assert!(
+        nodes.0 >= 0.98 && publishes.0 >= 0.98 && subscribes.0 >= 0.98,
+        "{score:?}"
+    );
+    assert!(
+        nodes.1 >= 0.97 && publishes.1 >= 0.99 && subscribes.1 >= 0.83,
+        "{score:?}"
+    );
+}
+
+#[test]
+fn compressed_recordings_tell_as_much() {
+    for bag in ["mini/mini_lz4.bag", "mini/mini_bz2.bag"] {
+        let score = scores(bag, "mini/truth_windows.json");
+        let Some([nodes, publishes, _]) = score else {
+            return;
+        };
+        assert!(nodes.1 >= 0.97 && publishes.1 >= 0.97, "{bag}: {score:?}");
+    }
+}
+
+#[test]
+fn a_recording_without_log_records_still_tells_something() {
+    let score = scores(
+        "warehouse/warehouse_norosout.bag",
+        "warehouse/truth_windows.json",
+    );
+    let Some([nodes, publishes, subscribes]) = score else {
+        return;
+    };
+    assert!(nodes.1 > 0.61 && publishes.1 > 0.51, "{score:?}");
+    assert!(
+        nodes.0 >= 0.98 && publishes.0 >= 0.98 && subscribes.0 >= 0.98,
+        "{score:?}"
+    );
+}
+
+#[test]
+fn a_rewritten_bag_does_not_believe_its_headers() {
+    for bag in ["warehouse/warehouse_lz4.bag", "warehouse/warehouse_bz2.bag"] {
+        let score = scores(bag, "warehouse/truth_windows.json");
+        let Some([_, publishes, _]) = score else {
+            return;
+        };
+        assert!(publishes.0 >= 0.9, "{bag}: {score:?}");
+    }
+}
+
+/// The windows in which a node is there.
+fn life(built: &Built, node: &str) -> Vec<usize> {
+    let there = |window: &usize| {
+        names(built, *window)[0]
+            .iter()
+            .any(|n| n[0].starts_with(node))
+    };
+    (0..built.graphs.len()).filter(there).collect()
+}
+
+#[test]
+fn every_start_stop_crash_and_restart_is_seen_and_none_invented() {
+    let Some(path) = shared("bags/mission/mission.bag") else {
+        return;
+    };
+    let (built, _) = graphs(&path);
+    // From `timeline.json`, whose clock began 3 s before the bag.
+    let expected = [
+        ("/lidar", (0..33).collect()),
+        ("/map_server", (0..33).collect()),
+        ("/camera_driver", (0..12).collect()),
+        ("/localizer", (0..27).chain(28..33).collect()),
+        ("/planner", (5..18).chain(20..33).collect()),
+        ("/controller_v2", (23..33).collect()),
+        ("/camera_backup", (14..32).collect()),
+        ("/probe_9665", (16..19).collect()),
+        ("/probe_11696", (21..25).collect()),
+        ("/joystick", (24..33).collect::<Vec<usize>>()),
+    ];
+    for (node, windows) in expected {
+        assert_eq!(life(&built, node), windows, "{node}");
+    }
+    let name = |id: u32| built.elements.nodes[id as usize].name.as_str();
+    let restarts: Vec<_> = built.restarts.iter().map(|(id, _)| name(*id)).collect();
+    assert_eq!(restarts, ["/planner", "/localizer"]);
+}
+
+/// Keeps what a reader says, so that it can be said again in another order.
+#[derive(Default)]
+struct Tape {
+    connections: Vec<Connection>,
+    wants: Collector,
+    stamps: Vec<(ConnectionId, Stamp, Option<u32>)>,
+    messages: Vec<(ConnectionId, Stamp, Vec<u8>)>,
+}
+
+impl Sink for Tape {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        self.connections.push(connection.clone());
+        self.wants.bag(&mut |_, _| ()).connection(connection)
+    }
+
+    fn stamps(&mut self, id: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let size = |at: usize| sizes.map(|s| s[at]);
+        self.stamps
+            .extend(stamps.iter().enumerate().map(|(at, t)| (id, *t, size(at))));
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        self.messages
+            .push((message.connection, message.time, message.data.to_vec()));
+    }
+
+    fn notice(&mut self, _: Notice) {}
+}
+
+/// A fixed disorder.
+fn shuffle<T>(list: &mut [T]) {
+    let mut seed = 1_u64;
+    for at in (1..list.len()).rev() {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        let other = usize::try_from(seed >> 33).unwrap() % (at + 1);
+        list.swap(at, other);
+    }
+}
+
+#[test]
+fn the_order_of_messages_in_the_file_does_not_matter() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+    let (expected, _) = graphs(&path);
+    let mut tape = Tape::default();
+    let mut reader = bag::open(&Input::Path(path), &OpenOptions::default()).unwrap();
+    reader.read(None, &mut tape).unwrap();
+    shuffle(&mut tape.stamps);
+    shuffle(&mut tape.messages);
+    let mut collector = Collector::new(Options::default());
+    let mut progress = |_, _| ();
+    let mut sink = collector.bag(&mut progress);
+    for connection in &tape.connections {
+        sink.connection(connection);
+    }
+    for (connection, time, data) in &tape.messages {
+        let size = u32::try_from(data.len()).unwrap();
+        sink.message(Message {
+            connection: *connection,
+            time: *time,
+            data,
+            size,
+        });
+    }
+    for (id, time, size) in &tape.stamps {
+        sink.stamps(*id, &[*time], size.as_ref().map(std::slice::from_ref));
+    }
+    let (shuffled, _) = built(collector);
+    assert_eq!(shuffled.elements, expected.elements);
+    assert!(shuffled.graphs == expected.graphs, "some graph differs");
+    assert_eq!(shuffled.restarts, expected.restarts);
+}
