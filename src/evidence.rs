@@ -196,7 +196,11 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "recorder",
-        about: "the recorder subscribes everything recorded",
+        about: "the recorder subscribes everything recorded; its log records name its source file",
+        reads: &[
+            (definition::LOG, recorder::read),
+            (definition::OLD_LOG, recorder::read),
+        ],
         conclude: &[recorder::conclude],
         ..NOTHING
     },

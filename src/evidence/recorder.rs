@@ -1,9 +1,27 @@
 //! The recorder subscribes everything recorded; views hide it unless asked.
 
-use crate::facts::{Degree, Name, SourceId};
+use std::collections::BTreeSet;
+
+use super::Heard;
+use crate::facts::{Claim, Degree, Name, SourceId};
 use crate::proof::{Known, Proof, What, When};
 use crate::trust;
-use std::collections::BTreeSet;
+use crate::wire::{self, Cursor};
+
+/// A recorder is known by the file its log records come from, whatever it is called.
+pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Result<()> {
+    payload.header()?;
+    payload.u8()?;
+    let name = payload.string()?;
+    let text = payload.string()?;
+    if payload.string()?.ends_with("rosbag/src/recorder.cpp") {
+        let node = heard.name(name);
+        heard.claim(Claim::Node(node), Degree::Stated, || {
+            format!("{name} records: {text}")
+        });
+    }
+    Ok(())
+}
 
 /// With one recorder among the nodes it is the one that wrote the bag; several cannot be told apart.
 pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {

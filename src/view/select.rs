@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::names::{is_debug, is_params, is_quiet, is_recorder, is_tf};
 use super::options::{Mode, ViewOptions};
-use crate::graph::Elements;
+use crate::graph::{Elements, Node};
 
 /// Why something is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,6 +29,11 @@ pub(super) struct Selection {
     pub(super) topics: Vec<Option<Reason>>,
 }
 
+/// Whether a node is a recorder or player, by its name or by what it logs.
+fn records(node: &Node) -> bool {
+    is_recorder(node.name.as_str()) || node.evidence.words().any(|word| word == "recorder")
+}
+
 /// How many connections a topic has.
 #[derive(Clone, Copy, Default)]
 struct Ends {
@@ -44,7 +49,7 @@ pub(super) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     let recorders: Vec<bool> = elements
         .nodes
         .iter()
-        .map(|n| hide_recorder && is_recorder(n.name.as_str()))
+        .map(|n| hide_recorder && records(n))
         .collect();
     let nodes: Vec<Option<Reason>> = elements
         .nodes
