@@ -1,10 +1,12 @@
 //! Takes in any number of bags: where every message lies in time, and what their contents claim.
 
 mod belief;
+mod services;
 
 use std::io;
 
 use belief::believed;
+pub use services::Service;
 
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::error::{Error, Result};
@@ -305,3 +307,5 @@ fn widen(span: &mut Option<Span>, (first, last): (Stamp, Stamp)) {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_ros2;

@@ -35,6 +35,7 @@ pub mod pixels;
 mod proof;
 pub mod reel;
 pub mod report;
+mod rhythm;
 pub mod scene;
 mod source;
 pub mod spells;

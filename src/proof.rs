@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::bag::Connection;
 use crate::facts::{Claim, Degree, Fact, Facts, Name, SourceId};
+use crate::rhythm::Rhythm;
 use crate::stamps::SeriesId;
 use crate::time::Stamp;
 
@@ -119,46 +120,6 @@ impl Proof {
         if let When::Like(other) = &mut self.when {
             *other = other.renamed(to);
         }
-    }
-}
-
-/// Whether something that is heard now and then has a rhythm, and whether that broke off.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Rhythm {
-    beat: Option<Stamp>,
-    last: Option<Stamp>,
-    beats: u32,
-    longest: i64,
-}
-
-impl Rhythm {
-    /// Fewer beats than this are no rhythm.
-    const FEWEST: u32 = 5;
-    /// What is heard sooner after a beat is the same beat; a burst at a start is no rhythm.
-    const BEAT_NS: i64 = 1_000_000_000;
-    /// Less silence than this is none: a recorder stops writing topics up to a second apart.
-    const SILENCE_NS: i64 = 2_000_000_000;
-
-    /// Hears something; times do not go back.
-    pub(crate) fn hear(&mut self, time: Stamp) {
-        self.longest = self
-            .longest
-            .max(self.last.map_or(0, |last| time.since(last)));
-        self.last = Some(time);
-        if self
-            .beat
-            .is_none_or(|beat| time.since(beat) >= Self::BEAT_NS)
-        {
-            self.beat = Some(time);
-            self.beats += 1;
-        }
-    }
-
-    /// Whether the silence before `end` is far longer than any before it.
-    pub(crate) fn broke_off(&self, end: Stamp) -> bool {
-        let silence = self.last.map_or(0, |last| end.since(last));
-        let usual = self.longest.saturating_mul(3).max(Self::SILENCE_NS);
-        self.beats >= Self::FEWEST && silence > usual
     }
 }
 
@@ -336,13 +297,17 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// The facts that end others.
-    fn endings(&self) -> BTreeMap<Claim, Vec<Fact>> {
-        let mut endings: BTreeMap<Claim, Vec<Fact>> = BTreeMap::new();
-        for fact in &self.facts.list {
+    /// When something was taken back, and when snapshots were taken.
+    fn endings(&mut self) -> BTreeMap<Claim, Vec<Stamp>> {
+        let mut endings: BTreeMap<Claim, Vec<Stamp>> = BTreeMap::new();
+        for fact in self.facts.list.clone() {
             if let Claim::NodeGone(_) | Claim::Unsubscribe(..) | Claim::Snapshot(_) = fact.claim {
-                endings.entry(fact.claim).or_default().push(*fact);
+                let times = self.times(&fact);
+                endings.entry(fact.claim).or_default().extend(times);
             }
+        }
+        for times in endings.values_mut() {
+            times.sort_unstable();
         }
         endings
     }
@@ -351,10 +316,9 @@ impl<'a> Known<'a> {
     fn signs_and_ends(
         &mut self,
         fact: &Fact,
-        endings: &BTreeMap<Claim, Vec<Fact>>,
+        endings: &BTreeMap<Claim, Vec<Stamp>>,
     ) -> (Vec<Stamp>, Vec<Stamp>) {
         let signs = self.times(fact);
-        let mut ends = Vec::new();
         let ending = match fact.claim {
             Claim::Node(node) => Some(Claim::NodeGone(node)),
             Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
@@ -362,46 +326,47 @@ impl<'a> Known<'a> {
             }
             _ => None,
         };
-        for end in ending.iter().filter_map(|e| endings.get(e)).flatten() {
-            ends.extend(self.times(end));
-        }
-        let snapshot = fact.snapshot.map(Claim::Snapshot);
-        for taken in snapshot.iter().filter_map(|s| endings.get(s)).flatten() {
-            // A snapshot that does not hold the claim ends it.
-            let times = self.times(taken);
-            ends.extend(
-                times
-                    .into_iter()
-                    .filter(|t| signs.binary_search(t).is_err()),
-            );
-        }
+        let mut ends = ending
+            .and_then(|e| endings.get(&e))
+            .cloned()
+            .unwrap_or_default();
+        let snapshots = fact
+            .snapshot
+            .and_then(|name| endings.get(&Claim::Snapshot(name)));
+        ends.extend(
+            snapshots
+                .map(|taken| absences(&signs, taken))
+                .unwrap_or_default(),
+        );
         ends.sort_unstable();
         ends.dedup();
         (signs, ends)
     }
 }
 
+/// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.
+fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
+    let mut absent = Vec::new();
+    let mut from = 0;
+    for sign in signs {
+        let run = &snapshots[from..snapshots.partition_point(|t| t < sign).max(from)];
+        absent.extend(run.first());
+        absent.extend(run.last());
+        from = snapshots.partition_point(|t| t <= sign);
+    }
+    absent.extend(snapshots.get(from));
+    absent
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn broke_off(times: &[i64], end: i64) -> bool {
-        let mut rhythm = Rhythm::default();
-        for time in times {
-            rhythm.hear(Stamp(time * 100_000_000));
-        }
-        rhythm.broke_off(Stamp(end * 100_000_000))
-    }
-
     #[test]
-    fn a_rhythm_breaks_off_when_silence_is_longer_than_ever() {
-        let steady = [0, 20, 40, 60, 80];
-        assert!(broke_off(&steady, 150));
-        assert!(!broke_off(&steady, 130));
-    }
-
-    #[test]
-    fn a_burst_at_the_start_is_no_rhythm() {
-        assert!(!broke_off(&[0, 1, 2, 3, 4, 5, 6], 900));
+    fn a_snapshot_without_a_claim_tells_of_its_absence() {
+        let stamps = |times: &[i64]| times.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
+        let absent = absences(&stamps(&[4, 8]), &stamps(&[1, 2, 3, 4, 5, 6, 7, 8, 9]));
+        assert_eq!(absent, stamps(&[1, 3, 5, 7, 9]));
+        assert_eq!(absences(&stamps(&[1, 2]), &stamps(&[1, 2])), []);
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Modules, lowest first: each uses only itself and those before it.
 #[rustfmt::skip]
 const LAYERS: &[&str] = &[
-    "time", "name", "geometry", "error", "notice", "yaml", "table", "hash", "decompress", "source", "bag", "wire", "stamps",
+    "time", "name", "geometry", "error", "notice", "yaml", "table", "hash", "decompress", "source", "bag", "wire", "stamps", "rhythm",
     "definition", "value", "facts", "proof", "trust", "evidence", "collect", "topology", "window", "graph", "diff",
     "evolution", "events", "info", "view", "text", "layout", "style", "scene", "svg", "pixels", "picture", "palette",
     "output", "spells", "stage", "dot", "mermaid", "film", "strip", "report", "page", "encode", "reel", "pipeline",

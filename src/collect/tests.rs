@@ -5,27 +5,27 @@ use crate::bag::Encoding;
 use crate::facts::Claim;
 
 /// A payload under construction.
-struct Payload {
+pub(super) struct Payload {
     bytes: Vec<u8>,
     cdr: bool,
 }
 
 impl Payload {
-    fn ros1() -> Self {
+    pub(super) fn ros1() -> Self {
         Self {
             bytes: Vec::new(),
             cdr: false,
         }
     }
 
-    fn cdr() -> Self {
+    pub(super) fn cdr() -> Self {
         Self {
             bytes: vec![0, 1, 0, 0],
             cdr: true,
         }
     }
 
-    fn number<const N: usize>(mut self, bytes: [u8; N]) -> Self {
+    pub(super) fn number<const N: usize>(mut self, bytes: [u8; N]) -> Self {
         while self.cdr && !(self.bytes.len() - 4).is_multiple_of(N) {
             self.bytes.push(0);
         }
@@ -33,40 +33,40 @@ impl Payload {
         self
     }
 
-    fn byte(self, value: u8) -> Self {
+    pub(super) fn byte(self, value: u8) -> Self {
         self.number([value])
     }
 
-    fn u32(self, value: u32) -> Self {
+    pub(super) fn u32(self, value: u32) -> Self {
         self.number(value.to_le_bytes())
     }
 
-    fn u64(self, value: u64) -> Self {
+    pub(super) fn u64(self, value: u64) -> Self {
         self.number(value.to_le_bytes())
     }
 
-    fn time(self) -> Self {
+    pub(super) fn time(self) -> Self {
         self.u32(1).u32(2)
     }
 
-    fn raw(mut self, bytes: &[u8]) -> Self {
+    pub(super) fn raw(mut self, bytes: &[u8]) -> Self {
         self.bytes.extend(bytes);
         self
     }
 
-    fn text(self, text: &str) -> Self {
+    pub(super) fn text(self, text: &str) -> Self {
         let zero = if self.cdr { "\0" } else { "" };
         let text = format!("{text}{zero}");
         self.u32(u32::try_from(text.len()).unwrap())
             .raw(text.as_bytes())
     }
 
-    fn header(self, seq: u32) -> Self {
+    pub(super) fn header(self, seq: u32) -> Self {
         let start = if self.cdr { self } else { self.u32(seq) };
         start.time().text("")
     }
 
-    fn log(name: &str, message: &str, file: &str, topics: &[&str]) -> Self {
+    pub(super) fn log(name: &str, message: &str, file: &str, topics: &[&str]) -> Self {
         let record = Self::ros1()
             .header(7)
             .byte(2)
@@ -83,7 +83,12 @@ impl Payload {
 }
 
 /// A collector that has heard one message of a connection, with what it wanted of it.
-fn hear(topic: &str, kind: &str, publisher: Option<&str>, payload: &Payload) -> (Collector, Want) {
+pub(super) fn hear(
+    topic: &str,
+    kind: &str,
+    publisher: Option<&str>,
+    payload: &Payload,
+) -> (Collector, Want) {
     let mut collector = Collector::new(Options::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
@@ -112,7 +117,12 @@ fn hear(topic: &str, kind: &str, publisher: Option<&str>, payload: &Payload) -> 
 }
 
 /// What one message claims, a line each, sorted.
-fn claims(topic: &str, kind: &str, publisher: Option<&str>, payload: &Payload) -> Vec<String> {
+pub(super) fn claims(
+    topic: &str,
+    kind: &str,
+    publisher: Option<&str>,
+    payload: &Payload,
+) -> Vec<String> {
     let (collector, want) = hear(topic, kind, publisher, payload);
     assert_eq!(want, Want::Payload);
     assert!(collector.notices.is_empty(), "{:?}", collector.notices);
@@ -174,22 +184,6 @@ fn the_recorder_dates_a_topic() {
 }
 
 #[test]
-fn a_log_record_of_ros2_names_its_logger() {
-    let record = Payload::cdr()
-        .time()
-        .byte(20)
-        .text("r1.nav")
-        .text("hi")
-        .text("f")
-        .text("g")
-        .u32(1);
-    assert_eq!(
-        claims("/rosout", "rcl_interfaces/msg/Log", None, &record),
-        ["Logger /r1/nav /rosout"]
-    );
-}
-
-#[test]
 fn statistics_know_both_ends() {
     let message = Payload::ros1()
         .text("/scan")
@@ -207,175 +201,6 @@ fn statistics_know_both_ends() {
         ),
         ["Publish /lidar /scan", "Subscribe /slam /scan"]
     );
-}
-
-#[test]
-fn parameter_events_name_their_node() {
-    let value = |p: Payload| {
-        p.byte(2)
-            .byte(0)
-            .u64(5)
-            .u64(0)
-            .text("")
-            .u32(0)
-            .u32(0)
-            .u32(0)
-            .u32(0)
-            .u32(0)
-    };
-    let message = Payload::cdr()
-        .time()
-        .text("/r1/nav")
-        .u32(1)
-        .text("use_sim_time");
-    let message = value(message).u32(0).u32(0);
-    assert_eq!(
-        claims(
-            "/parameter_events",
-            "rcl_interfaces/msg/ParameterEvent",
-            None,
-            &message
-        ),
-        ["Node /r1/nav", "Publish /r1/nav /parameter_events"]
-    );
-}
-
-#[test]
-fn a_transition_tells_the_state() {
-    let message = Payload::cdr()
-        .u64(1)
-        .byte(3)
-        .text("activate")
-        .byte(2)
-        .text("inactive")
-        .byte(3)
-        .text("active");
-    assert_eq!(
-        claims(
-            "/amcl/transition_event",
-            "lifecycle_msgs/msg/TransitionEvent",
-            None,
-            &message
-        ),
-        [
-            "Lifecycle /amcl active",
-            "Publish /amcl /amcl/transition_event"
-        ]
-    );
-}
-
-#[test]
-fn a_graph_snapshot_names_everything() {
-    let duration = |p: Payload| p.u32(0).u32(0);
-    let qos = |p: Payload| {
-        let p = duration(duration(p.u32(10)))
-            .byte(1)
-            .byte(1)
-            .byte(2)
-            .byte(1);
-        duration(p)
-    };
-    let message = Payload::cdr().time().u32(1).text("/lidar");
-    let message = qos(message
-        .u32(1)
-        .text("/scan")
-        .text("sensor_msgs/msg/LaserScan"));
-    let message = message.u32(0).u32(0).u32(0);
-    assert_eq!(
-        claims(
-            "/rosgraph",
-            "rosgraph_monitor_msgs/msg/Graph",
-            None,
-            &message
-        ),
-        [
-            "Node /lidar",
-            "Publish /lidar /scan",
-            "Snapshot snapshot /rosgraph",
-            "Type /scan sensor_msgs/msg/LaserScan"
-        ]
-    );
-}
-
-#[test]
-fn topic_statistics_tell_publishers_from_subscribers() {
-    let one = |p: Payload, kind, node| {
-        let p = p.byte(kind).text(node).text("/scan").u32(9);
-        p.time().time().time()
-    };
-    let message = one(one(Payload::cdr().time().u32(2), 0, "/lidar"), 1, "/slam");
-    assert_eq!(
-        claims(
-            "/topic_statistics",
-            "rosgraph_monitor_msgs/msg/TopicStatistics",
-            None,
-            &message
-        ),
-        ["Publish /lidar /scan", "Subscribe /slam /scan"]
-    );
-}
-
-#[test]
-fn metrics_name_a_subscriber() {
-    let message = Payload::cdr()
-        .text("slam")
-        .text("message_age")
-        .text("ms")
-        .time()
-        .time();
-    let message = message.u32(1).byte(1).u64(0);
-    assert_eq!(
-        claims(
-            "/statistics",
-            "statistics_msgs/msg/MetricsMessage",
-            None,
-            &message
-        ),
-        ["Reports /slam /statistics"]
-    );
-}
-
-#[test]
-fn discovery_names_nodes_with_either_length_of_identifier() {
-    for gid in [16, 24] {
-        let id = vec![7; gid];
-        let message = Payload::cdr()
-            .raw(&id)
-            .u32(1)
-            .text("/r1")
-            .text("nav")
-            .u32(1)
-            .raw(&id)
-            .u32(0);
-        let all = claims(
-            "ros_discovery_info",
-            "rmw_dds_common/msg/ParticipantEntitiesInfo",
-            None,
-            &message,
-        );
-        assert!(all.contains(&"Node /r1/nav".to_owned()), "{gid}: {all:?}");
-    }
-}
-
-#[test]
-fn service_events_count_clients_and_calls() {
-    let message = Payload::cdr()
-        .byte(1)
-        .time()
-        .raw(&[9; 16])
-        .u64(3)
-        .u32(0)
-        .u32(0);
-    let all = claims("/add/_service_event", "a/srv/Add_Event", None, &message);
-    let expected = [
-        "Called /add/_service_event request received",
-        "Topic /add/_service_event",
-    ];
-    assert!(
-        expected.iter().all(|e| all.contains(&(*e).to_owned())),
-        "{all:?}"
-    );
-    assert_eq!(all.len(), 3);
 }
 
 #[test]

@@ -45,9 +45,9 @@ pub(crate) fn is_stamped(connection: &Connection) -> bool {
 }
 
 /// Keeps the stamp of a message, together with its log time.
-pub(crate) fn hear(heard: &mut Heard<'_>, head: &[u8]) {
+pub(crate) fn hear(heard: &mut Heard<'_>, first_bytes: &[u8]) {
     let encoding = &heard.stream.connection.encoding;
-    let stamp = Cursor::new(encoding, head).and_then(|mut payload| {
+    let stamp = Cursor::new(encoding, first_bytes).and_then(|mut payload| {
         if *encoding == Encoding::Ros1 {
             payload.u32()?;
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io;
 
 use super::assemble::{Traffic, assemble};
-use super::lives::Track;
+use super::lives::{Extent, Track};
 use super::proofs::prove;
 use super::rates::{Rates, rates};
 use super::restarts::{Restarts, restarts};
@@ -168,8 +168,8 @@ impl<'a> Builder<'a> {
                     track.begin_all(signs, &ends, proof.degree, &self.windows);
                 }
                 When::Like(_) => {}
-                When::Whole => track.whole = true,
-                When::Always => track.always = true,
+                When::Whole => track.extent = track.extent.max(Extent::Whole),
+                When::Always => track.extent = Extent::Always,
             }
         }
         for (node, restarts) in &self.restarts {
@@ -210,7 +210,7 @@ impl<'a> Builder<'a> {
 /// Puts the messages of one stream on a track.
 fn follow(track: &mut Track, rates: &Rates, place: usize, latched: bool, end: Stamp) {
     let Some(spoke) = rates.traces.get(place).copied().flatten() else {
-        track.whole = true;
+        track.extent = track.extent.max(Extent::Whole);
         return;
     };
     track.signs.extend([spoke.first, spoke.last]);

@@ -10,6 +10,17 @@ use crate::time::{Span, Stamp};
 /// A node has registered its topics this long after its first sign.
 const REGISTRATION_NS: i64 = 1_000_000_000;
 
+/// How far a life reaches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Extent {
+    /// As far as its signs.
+    Signs,
+    /// The whole mission, unless there are signs: a header or a file declares it.
+    Whole,
+    /// The whole mission, whatever its signs say.
+    Always,
+}
+
 /// One stretch of being alive, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Life {
@@ -39,10 +50,8 @@ pub(super) struct Track {
     pub(super) latched: Option<Stamp>,
     /// Windows with signs, and how strong the best one is.
     pub(super) active: BTreeMap<usize, Degree>,
-    /// Known for the whole mission from a header or a file.
-    pub(super) whole: bool,
-    /// The same, whatever its signs say.
-    pub(super) always: bool,
+    /// Whether it is there for the whole mission.
+    pub(super) extent: Extent,
     pub(super) lives: Vec<Life>,
 }
 
@@ -58,8 +67,7 @@ impl Default for Track {
             ceased: false,
             latched: None,
             active: BTreeMap::new(),
-            whole: false,
-            always: false,
+            extent: Extent::Signs,
             lives: Vec::new(),
         }
     }
@@ -119,7 +127,7 @@ impl Track {
         self.signs.extend(&other.signs);
         self.held |= other.held;
         self.ceased |= other.ceased;
-        self.whole |= other.whole;
+        self.extent = self.extent.max(other.extent.min(Extent::Whole));
         self.latched = match (self.latched, other.latched) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),
@@ -142,7 +150,7 @@ impl Track {
                 (false, false) => linger(life.spoke),
             };
         }
-        if self.always || (self.whole && self.signs.is_empty()) {
+        if self.is_whole() {
             self.lives = vec![Life {
                 from: mission.0,
                 spoke: mission.1,
@@ -159,8 +167,8 @@ impl Track {
         self.ends.sort_unstable();
         self.ends.dedup();
         self.stated.sort_unstable();
-        if self.always || self.signs.is_empty() {
-            self.lives = if self.whole || self.always {
+        if self.is_whole() || self.signs.is_empty() {
+            self.lives = if self.is_whole() {
                 node.to_vec()
             } else {
                 Vec::new()
@@ -198,7 +206,7 @@ impl Track {
         }
         let alive = |life: &&Life| life.from < span.end && span.start <= life.to;
         let life = self.lives.iter().find(alive)?;
-        let state = if self.signs.is_empty() && self.whole && self.quiet == Degree::Declared {
+        let state = if self.signs.is_empty() && self.is_whole() && self.quiet == Degree::Declared {
             State::Declared
         } else if life.spoke < span.start && self.latched.is_some_and(|since| since < span.end) {
             State::Latched
@@ -206,6 +214,15 @@ impl Track {
             State::Silent
         };
         Some((state, self.quiet))
+    }
+
+    /// Whether it is there for the whole mission.
+    fn is_whole(&self) -> bool {
+        match self.extent {
+            Extent::Signs => false,
+            Extent::Whole => self.signs.is_empty(),
+            Extent::Always => true,
+        }
     }
 
     /// The first and last sign.

@@ -5,7 +5,7 @@ use std::io;
 
 use super::windows::Windows;
 use crate::collect::Collected;
-use crate::proof::Rhythm;
+use crate::rhythm::Rhythm;
 use crate::time::Stamp;
 
 /// What one topic did in one window.
