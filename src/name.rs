@@ -72,9 +72,38 @@ pub fn last_part(name: &str) -> &str {
     }
 }
 
+/// Whether a node of this name plays bags: `/play_` and a number (ROS 1), `/rosbag2_player`.
+pub fn is_player(node: &str) -> bool {
+    let last = last_part(node);
+    last == "rosbag2_player" || is_numbered(last, "play_")
+}
+
+/// Whether a node of this name records bags, or belongs to ROS 2's command line: `/record_` and a number (ROS 1),
+/// `/rosbag2_recorder…`, `/_ros2cli_…`.
+pub fn is_recorder(node: &str) -> bool {
+    let last = last_part(node);
+    is_numbered(last, "record_")
+        || last.starts_with("rosbag2_recorder")
+        || last.starts_with("_ros2cli_")
+}
+
+fn is_numbered(name: &str, prefix: &str) -> bool {
+    let number = name.strip_prefix(prefix);
+    number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn players_and_recorders_are_known_by_their_names() {
+        assert!(is_player("/play_1795170682045") && is_player("/rosbag2_player"));
+        assert!(!is_player("/play_music"));
+        assert!(is_recorder("/record_1795170682045") && is_recorder("/rosbag2_recorder"));
+        assert!(is_recorder("/_ros2cli_42"));
+        assert!(!is_recorder("/record_player") && !is_recorder("/record_"));
+    }
 
     #[test]
     fn names_split_at_their_last_slash() {

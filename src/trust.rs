@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::facts::{Claim, Facts, Name};
+use crate::name::is_player;
 use crate::notice::{Notice, NoticeKind};
 use crate::proof::{Stream, Trust};
 
@@ -95,33 +96,4 @@ fn rewritten(streams: &[Stream], of_bag: &[usize], named: &Named, facts: &Facts)
         .find(|at| &*facts.text(streams[**at].topic) == "/rosout");
     let host = log.and_then(|at| streams[*at].publisher);
     host.is_some_and(|host| named.guests.contains_key(&host))
-}
-
-/// `rosbag play` calls itself `/play_` and its start in nanoseconds.
-pub(crate) fn is_player(node: &str) -> bool {
-    node.strip_prefix("/play_").is_some_and(is_number)
-}
-
-/// The recorders: `rosbag record`, `ros2 bag record` and the command line's own nodes.
-pub(crate) fn is_recorder(node: &str) -> bool {
-    node.strip_prefix("/record_").is_some_and(is_number)
-        || node.starts_with("/rosbag2_recorder")
-        || node.starts_with("/_ros2cli_")
-}
-
-fn is_number(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn players_and_recorders_are_known_by_their_names() {
-        assert!(is_player("/play_1795170682045"));
-        assert!(!is_player("/play_music"));
-        assert!(is_recorder("/record_1795170682045") && is_recorder("/rosbag2_recorder"));
-        assert!(!is_recorder("/record_player"));
-    }
 }

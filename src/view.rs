@@ -30,7 +30,6 @@ pub use caption::hertz;
 pub use collapse::Candidate;
 pub use filter::NameFilter;
 pub use filtered::filtered;
-pub use names::is_recorder;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 
 /// What the picture shows of a mission, and a notice for everything that it leaves out.

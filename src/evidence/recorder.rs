@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::Heard;
 use crate::facts::{Claim, Degree, Name, SourceId};
+use crate::name::is_recorder;
 use crate::proof::{Known, Proof, What, When};
-use crate::trust;
 use crate::wire::{self, Cursor};
 
 /// A recorder is known by the file its log records come from, whatever it is called.
@@ -26,9 +26,7 @@ pub(super) fn read(heard: &mut Heard<'_>, payload: &mut Cursor<'_>) -> wire::Res
 /// With one recorder among the nodes it is the one that wrote the bag; several cannot be told apart.
 pub(super) fn conclude(source: SourceId, known: &mut Known<'_>) {
     let nodes = known.nodes().iter().copied();
-    let recorders: Vec<Name> = nodes
-        .filter(|n| trust::is_recorder(&known.text(*n)))
-        .collect();
+    let recorders: Vec<Name> = nodes.filter(|n| is_recorder(&known.text(*n))).collect();
     if let [recorder] = recorders[..] {
         let topics: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
         for topic in topics {

@@ -1,7 +1,5 @@
 //! Which names are housekeeping: by our own short list, and by the lists of `rqt_graph`.
 
-use crate::name::last_part;
-
 /// Whether our default leaves out this node or topic: log, clock, parameters, statistics, recorder events.
 pub(super) fn is_quiet(name: &str) -> bool {
     const EXACT: [&str; 5] = [
@@ -15,19 +13,6 @@ pub(super) fn is_quiet(name: &str) -> bool {
         || name.ends_with("/parameter_updates")
         || name.ends_with("/parameter_descriptions")
         || name.starts_with("/events/")
-}
-
-/// Whether a node of this name is a recorder or a player of bags, or a command of `ros2 topic`, not of the robot.
-pub fn is_recorder(name: &str) -> bool {
-    let last = last_part(name);
-    let numbered = |prefix| {
-        last.strip_prefix(prefix)
-            .is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit()))
-    };
-    numbered("record_")
-        || numbered("play_")
-        || last.starts_with("_ros2cli_")
-        || matches!(last, "rosbag2_recorder" | "rosbag2_player")
 }
 
 /// Whether `rqt_graph`'s "Debug" leaves out this node or topic (`_quiet_filter` of its `dotcode.py`).
@@ -90,27 +75,6 @@ mod tests {
             "/events",
         ] {
             assert!(!is_quiet(name), "{name}");
-        }
-    }
-
-    #[test]
-    fn recorders_are_known_by_their_numbers() {
-        for name in [
-            "/record_1605879",
-            "/play_17",
-            "/rosbag2_recorder",
-            "/_ros2cli_daemon_0",
-        ] {
-            assert!(is_recorder(name), "{name}");
-        }
-        for name in [
-            "/record_",
-            "/record_image",
-            "/play_sound",
-            "/recorder",
-            "/playground_1",
-        ] {
-            assert!(!is_recorder(name), "{name}");
         }
     }
 

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::names::{is_debug, is_params, is_quiet, is_recorder, is_tf};
+use super::names::{is_debug, is_params, is_quiet, is_tf};
 use super::options::{Mode, ViewOptions};
 use crate::graph::{Elements, Node};
+use crate::name::{is_player, is_recorder};
 
 /// Why something is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,7 +32,8 @@ pub(super) struct Selection {
 
 /// Whether a node is a recorder or player, by its name or by what it logs.
 fn records(node: &Node) -> bool {
-    is_recorder(node.name.as_str()) || node.evidence.words().any(|word| word == "recorder")
+    let name = node.name.as_str();
+    is_recorder(name) || is_player(name) || node.evidence.words().any(|word| word == "recorder")
 }
 
 /// How many connections a topic has.
