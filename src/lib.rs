@@ -3,6 +3,29 @@
 //! ```text
 //! bag ──> evidence ──> window ──> graph ──> diff ──> layout ──> scene ──> frame ──> encoder
 //! ```
+//!
+//! [`pipeline`] is that line in the order it happens; everything before the scene decides, everything after it only draws.
+//!
+//! ```
+//! use bagreel::bag::Input;
+//! use bagreel::pipeline::{Reading, Unwatched, read};
+//!
+//! let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+//! let reading = Reading { inputs: vec![Input::Path(bag.into())], ..Reading::default() };
+//! let mission = read(&reading, &mut Unwatched)?;
+//! for window in &mission.windows {
+//!     println!("{}: {} nodes, {} changes", window.index, window.graph.nodes.len(), window.changes.len());
+//! }
+//! # assert!(mission.windows.len() >= 5 && mission.elements.nodes.len() > 5);
+//! # Ok::<(), bagreel::error::Error>(())
+//! ```
+//!
+//! Where to add things: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
+//! `evidence/` and [`evidence::SOURCES`], an output one in `encode/` and [`encode::FORMATS`], a style one in `styles/` and
+//! [`style::BUILTIN`], a layout engine one in `layout/` and [`layout::ENGINES`].
+//!
+//! The library is silent and repeatable: it never prints (but for [`terminal`] and [`cli`]), reads no clock, and writes the
+//! same bytes for the same bag.
 
 pub mod bag;
 pub mod cli;
