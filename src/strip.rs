@@ -126,6 +126,9 @@ fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
     (1..=panels).find(|c| high(*c) <= HIGHEST).unwrap_or(1)
 }
 
+/// How many square pixels of panels a strip on a screen may take for the sake of its text.
+const LARGEST_STRIP: f64 = 24e6;
+
 /// The grid of panels.
 struct Page {
     columns: usize,
@@ -153,7 +156,10 @@ impl Page {
             (width, caption) = (mm * PX_PER_MM, CAPTION.0);
         } else {
             let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
-            width = width.max((legible + GAP) * columns as f64 + GAP);
+            let rows = panels.div_ceil(columns) as f64;
+            let square = natural.h / natural.w.max(1.0) / columns as f64 * rows;
+            let widest = (LARGEST_STRIP / square.max(0.01)).sqrt();
+            width = width.max(((legible + GAP) * columns as f64 + GAP).min(widest));
         }
         let wide = ((width - GAP * (columns as f64 + 1.0)) / columns as f64).max(1.0);
         let scale = wide / natural.w.max(1.0);
