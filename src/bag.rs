@@ -18,7 +18,7 @@ use index::{
     Ask, Body, Index, LONGEST_INDEX, Tally, hand_over, hand_over_slice, nameless, pass, span_of,
     threads,
 };
-use relay::{Clip, Gather, in_order};
+use relay::{Clip, GROUP, Gather, in_order};
 use unknown::explain;
 
 mod index;

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::{
-    Clip, FormatRow, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order,
-    threads,
+    Clip, FormatRow, GROUP, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name,
+    in_order, threads,
 };
 use crate::decompress::Compression;
 use crate::error::{Error, Result};
@@ -143,13 +143,16 @@ fn by_index(
     let chunks: Vec<&Chunk> = summary.chunks.iter().filter(inside).collect();
     let resolve = |raw| summary.resolve(raw);
     let reader = summary::reader(source, &resolve, &wants, range);
-    let work = |at: usize, sink: &mut dyn Sink| reader.read(chunks[at], sink);
-    let total = chunks.len() as u64;
-    let threads = threads(chunks.len(), summary.longest_index());
-    in_order(chunks.len(), threads, &work, sink, |at, sink| {
-        if at % 64 == 0 {
-            sink.progress(at as u64, total);
+    let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
+    let work = |at: usize, sink: &mut dyn Sink| {
+        for chunk in groups[at] {
+            reader.read(chunk, sink);
         }
+    };
+    let total = groups.len() as u64;
+    let threads = threads(chunks.len(), summary.longest_index());
+    in_order(groups.len(), threads, &work, sink, |at, sink| {
+        sink.progress(at as u64 + 1, total);
     });
     let samples = [chunks.first(), chunks.get(chunks.len() / 2), chunks.last()];
     let samples = samples.into_iter().flatten();

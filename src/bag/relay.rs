@@ -206,6 +206,9 @@ impl Sink for Sender {
     }
 }
 
+/// How many chunks are one part: handing over to another thread costs more than reading a small index.
+pub(super) const GROUP: usize = 16;
+
 /// Does `work` on the parts `0..count` on `threads` threads and tells `sink` what they find, in the order of the
 /// parts: the same calls as with one thread. `after` is called when a part has been told.
 ///

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::{
-    Clip, FormatRow, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name, in_order,
-    threads,
+    Clip, FormatRow, GROUP, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name,
+    in_order, threads,
 };
 use crate::decompress::Compression;
 use crate::error::{Error, Result};
@@ -138,18 +138,19 @@ fn by_index(source: &Source, plan: &Plan, range: Option<Span>, sink: &mut Clip<'
     let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();
     let resolve = |raw| plan.table.get(raw);
     let reader = plan.reader(source, &resolve, &wants, range);
-    let work = |at: usize, sink: &mut dyn Sink| reader.read(chunks[at], sink);
-    let total = chunks.len() as u64;
+    let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
+    let work = |at: usize, sink: &mut dyn Sink| {
+        for chunk in groups[at] {
+            reader.read(chunk, sink);
+        }
+    };
+    let total = groups.len() as u64;
     in_order(
-        chunks.len(),
+        groups.len(),
         threads(chunks.len(), plan.longest_index()),
         &work,
         sink,
-        |at, sink| {
-            if at % 64 == 0 {
-                sink.progress(at as u64, total);
-            }
-        },
+        |at, sink| sink.progress(at as u64 + 1, total),
     );
     let complete = !sink.lost;
     let samples = [chunks.first(), chunks.get(chunks.len() / 2), chunks.last()];

@@ -104,11 +104,17 @@ pub(super) const ENTRY: u32 = 12;
 
 /// What a header says; `None` if it is none: a field without a name, or longer than the header.
 pub(super) fn parse(header: &[u8]) -> Option<Record> {
+    let mut fields = Fields::default();
     let mut rest = header;
     while !rest.is_empty() {
-        rest = field(rest)?.2;
+        let (name, value, after) = field(rest)?;
+        rest = after;
+        if fields.count < MOST_FIELDS {
+            fields.all[fields.count] = (name, value);
+            fields.count += 1;
+        }
     }
-    Some(Fields(header).record().unwrap_or(Record::Other))
+    Some(fields.record().unwrap_or(Record::Other))
 }
 
 /// Whether a chunk's record begins here.
@@ -119,19 +125,21 @@ pub(super) fn is_chunk(bytes: &[u8]) -> bool {
     matches!(header.and_then(parse), Some(Record::Chunk { .. }))
 }
 
-/// A header that has been walked through once.
-struct Fields<'a>(&'a [u8]);
+/// Real headers have up to six fields.
+const MOST_FIELDS: usize = 12;
+
+/// The names and values in a header.
+#[derive(Default)]
+struct Fields<'a> {
+    all: [(&'a [u8], &'a [u8]); MOST_FIELDS],
+    count: usize,
+}
 
 impl<'a> Fields<'a> {
     fn get(&self, name: &[u8]) -> Option<&'a [u8]> {
-        let mut rest = self.0;
-        while let Some((found, value, after)) = field(rest) {
-            if found == name {
-                return Some(value);
-            }
-            rest = after;
-        }
-        None
+        let mut all = self.all[..self.count].iter();
+        all.find(|(found, _)| *found == name)
+            .map(|(_, value)| *value)
     }
 
     fn u32(&self, name: &[u8]) -> Option<u32> {

@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{BufWriter, Seek as _, SeekFrom, Write};
+use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
@@ -286,7 +286,8 @@ fn ros1(path: &Path, body: Body, streams: &[Stream], seconds: u32) {
         if len >= 768 * 1024 {
             let first = bag.chunks == 0;
             bag.chunk(&open, first);
-            (len, _) = (0, open.clear());
+            open.clear();
+            len = 0;
         }
     }
     bag.chunk(&open, bag.chunks == 0);
@@ -377,9 +378,10 @@ struct Counter {
 impl Sink for Counter {
     fn connection(&mut self, connection: &Connection) -> Want {
         self.windows.push(BTreeMap::new());
-        match self.logs && connection.topic.as_str() == "/rosout" {
-            true => Want::Payload,
-            false => Want::Stamps,
+        if self.logs && connection.topic.as_str() == "/rosout" {
+            Want::Payload
+        } else {
+            Want::Stamps
         }
     }
 
