@@ -1,6 +1,6 @@
 //! The elements with their ids, and the graph of each window.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::Built;
 use super::lives::Track;
@@ -8,7 +8,7 @@ use super::rates::{Rates, Tally};
 use super::roles::role;
 use super::values::Values;
 use super::windows::Windows;
-use super::{Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, Topic, TopicState};
+use super::{Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, State, Topic, TopicState};
 use crate::collect::Collected;
 use crate::facts::Name;
 use crate::proof::{Trust, What};
@@ -51,6 +51,7 @@ pub(super) fn assemble(
             What::Subscribe(topic, node) => all.subscribe(topic, node, track),
         }
     }
+    all.let_go();
     all.built
 }
 
@@ -67,6 +68,30 @@ struct Assembly<'a> {
 }
 
 impl Assembly<'_> {
+    /// A latched message does not outlive its publishers: once all that are known are gone, and nobody known listens,
+    /// the topic is gone too.
+    fn let_go(&mut self) {
+        let Built {
+            elements, graphs, ..
+        } = &mut self.built;
+        let sent_on: BTreeSet<u32> = elements.publishes.iter().map(|e| e.topic).collect();
+        for graph in graphs {
+            let publishes = graph
+                .publishes
+                .iter()
+                .map(|s| elements.publishes[s.id as usize].topic);
+            let subscribes = graph
+                .subscribes
+                .iter()
+                .map(|s| elements.subscribes[s.id as usize].topic);
+            let linked: BTreeSet<u32> = publishes.chain(subscribes).collect();
+            graph.topics.retain(|topic| {
+                let is_held = topic.state == State::Latched && sent_on.contains(&topic.id);
+                !is_held || linked.contains(&topic.id)
+            });
+        }
+    }
+
     /// Adds up the messages of each publisher.
     fn count_sent(&mut self) {
         for (topic, (streams, rates)) in self.traffic {
