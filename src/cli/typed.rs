@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::encode::FORMATS;
 use crate::time::{Moment, Period, parse_nanos};
 use crate::window::{Align, Length};
 
@@ -48,9 +49,7 @@ pub(super) enum Command {
 pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) inputs: Inputs,
-    /// A file to write; its extension tells the format, `{n}` makes one file per window, `-` is standard output.
-    /// May be given many times; the bag is read once. [default: out/<bag name>.gif]
-    #[arg(long = "output", short, value_name = "FILE")]
+    #[arg(long = "output", short, value_name = "FILE", help = shown(OUTPUT))]
     pub(super) outputs: Vec<String>,
     /// The format of outputs whose name does not tell it (such as `-`).
     #[arg(long, value_name = "WORD")]
@@ -189,10 +188,10 @@ pub(super) struct ViewArgs {
     /// Names of topics to draw, written like `--ns-filter`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
     pub(super) topic_filter: Option<String>,
-    /// Kinds to leave out: debug, dead, leaf, tf, params, unreachable.
+    /// Kinds to leave out, instead of the default `quiet`: debug, dead, leaf, tf, params, unreachable; `none` for nothing.
     #[arg(long, value_name = "KIND,…")]
     pub(super) hide: Option<String>,
-    /// Kinds to draw as one box: actions, tf, images, namespaces=N; `none` for nothing.
+    /// Kinds to draw as one box, instead of the default, which is all: actions, tf, images, namespaces=N; `none` for nothing.
     #[arg(long, value_name = "KIND,…")]
     pub(super) group: Option<String>,
     /// Namespaces to draw as one box each.
@@ -345,6 +344,20 @@ fn bytes(text: &str) -> Result<u64, String> {
         .ok_or_else(|| "write a size such as `5MB` or `500kB`".to_owned())
 }
 
+const OUTPUT: &str = "A file to write; its extension tells the format, `{n}` makes one file per window, `-` is standard \
+    output. May be given many times; the bag is read once. [default: out/<bag name>.gif]";
+
+/// The table of formats, for the end of `render --help`.
 fn outputs_help() -> String {
-    String::new()
+    let rows = FORMATS
+        .iter()
+        .map(|f| format!("  .{:<6} {}", f.word, f.what));
+    let rows: Vec<String> = rows.collect();
+    shown(&format!("Outputs, by extension:\n{}", rows.join("\n")))
+}
+
+/// A help text in which `{n}` stands as it is: clap would make a new line of it, so a style that changes nothing, and
+/// that is left out where there is no terminal, comes in between.
+fn shown(text: &str) -> String {
+    text.replace("{n}", "{\u{1b}[0mn}")
 }
