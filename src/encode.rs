@@ -114,8 +114,10 @@ fn single<'a>(film: &Film<'a>, target: &Target, strip: bool) -> Result<Single<'a
 
 /// A format at work on one output. What it has not finished leaves no trace when it is dropped.
 pub trait Encoder: Send {
-    /// What it wants of every frame.
-    fn needs(&self) -> Needs;
+    /// What it wants of every frame; nothing where it writes from the film when that is over.
+    fn needs(&self) -> Needs {
+        Needs::Nothing
+    }
 
     /// Whether it plays: then it is given the staged frames too, not only the windows.
     fn plays(&self) -> bool {
@@ -126,7 +128,9 @@ pub trait Encoder: Send {
     ///
     /// # Errors
     /// [`Error::Io`] with the output's path where it cannot be written.
-    fn frame(&mut self, frame: &Frame<'_>) -> Result<()>;
+    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
+        Ok(())
+    }
 
     /// Ends the output and gives it its final name.
     ///
@@ -160,14 +164,6 @@ impl<'a, W: FnOnce() -> (String, Vec<String>) + Send + 'a> AtOnce<W> {
 }
 
 impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
-    fn needs(&self) -> Needs {
-        Needs::Nothing
-    }
-
-    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
-        Ok(())
-    }
-
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut written = Written::to(&self.target);
         let mut sink = Sink::create(&self.target, None)?;

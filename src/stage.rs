@@ -13,7 +13,7 @@ use crate::picture::{Part, Union};
 use crate::scene::{Form, Group, Piece, Step};
 use crate::spells::word;
 use crate::style::Style;
-use crate::svg::escape;
+use crate::svg::{escape, units};
 use crate::text::is_invisible;
 use crate::view::{Mark, View};
 
@@ -264,21 +264,6 @@ fn fine(out: &mut String, form: &Form, class: &str) {
 /// Rounds to whole pixels; what is no number becomes 0.
 fn whole(value: f64) -> i64 {
     units(value, 1)
-}
-
-/// In units of 1/`parts`.
-fn units(value: f64, parts: i64) -> i64 {
-    let value = if value.is_finite() {
-        value.clamp(-1e7, 1e7)
-    } else {
-        0.0
-    };
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "held below 1e9 on the line above"
-    )]
-    let units = libm::round(value * parts as f64) as i64;
-    units
 }
 
 fn tenth(value: f64) -> String {

@@ -269,8 +269,8 @@ fn fine(out: &mut String, value: f64) {
     write_decimal(out, value, 100);
 }
 
-/// `value` in units of 1/`parts` (10 or 100), without trailing zeros.
-fn write_decimal(out: &mut String, value: f64, parts: i64) {
+/// In whole units of 1/`parts` (1 to 100); what is no number becomes 0.
+pub(crate) fn units(value: f64, parts: i64) -> i64 {
     let value = if value.is_finite() {
         value.clamp(-1e7, 1e7)
     } else {
@@ -281,6 +281,12 @@ fn write_decimal(out: &mut String, value: f64, parts: i64) {
         reason = "held below 1e9 on the line above"
     )]
     let units = libm::round(value * parts as f64) as i64;
+    units
+}
+
+/// `value` in units of 1/`parts` (10 or 100), without trailing zeros.
+fn write_decimal(out: &mut String, value: f64, parts: i64) {
+    let units = units(value, parts);
     if units < 0 {
         out.push('-');
     }

@@ -4,7 +4,7 @@
 
 use csv::Writer;
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Written};
 use crate::diff::Change;
 use crate::error::{Error, Result};
 use crate::evidence::Evidence;
@@ -78,14 +78,6 @@ pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn E
 }
 
 impl Encoder for Tables<'_> {
-    fn needs(&self) -> Needs {
-        Needs::Nothing
-    }
-
-    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
-        Ok(())
-    }
-
     fn finish(self: Box<Self>) -> Result<Written> {
         let write = |table| write(self.evolution, table, &self.target.with_word(table.word));
         // All of them are whole before the first one gets its name.

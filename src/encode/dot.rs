@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Written};
 use crate::dot::{Drawing, Profile, union};
 use crate::error::Result;
 use crate::film::Film;
@@ -32,14 +32,6 @@ pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn E
 }
 
 impl Encoder for Graphs<'_> {
-    fn needs(&self) -> Needs {
-        Needs::Nothing
-    }
-
-    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
-        Ok(())
-    }
-
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut written = Written::to(&self.target);
         let frames = &self.film.view.frames;

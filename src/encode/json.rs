@@ -1,6 +1,6 @@
 //! The evolution as JSON, as it is read back by every command.
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Written};
 use crate::error::Result;
 use crate::evolution::{self, Evolution};
 use crate::film::Film;
@@ -24,14 +24,6 @@ pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn E
 }
 
 impl Encoder for Data<'_> {
-    fn needs(&self) -> Needs {
-        Needs::Nothing
-    }
-
-    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
-        Ok(())
-    }
-
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut sink = Sink::create(&self.target, None)?;
         evolution::write_json(self.evolution, &mut sink).map_err(sink.error())?;

@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Written};
 use crate::dot::union;
 use crate::error::Result;
 use crate::film::Film;
@@ -27,14 +27,6 @@ pub(super) fn start<'a>(film: &'a Film<'a>, target: &Target) -> Result<Box<dyn E
 }
 
 impl Encoder for Charts<'_> {
-    fn needs(&self) -> Needs {
-        Needs::Nothing
-    }
-
-    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
-        Ok(())
-    }
-
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut written = Written::to(&self.target);
         let frames = &self.view.frames;

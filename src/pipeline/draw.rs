@@ -66,16 +66,21 @@ pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn 
         collapse(evolution, drawing, &wish, &mut options, &mut best);
         open_again(evolution, drawing, &wish, (&mut options, asked), &mut best);
     }
-    let (view, mut notices) = view(evolution, &options);
+    let Attempt {
+        view,
+        mut notices,
+        layout,
+        ..
+    } = best;
     notices.extend(told(&options.collapse[asked..], &drawing.wish, &wish));
     notices.extend(picture::unshown(&view, &drawing.fonts));
-    let remarks = best.layout.remarks.iter();
+    let remarks = layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
     Composed {
         view,
         options,
         wish,
-        layout: best.layout,
+        layout,
         notices,
     }
 }
@@ -93,6 +98,8 @@ pub(super) fn unplaced(evolution: &Evolution, drawing: &Drawing) -> Composed {
 
 /// A layout of what some options show.
 struct Attempt {
+    view: View,
+    notices: Notices,
     layout: Layout,
     /// The size of its smallest text in pixels.
     text: f64,
@@ -101,7 +108,7 @@ struct Attempt {
 impl Attempt {
     fn new(evolution: &Evolution, drawing: &Drawing, options: &ViewOptions, wish: &Wish) -> Self {
         // The widest labels depend on rates, so that the windows are needed too.
-        let (view, _) = view(evolution, options);
+        let (view, notices) = view(evolution, options);
         let sketch = Sketch::new(&view, &drawing.style, &drawing.fonts, wish.clone());
         let (plan, page) = (sketch.plan(), sketch.layout_wish());
         let layout = match &drawing.kept {
@@ -109,7 +116,12 @@ impl Attempt {
             Some(kept) => extend(plan, &page, drawing.engine, &known(&view, kept)),
         };
         let text = sketch.text_px(&layout);
-        Self { layout, text }
+        Self {
+            view,
+            notices,
+            layout,
+            text,
+        }
     }
 
     fn is_readable(&self) -> bool {
