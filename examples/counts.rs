@@ -7,8 +7,8 @@
 use std::collections::BTreeMap;
 
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
-use bagreel::notice::Notice;
-use bagreel::time::Stamp;
+use bagreel::base::notice::Notice;
+use bagreel::base::time::Stamp;
 
 #[derive(Default)]
 struct Counts {
@@ -88,7 +88,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let connections: Vec<_> = counts
         .connections
         .iter()
-        .map(|c| serde_json::json!({"topic": c.topic.as_str(), "type": &*c.type_name, "publisher": c.publisher.as_ref().map(bagreel::name::NodeName::as_str),
+        .map(|c| serde_json::json!({"topic": c.topic.as_str(), "type": &*c.type_name, "publisher": c.publisher.as_ref().map(bagreel::base::name::NodeName::as_str),
             "latching": c.latching, "qos": c.qos.is_some(), "hash": c.type_hash.as_deref()}))
         .collect();
     let json = serde_json::json!({

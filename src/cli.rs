@@ -1,7 +1,8 @@
 //! What was typed, turned into work; the only file (with its folder) that knows clap and the environment.
 
+mod args;
 mod look;
-mod typed;
+pub mod terminal;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -9,19 +10,19 @@ use std::path::{Path, PathBuf};
 use clap::{CommandFactory as _, Parser as _};
 
 use crate::bag::Input;
-use crate::collect;
-use crate::encode::Output;
-use crate::error::Error;
-use crate::evolution::Evolution;
+use crate::base::error::Error;
+use crate::cli::terminal::Terminal;
+use crate::evidence::collector;
+use crate::evidence::topology;
+use crate::export::Output;
 use crate::graph;
-use crate::info::{SurveyRow, json, survey_csv, survey_text};
+use crate::graph::window::{Division, Length};
+use crate::mission::Mission;
+use crate::mission::info::{SurveyRow, json, survey_csv, survey_text};
 use crate::pipeline::{
     Drawing, Reading, Render, Rendered, Watch as _, explain, is_survey, read, survey,
 };
-use crate::terminal::Terminal;
-use crate::topology;
-use crate::window::{Division, Length};
-use typed::{
+use args::{
     Command, EventsArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs, TimeArgs, Typed,
 };
 
@@ -84,10 +85,10 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
             align: time.align,
         },
         skip_unchanged: time.skip_unchanged,
-        collect: collect::Options {
+        collect: collector::Options {
             sizes: graph.bytes,
             infer_stamps: graph.infer.is_some(),
-            ..collect::Options::default()
+            ..collector::Options::default()
         },
         graph: graph::Options {
             grace: graph.grace.unwrap_or(0) as usize,
@@ -107,8 +108,8 @@ fn input(path: &Path) -> Input {
 }
 
 /// The exit code of a mission that was read.
-fn code(evolution: &Evolution) -> u8 {
-    if evolution.notices.any_loss() {
+fn code(mission: &Mission) -> u8 {
+    if mission.notices.any_loss() {
         SKIPPED
     } else {
         DONE
@@ -122,13 +123,13 @@ fn render(args: &RenderArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     }
     let done = crate::pipeline::render(&job, terminal)?;
     report(&done, args.timings, terminal);
-    Ok(code(&done.evolution))
+    Ok(code(&done.mission))
 }
 
 /// Draws again whenever the style file changes, until interrupted. The bag is read once.
 fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<u8, Error> {
     crate::pipeline::check(&job)?;
-    let evolution = read(&job.reading, terminal)?;
+    let mission = read(&job.reading, terminal)?;
     let path = PathBuf::from(&args.look.style);
     if !path.is_file() {
         return Err(Error::usage(
@@ -147,23 +148,23 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
         let style = look::style(&args.look.style);
         let drawn = style.and_then(|style| {
             job.drawing.style = style;
-            crate::pipeline::show(&job, evolution.clone(), terminal)
+            crate::pipeline::show(&job, mission.clone(), terminal)
         });
         match drawn {
             Ok(done) => report(&done, args.timings, terminal),
             Err(error) => terminal.error(&error),
         }
     }
-    Ok(code(&evolution))
+    Ok(code(&mission))
 }
 
 /// Tells what was written, how many windows and changes, in what time.
 fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
-    let evolution = &done.evolution;
+    let mission = &done.mission;
     for remark in done.written.iter().flat_map(|w| &w.remarks) {
         terminal.note(remark);
     }
-    terminal.notices(&evolution.notices);
+    terminal.notices(&mission.notices);
     if timings {
         terminal.timings();
     }
@@ -172,13 +173,13 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
         .iter()
         .map(|w| w.path.display().to_string())
         .collect();
-    let changes: usize = evolution.windows.iter().map(|w| w.changes.len()).sum();
-    let windows = evolution.windows.len();
+    let changes: usize = mission.windows.iter().map(|w| w.changes.len()).sum();
+    let windows = mission.windows.len();
     let seconds = terminal.seconds();
     terminal.say(&format!(
         "wrote {}: {windows} windows of {}, {changes} changes, in {seconds:.1} s",
         names.join(", "),
-        evolution.period
+        mission.period
     ));
 }
 
@@ -206,13 +207,13 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             view: look::view(&args.view)?,
             style: look::style(&args.look.style)?,
             fonts: look::fonts(args.look.font.as_deref())?,
-            wish: look::wish(&args.look, title, args.graph.rate_change),
+            page: look::options(&args.look, title, args.graph.rate_change),
             is_sized: args.look.size.is_some(),
             is_fitted: args.look.fit == "auto",
             engine: crate::layout::engine(&args.look.layout)?,
             kept: look::kept(args.look.layout_from.as_deref())?,
         },
-        sequence: crate::film::Options {
+        sequence: crate::export::sequence::Options {
             append_to: summary(),
             ..look::sequence(&args.sequence)?
         },
@@ -253,16 +254,16 @@ fn default_output(inputs: &[Input]) -> String {
 }
 
 fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let evolution = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
-    for event in crate::events::events(&evolution) {
+    let mission = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
+    for event in crate::mission::events::events(&mission) {
         terminal.results(&format!(
             "{:>12}  {}\n",
-            event.at(&evolution),
+            event.at(&mission),
             event.sentence()
         ));
     }
-    terminal.notices(&evolution.notices);
-    Ok(code(&evolution))
+    terminal.notices(&mission.notices);
+    Ok(code(&mission))
 }
 
 fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
@@ -285,18 +286,18 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     if !args.why.is_empty() {
         let mut reading = reading;
         reading.collect.why.clone_from(&args.why);
-        let (evolution, pieces) = explain(&reading, terminal)?;
-        terminal.results(&crate::info::why(&evolution, &args.why, &pieces)?);
-        terminal.notices(&evolution.notices);
-        return Ok(code(&evolution));
+        let (mission, pieces) = explain(&reading, terminal)?;
+        terminal.results(&crate::mission::info::why(&mission, &args.why, &pieces)?);
+        terminal.notices(&mission.notices);
+        return Ok(code(&mission));
     }
-    let evolution = read(&reading, terminal)?;
-    let info = crate::info::info(&evolution);
+    let mission = read(&reading, terminal)?;
+    let info = crate::mission::info::info(&mission);
     terminal.results(&match args.format {
-        InfoFormat::Text => crate::info::text(&info),
+        InfoFormat::Text => crate::mission::info::text(&info),
         InfoFormat::Json => json(&info),
         InfoFormat::Csv => {
-            let path = evolution
+            let path = mission
                 .bags
                 .first()
                 .map(|b| b.name.clone())
@@ -308,13 +309,13 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
             }])
         }
     });
-    terminal.notices(&evolution.notices);
-    Ok(code(&evolution))
+    terminal.notices(&mission.notices);
+    Ok(code(&mission))
 }
 
 fn styles(name: Option<&str>, terminal: &mut Terminal) -> Result<u8, Error> {
     match name {
-        Some(name) => terminal.results(crate::style::builtin_text(name)?),
+        Some(name) => terminal.results(crate::draw::style::builtin_text(name)?),
         None => terminal.results(&look::styles()),
     }
     Ok(DONE)

@@ -3,22 +3,15 @@
 //! A graph holds numbers only; names stand once, in the [`Elements`] of the whole mission, sorted, so that an index
 //! is an order and equal graphs are equal bytes.
 
-mod assemble;
 mod build;
-mod lives;
-mod proofs;
-mod rates;
-mod restarts;
-mod roles;
-mod settle;
-mod values;
-mod windows;
+pub mod diff;
+pub mod window;
 
 use std::sync::Arc;
 
+use crate::base::name::{NodeName, TopicName};
+use crate::base::time::Stamp;
 use crate::evidence::{Degree, Evidence};
-use crate::name::{NodeName, TopicName};
-use crate::time::Stamp;
 
 pub use build::{Built, Options, build};
 

@@ -2,27 +2,18 @@
 //!
 //! An engine sees sizes and connections only, never colours, rates or changes.
 
-mod acyclic;
-mod crude;
-mod cut;
-mod detour;
-mod fold;
+mod grid;
 mod isotonic;
-mod keep;
-mod labels;
 mod layered;
+mod layers;
 mod layout_rs;
-mod order;
 mod pack;
-mod parts;
-mod place;
-mod rank;
-mod room;
-mod route;
-mod sorter;
+mod pinned;
+mod routes;
+mod spacing;
 
-use crate::error::{Error, Result};
-use crate::geometry::{Point, Rect, Size};
+use crate::base::error::{Error, Result};
+use crate::base::geometry::{Point, Rect, Size};
 use isotonic::monotone;
 
 /// The outline that a route must end at.
@@ -98,7 +89,7 @@ impl Orientation {
 
 /// What the caller wants of a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub struct Options {
     /// The page to fill, in pixels: its aspect steers packing and the choice of orientation.
     pub page: Size,
     /// The orientation; `None` takes the better one.
@@ -140,7 +131,7 @@ pub trait Engine {
     ///
     /// # Errors
     /// Where the engine cannot do this plan; the caller may then take another.
-    fn lay_out(&self, plan: &Plan, wish: &Wish) -> Result<Layout>;
+    fn lay_out(&self, plan: &Plan, options: &Options) -> Result<Layout>;
 }
 
 /// Clusters are nested at most this deep; what is deeper is drawn in its ancestor.
@@ -170,10 +161,10 @@ pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
 /// The layout of this plan by this engine; where the engine cannot, by the default one with a remark.
 ///
 /// Impossible numbers are taken for zero, links and clusters that name nothing are left out.
-pub fn lay_out(plan: &Plan, wish: &Wish, engine: &dyn Engine) -> Layout {
-    let (plan, wish) = (plan.sane(), wish.sane());
-    engine.lay_out(&plan, &wish).unwrap_or_else(|error| {
-        let mut layout = layered::lay_out(&plan, &wish);
+pub fn lay_out(plan: &Plan, options: &Options, engine: &dyn Engine) -> Layout {
+    let (plan, options) = (plan.sane(), options.sane());
+    engine.lay_out(&plan, &options).unwrap_or_else(|error| {
+        let mut layout = layered::lay_out(&plan, &options);
         layout.remarks.push(error.to_string());
         layout
     })
@@ -183,8 +174,13 @@ pub fn lay_out(plan: &Plan, wish: &Wish, engine: &dyn Engine) -> Layout {
 /// a new one. New boxes stand near what they are linked to; frames and routes are found anew.
 ///
 /// Where nothing moved and nothing is new, this is the layout of [`lay_out`].
-pub fn extend(plan: &Plan, wish: &Wish, engine: &dyn Engine, known: &[Option<Rect>]) -> Layout {
-    let fresh = lay_out(plan, wish, engine);
+pub fn extend(
+    plan: &Plan,
+    options: &Options,
+    engine: &dyn Engine,
+    known: &[Option<Rect>],
+) -> Layout {
+    let fresh = lay_out(plan, options, engine);
     let same = |(now, then): (&Rect, &Option<Rect>)| {
         then.is_some_and(|then| (now.x - then.x).abs() < 1.0 && (now.y - then.y).abs() < 1.0)
     };
@@ -194,15 +190,15 @@ pub fn extend(plan: &Plan, wish: &Wish, engine: &dyn Engine, known: &[Option<Rec
         return fresh;
     }
     let plan = plan.sane();
-    let mut layout = keep::kept(&plan, known, fresh.orientation);
-    let (routes, straight) = detour::routes(&plan, &layout.boxes);
+    let mut layout = pinned::kept(&plan, known, fresh.orientation);
+    let (routes, straight) = routes::around::routes(&plan, &layout.boxes);
     layout.routes = routes;
     if straight > 0 {
         layout.remarks.push(format!(
             "{straight} edges found no way around the kept boxes"
         ));
     }
-    labels::place(&plan, &mut layout);
+    layered::labels::place(&plan, &mut layout);
     layout
 }
 
@@ -303,7 +299,7 @@ impl Route {
     }
 }
 
-impl Wish {
+impl Options {
     fn sane(&self) -> Self {
         let page = sane_size(self.page);
         Self {

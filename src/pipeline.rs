@@ -2,13 +2,13 @@
 
 mod captions;
 mod draw;
+mod export;
 mod read;
-mod render;
 mod survey;
 
 pub use draw::Drawing;
+pub use export::{Render, Rendered, check, render, show};
 pub use read::{Reading, explain, read};
-pub use render::{Render, Rendered, check, render, show};
 pub use survey::{is_survey, survey};
 
 /// A part of the work, as progress and timings tell it.

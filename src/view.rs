@@ -1,30 +1,30 @@
 //! What the picture shows: the full graph filtered, grouped and collapsed; the full graph stays as it is.
 
-use std::sync::Arc;
-
-use crate::evidence::Degree;
-use crate::evolution::Evolution;
-use crate::graph::{Element, State};
-use crate::notice::Notices;
-use crate::time::Span;
-
 mod caption;
-mod cast;
 mod cluster;
 mod collapse;
+mod counts;
 mod filter;
 mod filtered;
 mod frames;
 mod group;
+mod hidden;
+mod items;
+mod marks;
 mod names;
-mod news;
-mod notes;
 mod options;
-mod present;
+pub mod runs;
 mod select;
-mod tally;
-#[cfg(test)]
-pub(crate) mod testing;
+mod state;
+pub mod union;
+
+use std::sync::Arc;
+
+use crate::base::notice::Notices;
+use crate::base::time::Span;
+use crate::evidence::Degree;
+use crate::graph::{Element, State};
+use crate::mission::Mission;
 
 pub use caption::hertz;
 pub use collapse::Candidate;
@@ -33,25 +33,25 @@ pub use filtered::filtered;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 
 /// What the picture shows of a mission, and a notice for everything that it leaves out.
-pub fn view(evolution: &Evolution, options: &ViewOptions) -> (View, Notices) {
-    let cast = cast::Cast::new(&evolution.elements, options);
-    let notices = notes::notes(&evolution.elements, &cast, options);
-    let frames = frames::frames(evolution, options, &cast);
-    (stage(cast, options, frames), notices)
+pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
+    let viewed = items::Viewed::new(&mission.elements, options);
+    let notices = hidden::notes(&mission.elements, &viewed, options);
+    let frames = frames::frames(mission, options, &viewed);
+    (stage(viewed, options, frames), notices)
 }
 
 /// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
-pub fn outline(evolution: &Evolution, options: &ViewOptions) -> View {
-    let cast = cast::Cast::new(&evolution.elements, options);
-    stage(cast, options, Vec::new())
+pub fn outline(mission: &Mission, options: &ViewOptions) -> View {
+    let viewed = items::Viewed::new(&mission.elements, options);
+    stage(viewed, options, Vec::new())
 }
 
-fn stage(cast: cast::Cast, options: &ViewOptions, frames: Vec<Frame>) -> View {
-    let mut items = cast.items;
+fn stage(viewed: items::Viewed, options: &ViewOptions, frames: Vec<Frame>) -> View {
+    let mut items = viewed.items;
     let namespaces = cluster::clusters(&mut items, options.group.namespaces);
     View {
         items,
-        arrows: cast.arrows,
+        arrows: viewed.arrows,
         namespaces,
         frames,
     }
@@ -192,7 +192,7 @@ pub struct Shown {
 
 /// How many changes of each kind a window shows, for chips and captions; they count the viewed graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct Counts {
     /// Nodes that appeared.
     pub nodes_added: usize,
     /// Nodes that vanished.
@@ -227,7 +227,7 @@ pub struct Frame {
     /// Arrows in the window, ghosts included, sorted by id.
     pub arrows: Vec<Shown>,
     /// Changes counted.
-    pub tally: Tally,
+    pub tally: Counts,
     /// What changed, in words, the most important first: `camera_driver appeared`; empty when nothing did.
     pub caption: Vec<String>,
 }
@@ -245,3 +245,34 @@ pub struct View {
     /// The windows.
     pub frames: Vec<Frame>,
 }
+
+impl View {
+    /// Whether window `k` shows a change.
+    pub fn is_changed(&self, k: usize) -> bool {
+        self.frames.get(k).is_some_and(|frame| {
+            let mut shown = frame.items.iter().chain(&frame.arrows);
+            shown.any(|s| s.mark.is_some()) || !frame.caption.is_empty()
+        })
+    }
+
+    /// The place of the window that shows most; the first of several.
+    pub fn busiest(&self) -> usize {
+        let is_there = |s: &&Shown| s.mark != Some(Mark::Removed);
+        let mut best = (0, 0);
+        for (at, frame) in self.frames.iter().enumerate() {
+            let there = frame
+                .items
+                .iter()
+                .chain(&frame.arrows)
+                .filter(is_there)
+                .count();
+            if there > best.1 {
+                best = (at, there);
+            }
+        }
+        best.0
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod testing;

@@ -5,23 +5,25 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use bagreel::encode::{Output, Written};
-use bagreel::error::{Error, Result};
-use bagreel::evolution::Evolution;
-use bagreel::film::{Film, Options, Scenes};
-use bagreel::geometry::{Rect, Size};
-use bagreel::pixels::Painter;
-use bagreel::scene::{Form, Group, Scene, Shape};
-use bagreel::style::Style;
-use bagreel::text::Fonts;
-use bagreel::time::{Period, Span, Stamp};
-use bagreel::view::{Frame, Tally, View};
-use bagreel::{graph, notice, reel};
+use bagreel::base::error::{Error, Result};
+use bagreel::base::geometry::{Rect, Size};
+use bagreel::base::notice;
+use bagreel::base::time::{Period, Span, Stamp};
+use bagreel::draw::paint::raster::Painter;
+use bagreel::draw::scene::{Form, Group, Scene, Shape};
+use bagreel::draw::style::Style;
+use bagreel::draw::text::Fonts;
+use bagreel::export::run;
+use bagreel::export::sequence::{Drawings, Options, Sequence};
+use bagreel::export::{Output, Written};
+use bagreel::graph;
+use bagreel::mission::Mission;
+use bagreel::view::{Counts, Frame, View};
 
 /// A disc that moves through every window, over discs in all colours.
 struct Discs;
 
-impl Scenes for Discs {
+impl Drawings for Discs {
     fn scene(&self, window: usize, phase: f64) -> Scene {
         let style = Style::builtin("light").unwrap();
         let mut group = Group::named("discs");
@@ -46,10 +48,10 @@ impl Scenes for Discs {
 }
 
 /// Windows of which the odd ones show a change.
-fn mission(windows: usize) -> (Evolution, View) {
+fn mission(windows: usize) -> (Mission, View) {
     let second = |i: usize| Stamp(i64::try_from(i).unwrap() * 1_000_000_000);
     let period = Period::parse("1s").unwrap();
-    let evolution = Evolution {
+    let mission = Mission {
         bags: Vec::new(),
         span: Span {
             start: second(0),
@@ -73,7 +75,7 @@ fn mission(windows: usize) -> (Evolution, View) {
         messages: 0,
         items: Vec::new(),
         arrows: Vec::new(),
-        tally: Tally::default(),
+        tally: Counts::default(),
         caption: (index % 2 == 1)
             .then(|| "it moved".to_owned())
             .into_iter()
@@ -81,7 +83,7 @@ fn mission(windows: usize) -> (Evolution, View) {
     };
     let frames = (0..windows).map(frame).collect();
     (
-        evolution,
+        mission,
         View {
             frames,
             ..View::default()
@@ -105,13 +107,13 @@ fn shown(outputs: &[Output], options: Options) -> Result<Vec<Written>> {
 fn run(
     outputs: &[Output],
     options: Options,
-    progress: &mut reel::Progress<'_>,
+    progress: &mut run::Progress<'_>,
 ) -> Result<Vec<Written>> {
-    let (evolution, view) = mission(8);
+    let (mission, view) = mission(8);
     let fonts = Fonts::bundled();
-    let film = Film {
-        evolution: &evolution,
-        data: &evolution,
+    let sequence = Sequence {
+        mission: &mission,
+        data: &mission,
         view: &view,
         picture: &Discs,
         painter: &Painter::new(&fonts),
@@ -119,7 +121,7 @@ fn run(
         strip: None,
         options,
     };
-    reel::run(&film, outputs, progress)
+    run::run(&sequence, outputs, progress)
 }
 
 fn png(path: &Path) -> image::RgbImage {

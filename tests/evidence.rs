@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
-use bagreel::collect::{Collector, Options};
+use bagreel::base::notice::Notice;
+use bagreel::base::time::{Span, Stamp};
+use bagreel::evidence::collector::{Collector, Options};
 use bagreel::graph::{self, Built};
-use bagreel::notice::Notice;
-use bagreel::time::{Span, Stamp};
 
 const SECOND: i64 = 1_000_000_000;
 

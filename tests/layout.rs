@@ -3,19 +3,23 @@
 #[path = "bench/layout/measure.rs"]
 mod measure;
 
-use bagreel::geometry::{Point, Rect, Size};
-use bagreel::layout::{self, Cluster, Layout, Link, Orientation, Outline, Plan, Vertex, Wish};
+use bagreel::base::geometry::{Point, Rect, Size};
+use bagreel::layout::{self, Cluster, Layout, Link, Orientation, Outline, Plan, Vertex};
 use proptest::prelude::*;
 
-fn wish(orientation: Option<Orientation>) -> Wish {
-    Wish {
+fn options(orientation: Option<Orientation>) -> layout::Options {
+    layout::Options {
         page: Size::new(1280.0, 560.0),
         orientation,
     }
 }
 
 fn laid_out(plan: &Plan, orientation: Option<Orientation>) -> Layout {
-    layout::lay_out(plan, &wish(orientation), layout::engine("layered").unwrap())
+    layout::lay_out(
+        plan,
+        &options(orientation),
+        layout::engine("layered").unwrap(),
+    )
 }
 
 fn plans() -> impl Strategy<Value = Plan> {
@@ -121,7 +125,7 @@ proptest! {
         let before = laid_out(&plan, None);
         let places: Vec<Option<Rect>> =
             before.boxes.iter().zip(known).map(|(rect, known)| known.then_some(*rect)).collect();
-        let after = layout::extend(&plan, &wish(None), layout::engine("layered").unwrap(), &places);
+        let after = layout::extend(&plan, &options(None), layout::engine("layered").unwrap(), &places);
         for (rect, place) in after.boxes.iter().zip(&places) {
             let moved = |place: &Rect| (place.x - rect.x).abs() + (place.y - rect.y).abs();
             prop_assert!(place.as_ref().is_none_or(|place| moved(place) < 1e-6));
@@ -131,7 +135,7 @@ proptest! {
 
     #[test]
     fn the_second_engine_keeps_boxes_apart(plan in plans()) {
-        let layout = layout::lay_out(&plan, &wish(None), layout::engine("layout-rs").unwrap());
+        let layout = layout::lay_out(&plan, &options(None), layout::engine("layout-rs").unwrap());
         let found = measure::measure(&plan, &layout);
         prop_assert_eq!((found.overlaps, found.label_overlaps), (0, 0));
     }
@@ -204,7 +208,11 @@ fn a_graph_too_large_for_layers_is_laid_out_all_the_same() {
 #[test]
 fn nothing_needs_no_room() {
     for (word, _) in layout::ENGINES {
-        let layout = layout::lay_out(&Plan::default(), &wish(None), layout::engine(word).unwrap());
+        let layout = layout::lay_out(
+            &Plan::default(),
+            &options(None),
+            layout::engine(word).unwrap(),
+        );
         assert_eq!(layout.size, Size::default(), "{word}");
     }
 }
@@ -242,7 +250,7 @@ fn a_broken_plan_is_laid_out_all_the_same() {
         ],
     };
     for (word, _) in layout::ENGINES {
-        let page = Wish {
+        let page = layout::Options {
             page: odd,
             orientation: None,
         };

@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 /// Runs `bagreel render` on this evolution and returns the folder with `x.` and each of the extensions.
-fn rendered(evolution: &Value, extensions: &[&str]) -> TempDir {
+fn rendered(mission: &Value, extensions: &[&str]) -> TempDir {
     let folder = TempDir::new().unwrap();
     let input = folder.path().join("in.json");
-    fs::write(&input, evolution.to_string()).unwrap();
+    fs::write(&input, mission.to_string()).unwrap();
     render(&input, folder.path(), extensions);
     folder
 }
@@ -35,7 +35,7 @@ fn render(input: &Path, folder: &Path, extensions: &[&str]) {
 
 /// A mission of windows of ten seconds in which everybody publishes a topic of their own to a listener; who is there
 /// and how fast depends on the window.
-fn mission(names: &[&str], windows: usize) -> Value {
+fn running(names: &[&str], windows: usize) -> Value {
     let start = 1_700_000_000_000_000_000_i64;
     let window = |w: usize| {
         let there = |i: &usize| i.is_multiple_of(3) || !(w / 7 + i).is_multiple_of(4);
@@ -95,9 +95,9 @@ const HOSTILE: [&str; 10] = [
 #[test]
 fn a_browser_plays_the_page_as_the_evolution_says() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let evolution = mission(&ROBOT, 50);
-    let pages = rendered(&evolution, &["html", "svg", "json"]);
-    let hostile = rendered(&mission(&HOSTILE, 12), &["html"]);
+    let mission = running(&ROBOT, 50);
+    let pages = rendered(&mission, &["html", "svg", "json"]);
+    let hostile = rendered(&running(&HOSTILE, 12), &["html"]);
     let file = |folder: &TempDir, name: &str| folder.path().join(name);
     let driven = Command::new("python3")
         .arg(root.join("tests/browser/drive.py"))
@@ -126,7 +126,7 @@ fn a_browser_plays_the_page_as_the_evolution_says() {
 
 #[test]
 fn a_page_asks_for_nothing_and_lets_nothing_in() {
-    let pages = rendered(&mission(&HOSTILE, 12), &["html", "svg"]);
+    let pages = rendered(&running(&HOSTILE, 12), &["html", "svg"]);
     let page = fs::read_to_string(pages.path().join("x.html")).unwrap();
     assert!(page.contains("default-src 'none';script-src 'sha256-"));
     for bad in [
@@ -156,7 +156,7 @@ fn a_page_asks_for_nothing_and_lets_nothing_in() {
 
 #[test]
 fn a_report_carries_no_markup_from_names() {
-    let pages = rendered(&mission(&HOSTILE, 12), &["md", "mmd"]);
+    let pages = rendered(&running(&HOSTILE, 12), &["md", "mmd"]);
     let report = fs::read_to_string(pages.path().join("x.md")).unwrap();
     // Mermaid has entities of its own.
     let (before, rest) = report.split_once("```mermaid").unwrap();
@@ -185,7 +185,7 @@ fn a_report_carries_no_markup_from_names() {
 fn a_job_summary_is_added_to() {
     let folder = TempDir::new().unwrap();
     let (input, summary) = (folder.path().join("in.json"), folder.path().join("summary"));
-    fs::write(&input, mission(&ROBOT, 9).to_string()).unwrap();
+    fs::write(&input, running(&ROBOT, 9).to_string()).unwrap();
     fs::write(&summary, "before\n").unwrap();
     let done = Command::new(env!("CARGO_BIN_EXE_bagreel"))
         .arg("render")

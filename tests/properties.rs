@@ -1,7 +1,7 @@
 //! What holds for every graph and every mission, tried on random ones.
 
-use bagreel::diff::{apply, diff};
 use bagreel::evidence::Degree;
+use bagreel::graph::diff::{apply, diff};
 use bagreel::graph::{EdgeState, Graph, NodeState, State, TopicState};
 use proptest::collection::btree_map;
 use proptest::prelude::*;

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bagreel::bag::Input;
-use bagreel::evolution::Evolution;
+use bagreel::base::time::Period;
+use bagreel::graph::window::{Division, Length};
+use bagreel::mission::Mission;
 use bagreel::pipeline::{Reading, Unwatched, read};
-use bagreel::time::Period;
-use bagreel::window::{Division, Length};
 
 /// The mission in 10-second windows.
-fn mission() -> Evolution {
+fn mission() -> Mission {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
     let length = Period::parse("10").map_or(Length::Auto, Length::Fixed);
     let reading = Reading {
@@ -63,7 +63,7 @@ fn every_count_equals_that_of_an_independent_reader() {
 }
 
 /// Whether a node is there in the window that begins at this second of the mission.
-fn alive(mission: &Evolution, node: &str, second: usize) -> bool {
+fn alive(mission: &Mission, node: &str, second: usize) -> bool {
     let graph = &mission.windows[second / 10].graph;
     graph.nodes.iter().any(|n| {
         mission.elements.nodes[n.id as usize]

@@ -3,23 +3,23 @@
 use std::io;
 use std::ops::Range;
 
-use super::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
-use crate::decompress::Compression;
-use crate::notice::{Notice, NoticeKind};
-use crate::source::{FAR, NEAR, Source, Stream};
-use crate::time::{Span, Stamp};
+use crate::bag::decompress::Compression;
+use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
+use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::{Span, Stamp};
 
 /// What index records of a chunk should add up to, in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Tally {
-    pub(super) connections: u32,
-    pub(super) messages: u64,
+pub(crate) struct IndexSum {
+    pub(crate) connections: u32,
+    pub(crate) messages: u64,
     mix: u64,
 }
 
-impl Tally {
+impl IndexSum {
     /// Adds `count` messages of the connection that the bag calls `raw`.
-    pub(super) fn add(&mut self, raw: u32, count: u32) {
+    pub(crate) fn add(&mut self, raw: u32, count: u32) {
         // A multiplication by an odd number loses nothing; folding in its high bits tells sums of pairs apart.
         let pair = u64::from(raw) << 32 | u64::from(count);
         let spread = pair.wrapping_mul(0x9E37_79B9_7F4A_7C15);
@@ -30,11 +30,11 @@ impl Tally {
 }
 
 /// A longer index, in bytes, is not held in memory; its chunk is walked instead.
-pub(super) const LONGEST_INDEX: u64 = 16 << 20;
+pub(crate) const LONGEST_INDEX: u64 = 16 << 20;
 
 /// How many threads pay for `chunks` chunks of which the longest index takes `index` bytes: the reads wait for the
 /// disk, and a long index takes memory.
-pub(super) fn threads(chunks: usize, index: u64) -> usize {
+pub(crate) fn threads(chunks: usize, index: u64) -> usize {
     if index > LONGEST_INDEX / 16 {
         return 1;
     }
@@ -43,7 +43,7 @@ pub(super) fn threads(chunks: usize, index: u64) -> usize {
 
 /// The entries of a chunk's index.
 #[derive(Default)]
-pub(super) struct Index {
+pub(crate) struct Index {
     /// The bag's own number for a connection, and the place of its entries.
     runs: Vec<(u32, Range<usize>)>,
     stamps: Vec<Stamp>,
@@ -53,7 +53,7 @@ pub(super) struct Index {
 
 impl Index {
     /// Adds the entries of one connection.
-    pub(super) fn add(&mut self, raw: u32, entries: impl Iterator<Item = (Stamp, u64)>) {
+    pub(crate) fn add(&mut self, raw: u32, entries: impl Iterator<Item = (Stamp, u64)>) {
         let start = self.stamps.len();
         for (time, offset) in entries {
             self.stamps.push(time);
@@ -64,15 +64,15 @@ impl Index {
 }
 
 /// Where a chunk's records lie.
-pub(super) struct Body {
-    pub(super) how: Compression,
-    pub(super) range: Range<u64>,
+pub(crate) struct Body {
+    pub(crate) how: Compression,
+    pub(crate) range: Range<u64>,
 }
 
 impl Body {
     /// Its plain bytes, and the position at which they start. `step` is how much is read at a time if they are plain
     /// in the file.
-    pub(super) fn plain<'a>(
+    pub(crate) fn plain<'a>(
         &self,
         source: &'a Source,
         step: usize,
@@ -88,20 +88,20 @@ impl Body {
 
 /// What is asked for of a bag: the same for all of its chunks.
 #[derive(Clone, Copy)]
-pub(super) struct Ask<'a> {
+pub(crate) struct Query<'a> {
     /// The connection that the bag calls so.
-    pub(super) resolve: &'a (dyn Fn(u32) -> Option<ConnectionId> + Sync),
+    pub(crate) resolve: &'a (dyn Fn(u32) -> Option<ConnectionId> + Sync),
     /// What is wanted, by connection.
-    pub(super) wants: &'a [Want],
-    pub(super) range: Option<Span>,
+    pub(crate) wants: &'a [Want],
+    pub(crate) range: Option<Span>,
     /// Takes the head of a message record: the bag's number of its connection, and the length of the payload, which
     /// the stream then stands at.
-    pub(super) head: fn(&mut Stream<'_>) -> Option<(u32, u32)>,
+    pub(crate) head: fn(&mut Stream<'_>) -> Option<(u32, u32)>,
 }
 
-impl Ask<'_> {
+impl Query<'_> {
     /// Tells `sink` the stamps of `index`, and the wanted messages from `body`.
-    pub(super) fn tell(
+    pub(crate) fn tell(
         &self,
         index: &Index,
         source: &Source,
@@ -229,7 +229,7 @@ struct Wanted {
 }
 
 /// Messages of a connection that the bag does not describe.
-pub(super) fn nameless(sink: &mut dyn Sink, count: u64) {
+pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
     sink.notice(Notice {
         kind: NoticeKind::Damaged,
         count,
@@ -238,7 +238,7 @@ pub(super) fn nameless(sink: &mut dyn Sink, count: u64) {
 }
 
 /// Hands over what is wanted of the message that `stream` stands at, and passes over it.
-pub(super) fn hand_over(
+pub(crate) fn hand_over(
     stream: &mut Stream<'_>,
     (connection, time, size): (ConnectionId, Stamp, u32),
     want: Want,
@@ -256,7 +256,7 @@ pub(super) fn hand_over(
 }
 
 /// Hands over what is wanted of a message that another reader holds.
-pub(super) fn hand_over_slice(
+pub(crate) fn hand_over_slice(
     whole: &[u8],
     (connection, time): (ConnectionId, Stamp),
     want: Want,
@@ -277,7 +277,7 @@ pub(super) fn hand_over_slice(
 }
 
 /// Passes over `len` bytes, which must be there.
-pub(super) fn pass(stream: &mut Stream<'_>, len: u64) -> io::Result<()> {
+pub(crate) fn pass(stream: &mut Stream<'_>, len: u64) -> io::Result<()> {
     match stream.skip(len)? {
         n if n < len => Err(io::ErrorKind::UnexpectedEof.into()),
         _ => Ok(()),
@@ -312,11 +312,11 @@ const TOO_LARGE: &str = "messages larger than 16 MiB were counted and not looked
 
 /// A way to find the first and the last stamp: all the rest is forgotten.
 #[derive(Default)]
-pub(super) struct Extremes(Option<(Stamp, Stamp)>);
+pub(crate) struct Extremes(Option<(Stamp, Stamp)>);
 
 impl Extremes {
     /// The span of the stamps.
-    pub(super) fn span(&self) -> Option<Span> {
+    pub(crate) fn span(&self) -> Option<Span> {
         let (start, last) = self.0?;
         Some(Span {
             start,
@@ -344,7 +344,7 @@ impl Sink for Extremes {
 
 /// The span of a bag from the claimed spans of its chunks: `read` looks into the chunks that are said to be first and
 /// last, or into all if they are few.
-pub(super) fn span_of(
+pub(crate) fn span_of(
     claims: impl Iterator<Item = (usize, Stamp, Stamp)>,
     read: impl Fn(usize, &mut dyn Sink),
 ) -> Option<Span> {

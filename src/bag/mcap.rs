@@ -2,35 +2,30 @@
 //!
 //! The format: <https://mcap.dev/spec>. The files `mcap_*.rs` are parts of this one.
 
+mod chunk;
+mod forward;
+mod records;
+mod summary;
+mod verify;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::{
-    Clip, FormatRow, GROUP, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name,
-    in_order, threads,
-};
-use crate::decompress::Compression;
-use crate::error::{Error, Result};
-use crate::notice::{Notice, NoticeKind};
-use crate::source::{FAR, NEAR, Source, Stream};
-use crate::time::Span;
+use crate::bag::adapters::{Clip, GROUP, in_order};
+use crate::bag::decompress::Compression;
+use crate::bag::index::threads;
+use crate::bag::input::{FormatRow, Medium, Place, file_name};
+use crate::bag::model::{OpenOptions, Reader, Report, Sink, Tier};
+use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::Span;
 use chunk::Chunk;
 use records::{Cursor, MAGIC, op};
 use summary::{Summary, Unindexed};
 
-#[path = "mcap_chunk.rs"]
-mod chunk;
-#[path = "mcap_forward.rs"]
-mod forward;
-#[path = "mcap_records.rs"]
-mod records;
-#[path = "mcap_summary.rs"]
-mod summary;
-#[path = "mcap_verify.rs"]
-mod verify;
-
 /// MCAP files.
-pub(super) const FORMAT: FormatRow = FormatRow {
+pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "mcap",
     what: "MCAP file (ROS 1 or ROS 2)",
     extensions: &["mcap"],

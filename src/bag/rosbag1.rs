@@ -2,34 +2,29 @@
 //!
 //! The format: <https://wiki.ros.org/Bags/Format/2.0>. The files `rosbag1_*.rs` are parts of this one.
 
+mod chunk;
+mod forward;
+mod plan;
+mod records;
+mod verify;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::{
-    Clip, FormatRow, GROUP, Medium, OpenOptions, Place, Reader, Report, Sink, Tier, file_name,
-    in_order, threads,
-};
-use crate::decompress::Compression;
-use crate::error::{Error, Result};
-use crate::notice::{Notice, NoticeKind};
-use crate::source::{FAR, Source, Stream};
-use crate::time::Span;
+use crate::bag::adapters::{Clip, GROUP, in_order};
+use crate::bag::decompress::Compression;
+use crate::bag::index::threads;
+use crate::bag::input::{FormatRow, Medium, Place, file_name};
+use crate::bag::model::{OpenOptions, Reader, Report, Sink, Tier};
+use crate::bag::source::{FAR, Source, Stream};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::Span;
 use chunk::Chunk;
 use plan::{Plan, Unindexed};
 
-#[path = "rosbag1_chunk.rs"]
-mod chunk;
-#[path = "rosbag1_forward.rs"]
-mod forward;
-#[path = "rosbag1_plan.rs"]
-mod plan;
-#[path = "rosbag1_records.rs"]
-mod records;
-#[path = "rosbag1_verify.rs"]
-mod verify;
-
 /// ROS 1 bags.
-pub(super) const FORMAT: FormatRow = FormatRow {
+pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "rosbag1",
     what: "ROS 1 bag",
     extensions: &["bag", "bag.active"],

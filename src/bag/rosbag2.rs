@@ -1,24 +1,24 @@
 //! rosbag2 folders: the storage files in them, read as one recording, with `metadata.yaml` as a hint.
 
+mod metadata;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{
-    Connection, ConnectionId, Encoding, FormatRow, Input, Medium, Message, OpenOptions, Place,
-    Reader, Report, Sink, Want, explain, file_name,
+use crate::bag::input::{FormatRow, Input, Medium, Place, file_name};
+use crate::bag::model::{
+    Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
 };
-use crate::error::{Error, Result};
-use crate::name::NodeName;
-use crate::notice::{Notice, NoticeKind};
-use crate::time::{Span, Stamp};
+use crate::bag::unknown::explain;
+use crate::base::error::{Error, Result};
+use crate::base::name::NodeName;
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::{Span, Stamp};
 use metadata::{Metadata, is_storage};
 
-#[path = "rosbag2_metadata.rs"]
-mod metadata;
-
 /// Folders.
-pub(super) const FORMAT: FormatRow = FormatRow {
+pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "rosbag2",
     what: "ROS 2 recording: a folder with metadata.yaml or storage files",
     extensions: &[],

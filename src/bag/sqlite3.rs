@@ -2,31 +2,29 @@
 //!
 //! The tables: `sqlite_storage.cpp` of `rosbag2_storage_sqlite3`. The files `sqlite3_*.rs` are parts of this one.
 
+mod db;
+mod place;
+mod rows;
+
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{
-    Clip, Connection, ConnectionId, Encoding, FormatRow, MOST_PAYLOAD, Medium, OpenOptions, Place,
-    Reader, Report, Sink, Tier, Want, file_name, in_order,
+use crate::bag::adapters::{Clip, in_order};
+use crate::bag::input::{FormatRow, Medium, Place, file_name};
+use crate::bag::model::{
+    Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
-use crate::error::{Error, Result};
-use crate::notice::{Notice, NoticeKind};
-use crate::time::{Span, Stamp};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::{Span, Stamp};
 use db::{Db, Refusal};
 use place::Ready;
 use rows::{Part, Rows, ZSTD};
 
-#[path = "sqlite3_db.rs"]
-mod db;
-#[path = "sqlite3_place.rs"]
-mod place;
-#[path = "sqlite3_rows.rs"]
-mod rows;
-
 /// ROS 2 bags in SQLite.
-pub(super) const FORMAT: FormatRow = FormatRow {
+pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "sqlite3",
     what: "ROS 2 bag in SQLite",
     extensions: &["db3"],

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::error::Error;
+use crate::base::error::Error;
 
 /// The error for `path`, which begins with `head` and is no bag.
-pub(super) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
+pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     let (looks_like, hint) = if folder {
         (
             "a folder without a recording",

@@ -4,16 +4,15 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::typed::{LookArgs, SequenceArgs, ViewArgs};
-use crate::dot::Profile;
-use crate::error::{Error, Result};
-use crate::evolution::{Places, read_json};
-use crate::film;
-use crate::geometry::Size;
+use super::args::{LookArgs, SequenceArgs, ViewArgs};
+use crate::base::error::{Error, Result};
+use crate::base::geometry::Size;
+use crate::draw::picture::PageOptions;
+use crate::draw::style::{BUILTIN, Style};
+use crate::draw::text::Fonts;
+use crate::export::options::{self, Profile};
 use crate::layout::Orientation;
-use crate::picture::Wish;
-use crate::style::{BUILTIN, Style};
-use crate::text::Fonts;
+use crate::mission::{Places, read_json};
 use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
 /// What is shown: `rqt_graph`'s defaults or ours, then what was asked for.
@@ -70,12 +69,12 @@ pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
     Fonts::bundled().with(data, path)
 }
 
-pub(super) fn wish(args: &LookArgs, title: String, rate_change: f64) -> Wish {
-    let default = Wish::default();
+pub(super) fn options(args: &LookArgs, title: String, rate_change: f64) -> PageOptions {
+    let default = PageOptions::default();
     let size = args
         .size
         .map_or(default.size, |(w, h)| Size::new(f64::from(w), f64::from(h)));
-    Wish {
+    PageOptions {
         size,
         width_mm: args.width,
         bare: args.bare,
@@ -90,9 +89,9 @@ pub(super) fn wish(args: &LookArgs, title: String, rate_change: f64) -> Wish {
     }
 }
 
-pub(super) fn sequence(args: &SequenceArgs) -> Result<film::Options> {
-    let strip = args.strip.as_deref().map(film::Choice::parse);
-    Ok(film::Options {
+pub(super) fn sequence(args: &SequenceArgs) -> Result<options::Options> {
+    let strip = args.strip.as_deref().map(options::Choice::parse);
+    Ok(options::Options {
         frame_ms: args.frame_ms,
         tween: args.tween,
         hold_changes: args.hold_changes,
@@ -100,7 +99,7 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<film::Options> {
         dot_profile: Profile::parse(&args.dot_profile)?,
         strip: strip.transpose()?,
         links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
-        ..film::Options::default()
+        ..options::Options::default()
     })
 }
 

@@ -1,25 +1,35 @@
 //! From proofs to graphs: the elements of the mission, and for each window who is alive, how, and how busy.
 
+pub(crate) mod assemble;
+pub(crate) mod liveness;
+pub(crate) mod proofs;
+pub(crate) mod rates;
+pub(crate) mod restarts;
+pub(crate) mod roles;
+pub(crate) mod settle;
+pub(crate) mod values;
+pub(crate) mod windows;
+
 use std::collections::BTreeMap;
 use std::io;
 
-use super::assemble::{Traffic, assemble};
-use super::lives::{Extent, Track};
-use super::proofs::prove;
-use super::rates::{Rates, rates};
-use super::restarts::{Restarts, restarts};
-use super::settle::{Frame, settle};
-use super::values::Values;
-use super::windows::Windows;
+use self::assemble::{Traffic, assemble};
+use self::liveness::{Extent, Liveness};
+use self::proofs::prove;
+use self::rates::{Rates, rates};
+use self::restarts::{Restarts, restarts};
+use self::settle::{Frame, settle};
+use self::values::Values;
+use self::windows::Windows;
 use super::{Elements, Graph, NodeId};
-use crate::collect::{Collected, spool_error};
-use crate::error::Result;
+use crate::base::error::Result;
+use crate::base::notice::Notices;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::claim::Name;
+use crate::evidence::collector::{Collected, spool_error};
+use crate::evidence::proof::{Key, Proof, Validity};
+use crate::evidence::topology::Topology;
 use crate::evidence::{Degree, Evidence};
-use crate::facts::Name;
-use crate::notice::Notices;
-use crate::proof::{Proof, What, When};
-use crate::time::{Span, Stamp};
-use crate::topology::Topology;
 
 /// How graphs are built.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -62,7 +72,7 @@ struct Builder<'a> {
     windows: Windows<'a>,
     mission: (Stamp, Stamp),
     proofs: Vec<Proof>,
-    tracks: BTreeMap<What, Track>,
+    tracks: BTreeMap<Key, Liveness>,
     /// Per topic: its streams and their messages.
     rates: Traffic,
     restarts: Restarts,
@@ -122,8 +132,8 @@ impl<'a> Builder<'a> {
     fn track(&mut self, collected: &mut Collected) -> io::Result<()> {
         for proof in &self.proofs {
             let node = match proof.what {
-                What::Node(node) | What::Publish(node, _) | What::Subscribe(_, node) => Some(node),
-                What::Topic(_) => None,
+                Key::Node(node) | Key::Publish(node, _) | Key::Subscribe(_, node) => Some(node),
+                Key::Topic(_) => None,
             };
             let restarts = node.and_then(|node| self.restarts.get(&node));
             let deaths: Vec<Stamp> = restarts.into_iter().flatten().map(|r| r.death).collect();
@@ -133,7 +143,7 @@ impl<'a> Builder<'a> {
                 track.quiet = track.quiet.min(proof.degree);
             }
             match &proof.when {
-                When::Messages(at) => {
+                Validity::Messages(at) => {
                     let stream = &collected.streams[*at];
                     let Some((streams, rates)) = self.rates.get(&stream.topic) else {
                         continue;
@@ -145,7 +155,7 @@ impl<'a> Builder<'a> {
                         track.bound_all(&times, &deaths);
                     }
                 }
-                When::First(at) => {
+                Validity::First(at) => {
                     let stream = &collected.streams[*at];
                     if let Some((streams, rates)) = self.rates.get(&stream.topic)
                         && let Some(place) = streams.iter().position(|s| s == at)
@@ -154,26 +164,26 @@ impl<'a> Builder<'a> {
                         track.begin_all(&[trace.first], &[], proof.degree, &self.windows);
                     }
                 }
-                When::Signs { signs, ends, held } => {
+                Validity::Signs { signs, ends, held } => {
                     let mut ends = ends.clone();
                     ends.extend(&deaths);
                     ends.sort_unstable();
                     track.sign_all(signs, &ends, proof.degree, &self.windows);
                     track.held |= held;
                 }
-                When::Begins { signs, ends } => {
+                Validity::Begins { signs, ends } => {
                     let mut ends = ends.clone();
                     ends.extend(&deaths);
                     ends.sort_unstable();
                     track.begin_all(signs, &ends, proof.degree, &self.windows);
                 }
-                When::Like(_) => {}
-                When::Whole => track.extent = track.extent.max(Extent::Whole),
-                When::Always => track.extent = Extent::Always,
+                Validity::Like(_) => {}
+                Validity::Whole => track.extent = track.extent.max(Extent::Whole),
+                Validity::Always => track.extent = Extent::Always,
             }
         }
         for (node, restarts) in &self.restarts {
-            let track = self.tracks.entry(What::Node(*node)).or_default();
+            let track = self.tracks.entry(Key::Node(*node)).or_default();
             for restart in restarts {
                 track.signs.extend([restart.death, restart.birth]);
                 track.ends.push(restart.death);
@@ -208,7 +218,7 @@ impl<'a> Builder<'a> {
 }
 
 /// Puts the messages of one stream on a track.
-fn follow(track: &mut Track, rates: &Rates, place: usize, latched: bool, end: Stamp) {
+fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end: Stamp) {
     let Some(spoke) = rates.traces.get(place).copied().flatten() else {
         track.extent = track.extent.max(Extent::Whole);
         return;

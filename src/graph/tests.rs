@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
-use crate::collect::Collector;
-use crate::time::Span;
-use crate::topology::Element::{Node, Subscribe};
+use crate::base::time::Span;
+use crate::evidence::collector::Collector;
+use crate::evidence::topology::Element::{Node, Subscribe};
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -30,7 +30,7 @@ fn graphs(talks: &[Talk<'_>], period: i64) -> Built {
 }
 
 fn built(talks: &[Talk<'_>], period: i64, options: &Options) -> Built {
-    let mut collector = Collector::new(crate::collect::Options::default());
+    let mut collector = Collector::new(crate::evidence::collector::Options::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
     for (id, (topic, publisher, latching, times)) in (0..).zip(talks) {
@@ -189,7 +189,7 @@ fn roles_fold_anonymous_nodes_into_one() {
 
 #[test]
 fn what_the_user_tells_is_added_and_overwrites_nothing() {
-    let entry = |element, from_ns, to_ns| crate::topology::Entry {
+    let entry = |element, from_ns, to_ns| crate::evidence::topology::Entry {
         element,
         from_ns,
         to_ns,
@@ -197,7 +197,7 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
         place: String::new(),
     };
     let options = Options {
-        topology: crate::topology::Topology {
+        topology: crate::evidence::topology::Topology {
             entries: vec![
                 entry(Node("/x".to_owned()), None, None),
                 entry(
@@ -223,7 +223,7 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
 
 #[test]
 fn windows_may_overlap() {
-    let mut collector = Collector::new(crate::collect::Options::default());
+    let mut collector = Collector::new(crate::evidence::collector::Options::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
     bag.connection(&connection(0, "/a", Some("/x"), false));

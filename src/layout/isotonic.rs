@@ -1,7 +1,7 @@
 //! Growing sequences: what comes nearest to wishes that are out of order.
 
 /// The growing sequence nearest to the goals in weighted squares, by pooling adjacent violators.
-pub(super) fn monotone(goal: &[f64], weight: &[f64]) -> Vec<f64> {
+pub(crate) fn monotone(goal: &[f64], weight: &[f64]) -> Vec<f64> {
     let mut pools: Vec<(f64, f64, usize)> = Vec::with_capacity(goal.len());
     for (&g, &w) in goal.iter().zip(weight) {
         let mut pool = (g * w, w, 1);

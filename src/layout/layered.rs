@@ -2,16 +2,23 @@
 //!
 //! It is the line through the other files of this folder, which is why it alone knows its siblings.
 
+pub(crate) mod acyclic;
+pub(crate) mod crossings;
+pub(crate) mod fold;
+pub(crate) mod labels;
+pub(crate) mod order;
+pub(crate) mod parts;
+pub(crate) mod place;
+pub(crate) mod rank;
+
 use std::collections::BTreeSet;
 
-use super::{Engine, Layers, Layout, Orientation, Part, Plan, Route, Rows, Wish};
-use super::{acyclic, crude, fold, labels, order, pack, parts, place, rank, route};
-use super::{
-    cut::{Lane, cut, items},
-    room::{Room, turned},
-};
-use crate::error::Result;
-use crate::geometry::{Point, Rect, Size};
+use super::layers::{Lane, cut, items};
+use super::spacing::{Spacing, turned};
+use super::{Engine, Layers, Layout, Options, Orientation, Part, Plan, Route, Rows};
+use super::{grid, pack, routes};
+use crate::base::error::Result;
+use crate::base::geometry::{Point, Rect, Size};
 
 /// The room between parts.
 const PART_GAP: f64 = 20.0;
@@ -23,38 +30,38 @@ const MOST: usize = 150_000;
 const EFFORT: usize = 120_000;
 
 /// The default engine.
-pub(super) struct Layered;
+pub(crate) struct Layered;
 
 impl Engine for Layered {
-    fn lay_out(&self, plan: &Plan, wish: &Wish) -> Result<Layout> {
-        Ok(lay_out(plan, wish))
+    fn lay_out(&self, plan: &Plan, options: &Options) -> Result<Layout> {
+        Ok(lay_out(plan, options))
     }
 }
 
 /// The layered layout of a sane plan.
-pub(super) fn lay_out(plan: &Plan, wish: &Wish) -> Layout {
+pub(crate) fn lay_out(plan: &Plan, options: &Options) -> Layout {
     let parts = parts::parts(plan);
-    let aspect = wish.page.w / wish.page.h.max(1.0);
-    let drafts: Vec<Vec<Draft>> = parts
+    let aspect = options.page.w / options.page.h.max(1.0);
+    let orderings: Vec<Vec<Ordering>> = parts
         .iter()
-        .map(|part| drafts(plan, part, aspect))
+        .map(|part| orderings(plan, part, aspect))
         .collect();
-    if drafts.iter().any(Vec::is_empty) {
-        let mut layout = crude::lay_out(plan, wish);
+    if orderings.iter().any(Vec::is_empty) {
+        let mut layout = grid::lay_out(plan, options);
         labels::place(plan, &mut layout);
         return layout;
     }
     let both = [Orientation::LeftRight, Orientation::TopBottom];
     let wished = both
         .into_iter()
-        .filter(|o| wish.orientation.is_none_or(|wish| wish == *o));
+        .filter(|o| options.orientation.is_none_or(|options| options == *o));
     let tries = wished.map(|orientation| {
         let blocks: Vec<Block> = parts
             .iter()
-            .zip(&drafts)
-            .map(|(part, drafts)| best_block(plan, wish, part, drafts, orientation))
+            .zip(&orderings)
+            .map(|(part, orderings)| best_block(plan, options, part, orderings, orientation))
             .collect();
-        assembled(plan, wish, &parts, blocks, orientation)
+        assembled(plan, options, &parts, blocks, orientation)
     });
     let labelled = tries.map(|(quality, mut layout)| {
         labels::place(plan, &mut layout);
@@ -84,14 +91,14 @@ fn labelled(plan: &Plan, layout: &Layout) -> f64 {
 }
 
 /// One way of cutting and ordering a part.
-struct Draft {
+struct Ordering {
     layers: Layers,
     rows: Rows,
     crossings: u64,
 }
 
 /// The drafts of a part, none if it is too large: every way of ranking, with long edges led outside and inside of clusters.
-fn drafts(plan: &Plan, part: &Part, aspect: f64) -> Vec<Draft> {
+fn orderings(plan: &Plan, part: &Part, aspect: f64) -> Vec<Ordering> {
     let mut ways = rankings(part, aspect);
     ways.retain(|rank| items(part, rank) <= MOST);
     let mut lanes = vec![Lane::Inside];
@@ -103,16 +110,16 @@ fn drafts(plan: &Plan, part: &Part, aspect: f64) -> Vec<Draft> {
     let pairs = ways
         .iter()
         .flat_map(|rank| lanes.iter().map(move |lane| (rank, *lane)));
-    let draft = |(rank, lane): (&Vec<usize>, Lane)| {
+    let ordering = |(rank, lane): (&Vec<usize>, Lane)| {
         let layers = cut(part, rank, lane);
         let (rows, crossings) = order::order(&layers, effort);
-        Draft {
+        Ordering {
             layers,
             rows,
             crossings,
         }
     };
-    pairs.map(draft).collect()
+    pairs.map(ordering).collect()
 }
 
 /// Ranks for a part: cycles broken in different ways, shallow graphs folded.
@@ -142,34 +149,34 @@ fn rankings(part: &Part, aspect: f64) -> Vec<Vec<usize>> {
 }
 
 /// One part placed and routed, its top left corner at (0, 0).
-pub(super) struct Block {
-    pub(super) size: Size,
-    pub(super) crossings: u64,
-    pub(super) boxes: Vec<Rect>,
-    pub(super) routes: Vec<Route>,
-    pub(super) clusters: Vec<Rect>,
+pub(crate) struct Block {
+    pub(crate) size: Size,
+    pub(crate) crossings: u64,
+    pub(crate) boxes: Vec<Rect>,
+    pub(crate) routes: Vec<Route>,
+    pub(crate) clusters: Vec<Rect>,
 }
 
 /// How good a drawing is: the scale at which it fills the page, above all; how small it is; how free of crossings.
-fn quality(size: Size, crossings: u64, links: usize, wish: &Wish) -> f64 {
-    let small = (wish.page.w * wish.page.h / (size.w * size.h).max(1.0)).sqrt();
-    let readable = libm::pow(pack::fit(size, wish.page), 0.8) * libm::pow(small, 0.2);
+fn quality(size: Size, crossings: u64, links: usize, options: &Options) -> f64 {
+    let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
+    let readable = libm::pow(pack::fit(size, options.page), 0.8) * libm::pow(small, 0.2);
     readable / (1.0 + 0.5 * crossings as f64 / links.max(1) as f64)
 }
 
 fn best_block(
     plan: &Plan,
-    wish: &Wish,
+    options: &Options,
     part: &Part,
-    drafts: &[Draft],
+    orderings: &[Ordering],
     orientation: Orientation,
 ) -> Block {
-    let blocks = drafts
+    let blocks = orderings
         .iter()
-        .map(|draft| block(plan, part, draft, orientation));
+        .map(|ordering| block(plan, part, ordering, orientation));
     let judged = blocks.map(|block| {
         (
-            quality(block.size, block.crossings, part.links.len(), wish),
+            quality(block.size, block.crossings, part.links.len(), options),
             block,
         )
     });
@@ -177,17 +184,17 @@ fn best_block(
     best.map_or_else(Block::empty, |best| best.1)
 }
 
-fn block(plan: &Plan, part: &Part, draft: &Draft, orientation: Orientation) -> Block {
-    let layers = &draft.layers;
-    let room = Room::new(plan, part, layers, orientation);
-    let across = place::place(layers, &draft.rows, &room.apart(&draft.rows));
-    let columns = room.columns(&draft.rows, &across);
+fn block(plan: &Plan, part: &Part, ordering: &Ordering, orientation: Orientation) -> Block {
+    let layers = &ordering.layers;
+    let room = Spacing::new(plan, part, layers, orientation);
+    let across = place::place(layers, &ordering.rows, &room.apart(&ordering.rows));
+    let columns = room.columns(&ordering.rows, &across);
     let outline: Vec<_> = part
         .vertices
         .iter()
         .map(|&v| plan.vertices[v].outline)
         .collect();
-    let sheet = route::Sheet {
+    let sheet = routes::Sheet {
         layers,
         size: &room.size,
         outline: &outline,
@@ -201,7 +208,7 @@ fn block(plan: &Plan, part: &Part, draft: &Draft, orientation: Orientation) -> B
     let routes = sheet.routes(&part.ends);
     Block {
         size: Size::default(),
-        crossings: draft.crossings,
+        crossings: ordering.crossings,
         boxes,
         routes,
         clusters,
@@ -221,7 +228,7 @@ impl Block {
     }
 
     /// This block, so far with x along and y across, turned to the page and moved to (0, 0).
-    pub(super) fn on_page(self, orientation: Orientation) -> Self {
+    pub(crate) fn on_page(self, orientation: Orientation) -> Self {
         let reach = self
             .routes
             .iter()
@@ -258,15 +265,15 @@ impl Block {
 }
 
 /// All blocks packed, with the quality of the whole.
-pub(super) fn assembled(
+pub(crate) fn assembled(
     plan: &Plan,
-    wish: &Wish,
+    options: &Options,
     parts: &[Part],
     blocks: Vec<Block>,
     orientation: Orientation,
 ) -> (f64, Layout) {
     let sizes: Vec<Size> = blocks.iter().map(|block| block.size).collect();
-    let (corners, size) = pack::pack(&sizes, wish.page, PART_GAP);
+    let (corners, size) = pack::pack(&sizes, options.page, PART_GAP);
     let crossings = blocks.iter().map(|block| block.crossings).sum();
     let mut layout = Layout {
         orientation,
@@ -288,5 +295,5 @@ pub(super) fn assembled(
             layout.routes[i] = route.mapped(|p| Point::new(p.x + corner.x, p.y + corner.y));
         }
     }
-    (quality(size, crossings, plan.links.len(), wish), layout)
+    (quality(size, crossings, plan.links.len(), options), layout)
 }

@@ -10,15 +10,14 @@ use ::layout::std_shapes::shapes::{Element, ShapeKind};
 use ::layout::topo::layout::VisualGraph;
 use ::layout::topo::placer::Placer;
 
-use super::{Engine, Kind, Layers, Layout, Orientation, Part, Plan, Rows, Wish};
-use super::{acyclic, labels, order, parts, rank, route};
-use super::{
-    cut::{Lane, cut},
-    layered::{Block, assembled},
-    room::{Room, turned},
-};
-use crate::error::{Error, Result};
-use crate::geometry::{Rect, Size};
+use super::layered::{Block, assembled};
+use super::layered::{acyclic, labels, order, parts, rank};
+use super::layers::{Lane, cut};
+use super::routes;
+use super::spacing::{Spacing, turned};
+use super::{Engine, Kind, Layers, Layout, Options, Orientation, Part, Plan, Rows};
+use crate::base::error::{Error, Result};
+use crate::base::geometry::{Rect, Size};
 
 /// More vertices than this take it too long.
 const MOST: usize = 150;
@@ -29,10 +28,10 @@ const BOX_HALO: Size = Size::new(50.0, 14.0);
 const EDGE_HALO: Size = Size::new(10.0, 7.0);
 
 /// The engine behind `--layout layout-rs`.
-pub(super) struct LayoutRs;
+pub(crate) struct LayoutRs;
 
 impl Engine for LayoutRs {
-    fn lay_out(&self, plan: &Plan, wish: &Wish) -> Result<Layout> {
+    fn lay_out(&self, plan: &Plan, options: &Options) -> Result<Layout> {
         let hint = "use `--layout layered`, or show fewer elements";
         if plan.vertices.len() > MOST {
             return Err(Error::usage(
@@ -40,14 +39,14 @@ impl Engine for LayoutRs {
                 hint,
             ));
         }
-        let orientation = wish.orientation.unwrap_or(Orientation::LeftRight);
+        let orientation = options.orientation.unwrap_or(Orientation::LeftRight);
         // It states what it expects with `assert!`.
-        let attempt = std::panic::catch_unwind(|| lay_out(plan, wish, orientation));
+        let attempt = std::panic::catch_unwind(|| lay_out(plan, options, orientation));
         attempt.unwrap_or_else(|_| Err(Error::usage("layout-rs gave up on this graph", hint)))
     }
 }
 
-fn lay_out(plan: &Plan, wish: &Wish, orientation: Orientation) -> Result<Layout> {
+fn lay_out(plan: &Plan, options: &Options, orientation: Orientation) -> Result<Layout> {
     let flat = plan.without_clusters();
     let parts = parts::parts(&flat);
     let blocks: Option<Vec<Block>> = parts
@@ -60,7 +59,7 @@ fn lay_out(plan: &Plan, wish: &Wish, orientation: Orientation) -> Result<Layout>
             "use `--layout layered`",
         )
     })?;
-    let (_, mut layout) = assembled(&flat, wish, &parts, blocks, orientation);
+    let (_, mut layout) = assembled(&flat, options, &parts, blocks, orientation);
     layout.clusters = vec![Rect::default(); plan.clusters.len()];
     labels::place(&flat, &mut layout);
     if !plan.clusters.is_empty() {
@@ -81,7 +80,7 @@ fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
         Lane::Outside,
     );
     let (rows, crossings) = order::order(&layers, EFFORT);
-    let room = Room::new(plan, part, &layers, orientation);
+    let room = Spacing::new(plan, part, &layers, orientation);
     let places = places(&layers, &rows, &room, orientation);
     let across: Vec<f64> = places.iter().map(|&(_, across)| across).collect();
     let columns: Vec<(f64, f64)> = rows
@@ -93,7 +92,7 @@ fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
         .iter()
         .map(|&v| plan.vertices[v].outline)
         .collect();
-    let sheet = route::Sheet {
+    let sheet = routes::Sheet {
         layers: &layers,
         size: &room.size,
         outline: &outline,
@@ -118,7 +117,12 @@ fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
 }
 
 /// The middle of each item: along, across.
-fn places(layers: &Layers, rows: &Rows, room: &Room, orientation: Orientation) -> Vec<(f64, f64)> {
+fn places(
+    layers: &Layers,
+    rows: &Rows,
+    room: &Spacing,
+    orientation: Orientation,
+) -> Vec<(f64, f64)> {
     let direction = match orientation {
         Orientation::LeftRight => Direction::LeftToRight,
         Orientation::TopBottom => Direction::TopToBottom,
@@ -177,7 +181,7 @@ fn places(layers: &Layers, rows: &Rows, room: &Room, orientation: Orientation) -
 }
 
 /// The extent of a layer along.
-fn column(row: &[usize], layers: &Layers, room: &Room, places: &[(f64, f64)]) -> (f64, f64) {
+fn column(row: &[usize], layers: &Layers, room: &Spacing, places: &[(f64, f64)]) -> (f64, f64) {
     let middle = row.iter().map(|&item| places[item].0).sum::<f64>() / row.len().max(1) as f64;
     let vertices = row
         .iter()

@@ -1,10 +1,10 @@
 //! Where to put blocks side by side: shelves, tallest first, towards the page's aspect.
 
-use crate::geometry::{Point, Size};
+use crate::base::geometry::{Point, Size};
 
 /// Top left corners for blocks of these sizes, `gap` apart, and the size of the whole. The width is the one of several
 /// tries that lets the whole be drawn largest on the page.
-pub(super) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
+pub(crate) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
     let widest = sizes.iter().map(|size| size.w).fold(0.0, f64::max);
     let area: f64 = sizes.iter().map(|s| (s.w + gap) * (s.h + gap)).sum();
     let ideal = (area * page.w / page.h).sqrt();
@@ -25,7 +25,7 @@ pub(super) fn pack(sizes: &[Size], page: Size, gap: f64) -> (Vec<Point>, Size) {
 }
 
 /// The scale at which a drawing fills the page.
-pub(super) fn fit(whole: Size, page: Size) -> f64 {
+pub(crate) fn fit(whole: Size, page: Size) -> f64 {
     (page.w / whole.w.max(1.0)).min(page.h / whole.h.max(1.0))
 }
 

@@ -6,11 +6,11 @@ use std::path::Path;
 use crate::bag::{
     self, Connection, ConnectionId, Encoding, Input, Message, OpenOptions, Sink, Want,
 };
-use crate::error::{Error, Result};
-use crate::evolution::Evolution;
-use crate::notice::Notice;
-use crate::time::{Stamp, parse_nanos};
-use crate::wire::Cursor;
+use crate::base::error::{Error, Result};
+use crate::base::notice::Notice;
+use crate::base::time::{Stamp, parse_nanos};
+use crate::evidence::message::cursor::Cursor;
+use crate::mission::Mission;
 
 /// The phase of every window: the last caption that begins before the window's end, empty before the first one.
 /// `from` is a file if there is one of that name, else a topic of type `std_msgs/String`.
@@ -18,7 +18,7 @@ use crate::wire::Cursor;
 /// # Errors
 /// [`Error::BadFile`] with the line for a line that is no caption; [`Error::Usage`] if there is neither such a file nor
 /// such a topic.
-pub(super) fn phases(evolution: &Evolution, inputs: &[Input], from: &str) -> Result<Vec<String>> {
+pub(super) fn phases(mission: &Mission, inputs: &[Input], from: &str) -> Result<Vec<String>> {
     let path = Path::new(from);
     let captions = if path.is_file() {
         from_file(
@@ -28,7 +28,7 @@ pub(super) fn phases(evolution: &Evolution, inputs: &[Input], from: &str) -> Res
     } else {
         from_topic(inputs, from)?
             .into_iter()
-            .map(|(at, text)| (evolution.offset(at), text))
+            .map(|(at, text)| (mission.offset(at), text))
             .collect()
     };
     let phase = |end: i64| {
@@ -38,10 +38,10 @@ pub(super) fn phases(evolution: &Evolution, inputs: &[Input], from: &str) -> Res
             .find(|(at, _)| *at < end)
             .map_or("", |(_, text)| text)
     };
-    Ok(evolution
+    Ok(mission
         .windows
         .iter()
-        .map(|w| phase(evolution.offset(w.span.end)).to_owned())
+        .map(|w| phase(mission.offset(w.span.end)).to_owned())
         .collect())
 }
 

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{Stage, Watch};
-use crate::evolution::{Evolution, Place, Places};
-use crate::geometry::{Rect, Size};
+use crate::base::geometry::{Rect, Size};
+use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::draw::picture::{self, Measured, PageOptions};
+use crate::draw::style::Style;
+use crate::draw::text::Fonts;
 use crate::layout::{Engine, Layout, extend, lay_out};
-use crate::notice::{Notice, NoticeKind, Notices};
-use crate::picture::{self, Sketch, Wish};
-use crate::style::Style;
-use crate::text::Fonts;
+use crate::mission::{Mission, Place, Places};
 use crate::view::{View, ViewOptions, outline, view};
 
 /// What to draw and how.
@@ -23,7 +23,7 @@ pub struct Drawing {
     /// What text is set in.
     pub fonts: Fonts,
     /// Page, title, orientation.
-    pub wish: Wish,
+    pub page: PageOptions,
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
     /// Whether to grow the page and collapse namespaces until the text can be read.
@@ -44,7 +44,7 @@ const LARGEST: Size = Size::new(1920.0, 1080.0);
 pub(super) struct Composed {
     pub(super) view: View,
     pub(super) options: ViewOptions,
-    pub(super) wish: Wish,
+    pub(super) page: PageOptions,
     pub(super) layout: Layout,
     pub(super) notices: Notices,
 }
@@ -52,19 +52,19 @@ pub(super) struct Composed {
 /// Chooses what is shown and lays it out. With `--fit auto` the page grows, then the largest innermost namespaces are
 /// collapsed, until the smallest text is at least 9 pixels high or nothing is left to collapse; then those that turn
 /// out to fit are opened again.
-pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
+pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
-    let mut wish = drawing.wish.clone();
+    let mut page = drawing.page.clone();
     let mut options = drawing.view.clone();
     let asked = options.collapse.len();
-    let mut best = Attempt::new(evolution, drawing, &options, &wish);
+    let mut best = Attempt::new(mission, drawing, &options, &page);
     if drawing.is_fitted && !best.is_readable() {
-        if !drawing.is_sized && wish.width_mm.is_none() {
-            wish.size = LARGEST;
-            best = Attempt::new(evolution, drawing, &options, &wish);
+        if !drawing.is_sized && page.width_mm.is_none() {
+            page.size = LARGEST;
+            best = Attempt::new(mission, drawing, &options, &page);
         }
-        collapse(evolution, drawing, &wish, &mut options, &mut best);
-        open_again(evolution, drawing, &wish, (&mut options, asked), &mut best);
+        collapse(mission, drawing, &page, &mut options, &mut best);
+        open_again(mission, drawing, &page, (&mut options, asked), &mut best);
     }
     let Attempt {
         view,
@@ -72,25 +72,25 @@ pub(super) fn compose(evolution: &Evolution, drawing: &Drawing, watch: &mut dyn 
         layout,
         ..
     } = best;
-    notices.extend(told(&options.collapse[asked..], &drawing.wish, &wish));
+    notices.extend(told(&options.collapse[asked..], &drawing.page, &page));
     notices.extend(picture::unshown(&view, &drawing.fonts));
     let remarks = layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
     Composed {
         view,
         options,
-        wish,
+        page,
         layout,
         notices,
     }
 }
 
 /// What is shown where nothing is drawn: everything asked for, without places.
-pub(super) fn unplaced(evolution: &Evolution, drawing: &Drawing) -> Composed {
+pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
     Composed {
-        view: view(evolution, &drawing.view).0,
+        view: view(mission, &drawing.view).0,
         options: drawing.view.clone(),
-        wish: drawing.wish.clone(),
+        page: drawing.page.clone(),
         layout: Layout::empty(),
         notices: Notices::new(),
     }
@@ -106,16 +106,21 @@ struct Attempt {
 }
 
 impl Attempt {
-    fn new(evolution: &Evolution, drawing: &Drawing, options: &ViewOptions, wish: &Wish) -> Self {
+    fn new(
+        mission: &Mission,
+        drawing: &Drawing,
+        options: &ViewOptions,
+        page: &PageOptions,
+    ) -> Self {
         // The widest labels depend on rates, so that the windows are needed too.
-        let (view, notices) = view(evolution, options);
-        let sketch = Sketch::new(&view, &drawing.style, &drawing.fonts, wish.clone());
-        let (plan, page) = (sketch.plan(), sketch.layout_wish());
+        let (view, notices) = view(mission, options);
+        let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
+        let (plan, page) = (measured.plan(), measured.layout_options());
         let layout = match &drawing.kept {
             None => lay_out(plan, &page, drawing.engine),
             Some(kept) => extend(plan, &page, drawing.engine, &known(&view, kept)),
         };
-        let text = sketch.text_px(&layout);
+        let text = measured.text_px(&layout);
         Self {
             view,
             notices,
@@ -131,14 +136,14 @@ impl Attempt {
 
 /// Collapses namespaces until the text can be read.
 fn collapse(
-    evolution: &Evolution,
+    mission: &Mission,
     drawing: &Drawing,
-    wish: &Wish,
+    page: &PageOptions,
     options: &mut ViewOptions,
     best: &mut Attempt,
 ) {
     while !best.is_readable() {
-        let candidates = outline(evolution, options).collapsible(options);
+        let candidates = outline(mission, options).collapsible(options);
         let fresh = candidates
             .into_iter()
             .map(|c| c.name)
@@ -154,7 +159,7 @@ fn collapse(
             1
         };
         options.collapse.extend(fresh.into_iter().take(many));
-        *best = Attempt::new(evolution, drawing, options, wish);
+        *best = Attempt::new(mission, drawing, options, page);
     }
 }
 
@@ -163,9 +168,9 @@ const MOST_REOPENED: usize = 24;
 
 /// Opens namespaces that were collapsed on the way and need not have been, the outermost first.
 fn open_again(
-    evolution: &Evolution,
+    mission: &Mission,
     drawing: &Drawing,
-    wish: &Wish,
+    page: &PageOptions,
     options: (&mut ViewOptions, usize),
     best: &mut Attempt,
 ) {
@@ -177,7 +182,7 @@ fn open_again(
     for name in collapsed.iter().rev().take(MOST_REOPENED) {
         let mut opened = options.clone();
         opened.collapse.retain(|n| n != name);
-        let attempt = Attempt::new(evolution, drawing, &opened, wish);
+        let attempt = Attempt::new(mission, drawing, &opened, page);
         if attempt.is_readable() {
             (*options, *best) = (opened, attempt);
         }
@@ -185,7 +190,7 @@ fn open_again(
 }
 
 /// What `--fit auto` did.
-fn told(collapsed: &[Arc<str>], asked: &Wish, got: &Wish) -> Vec<Notice> {
+fn told(collapsed: &[Arc<str>], asked: &PageOptions, got: &PageOptions) -> Vec<Notice> {
     let mut notices = Vec::new();
     if asked.size != got.size {
         let text = format!(

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 
 use super::{Stage, Watch};
 use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
-use crate::collect::{self, Collected, Collector};
-use crate::diff::RATE_CHANGE;
-use crate::error::{Error, Result};
-use crate::evidence::Piece;
-use crate::evolution::{Evolution, Window, read_json};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::time::Span;
+use crate::evidence::EvidenceLine;
+use crate::evidence::collector::{self, Collected, Collector};
 use crate::graph;
-use crate::notice::{Notice, NoticeKind, Notices};
-use crate::time::Span;
-use crate::window::{self, Division, Length, Windows};
+use crate::graph::diff::RATE_CHANGE;
+use crate::graph::window::{self, Division, Length, Windows};
+use crate::mission::{Mission, Window, read_json};
 
 /// What to read and how.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct Reading {
     /// Whether to merge runs of windows without a change.
     pub skip_unchanged: bool,
     /// What to look at while reading.
-    pub collect: collect::Options,
+    pub collect: collector::Options,
     /// How graphs are built.
     pub graph: graph::Options,
     /// The share by which a rate must change to count, 0...
@@ -43,7 +43,7 @@ impl Default for Reading {
             verify: false,
             division: Division::default(),
             skip_unchanged: false,
-            collect: collect::Options::default(),
+            collect: collector::Options::default(),
             graph: graph::Options::default(),
             rate_change: RATE_CHANGE,
         }
@@ -54,14 +54,14 @@ impl Default for Reading {
 ///
 /// # Errors
 /// Where an input cannot be read at all or none holds a message, and for times that make no sense.
-pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Evolution> {
-    let (mut evolution, _) = explain(reading, watch)?;
-    if reading.verify && evolution_file(&reading.inputs)?.is_none() {
+pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
+    let (mut mission, _) = explain(reading, watch)?;
+    if reading.verify && mission_file(&reading.inputs)?.is_none() {
         watch.stage(Stage::Verify);
-        let second = build(Mission::read(reading, true, watch)?, reading, watch)?;
-        compare(&mut evolution, &second);
+        let second = build(Recorded::read(reading, true, watch)?, reading, watch)?;
+        compare(&mut mission, &second);
     }
-    Ok(evolution)
+    Ok(mission)
 }
 
 /// Reads the inputs into an evolution, with every piece of evidence on the elements that `reading` asks about, sorted
@@ -69,18 +69,18 @@ pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Evolution> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Evolution, Vec<Piece>)> {
+pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec<EvidenceLine>)> {
     watch.stage(Stage::Read);
-    if let Some(path) = evolution_file(&reading.inputs)? {
+    if let Some(path) = mission_file(&reading.inputs)? {
         return Ok((reread(path, reading)?, Vec::new()));
     }
-    let mission = Mission::read(reading, false, watch)?;
-    let pieces = mission.collected.why();
-    Ok((build(mission, reading, watch)?, pieces))
+    let recorded = Recorded::read(reading, false, watch)?;
+    let pieces = recorded.collected.why();
+    Ok((build(recorded, reading, watch)?, pieces))
 }
 
 /// The path of the evolution that is the only input; `None` for bags.
-fn evolution_file(inputs: &[Input]) -> Result<Option<&Path>> {
+fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     let is_json = |input: &Input| -> Result<bool> { Ok(matches!(bag::sniff(input)?, Kind::Json)) };
     match inputs {
         [Input::Path(path)] if is_json(&inputs[0])? => Ok(Some(path)),
@@ -91,7 +91,7 @@ fn evolution_file(inputs: &[Input]) -> Result<Option<&Path>> {
 /// The largest evolution that is read, in bytes.
 const MOST_JSON: u64 = 4 << 30;
 
-fn reread(path: &Path, reading: &Reading) -> Result<Evolution> {
+fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let length = fs::metadata(path).map_err(Error::io("read", path))?.len();
     if length > MOST_JSON {
         return Err(Error::Unsupported {
@@ -101,21 +101,21 @@ fn reread(path: &Path, reading: &Reading) -> Result<Evolution> {
         });
     }
     let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
-    let mut evolution = read_json(&text, path)?;
+    let mut mission = read_json(&text, path)?;
     drop(text);
-    evolution.find_changes(reading.rate_change, &[]);
-    Ok(evolution)
+    mission.find_changes(reading.rate_change, &[]);
+    Ok(mission)
 }
 
 /// Everything that was read of a mission.
-struct Mission {
+struct Recorded {
     bags: Vec<Report>,
     collected: Collected,
     /// The time that the windows divide.
     range: Span,
 }
 
-impl Mission {
+impl Recorded {
     /// Reads every bag once.
     fn read(reading: &Reading, verify: bool, watch: &mut dyn Watch) -> Result<Self> {
         let options = OpenOptions { verify };
@@ -175,26 +175,26 @@ fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
     Ok(all)
 }
 
-fn build(mut mission: Mission, reading: &Reading, watch: &mut dyn Watch) -> Result<Evolution> {
+fn build(mut recorded: Recorded, reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     watch.stage(Stage::Graphs);
-    let windows = window::divide(&reading.division, mission.range)?;
-    let mut evolution = graphs(&mut mission, &windows, reading)?;
+    let windows = window::divide(&reading.division, recorded.range)?;
+    let mut mission = graphs(&mut recorded, &windows, reading)?;
     if reading.skip_unchanged {
-        let merged = merged(&evolution, &windows);
-        evolution = graphs(&mut mission, &merged, reading)?;
+        let merged = merged(&mission, &windows);
+        mission = graphs(&mut recorded, &merged, reading)?;
     }
     if reading.division.length == Length::Auto {
         let text = format!("the period is {}; `--period` takes another", windows.period);
-        evolution.notices.add(Notice::new(NoticeKind::Chosen, text));
+        mission.notices.add(Notice::new(NoticeKind::Chosen, text));
     }
-    Ok(evolution)
+    Ok(mission)
 }
 
 /// Builds the graph of every window and finds what changed.
-fn graphs(mission: &mut Mission, windows: &Windows, reading: &Reading) -> Result<Evolution> {
-    let built = graph::build(&mut mission.collected, &windows.spans, &reading.graph)?;
+fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Result<Mission> {
+    let built = graph::build(&mut recorded.collected, &windows.spans, &reading.graph)?;
     let messages = built.messages.iter().sum();
-    let mut notices: Notices = mission.collected.notices.clone();
+    let mut notices: Notices = recorded.collected.notices.clone();
     notices.extend(built.notices.iter());
     let parts = windows
         .spans
@@ -212,8 +212,8 @@ fn graphs(mission: &mut Mission, windows: &Windows, reading: &Reading) -> Result
             changes: Vec::new(),
         })
         .collect();
-    let mut evolution = Evolution {
-        bags: mission.bags.clone(),
+    let mut mission = Mission {
+        bags: recorded.bags.clone(),
         span: windows.span,
         messages,
         period: windows.period,
@@ -223,14 +223,14 @@ fn graphs(mission: &mut Mission, windows: &Windows, reading: &Reading) -> Result
         layout: None,
         notices,
     };
-    evolution.find_changes(reading.rate_change, &built.restarts);
-    Ok(evolution)
+    mission.find_changes(reading.rate_change, &built.restarts);
+    Ok(mission)
 }
 
 /// The windows with every run of them that shows no change made one.
-fn merged(evolution: &Evolution, windows: &Windows) -> Windows {
+fn merged(mission: &Mission, windows: &Windows) -> Windows {
     let mut spans: Vec<Span> = Vec::new();
-    for window in &evolution.windows {
+    for window in &mission.windows {
         match spans.last_mut() {
             Some(last) if window.changes.is_empty() => last.end = window.span.end,
             _ => spans.push(window.span),
@@ -243,7 +243,7 @@ fn merged(evolution: &Evolution, windows: &Windows) -> Windows {
 }
 
 /// Notices where the second reader counts otherwise than the first.
-fn compare(first: &mut Evolution, second: &Evolution) {
+fn compare(first: &mut Mission, second: &Mission) {
     let (ours, theirs) = (counts(first), counts(second));
     let differing = ours.symmetric_difference(&theirs).count();
     let (text, kind) = if first.messages == second.messages && differing == 0 {
@@ -269,8 +269,8 @@ fn compare(first: &mut Evolution, second: &Evolution) {
 }
 
 /// Every count of a topic in a window.
-fn counts(evolution: &Evolution) -> BTreeSet<(usize, &str, u64)> {
-    let topics = &evolution.elements.topics;
+fn counts(mission: &Mission) -> BTreeSet<(usize, &str, u64)> {
+    let topics = &mission.elements.topics;
     let counted = |window: &'_ Window| {
         let index = window.index;
         let states = window.graph.topics.iter().filter(|t| t.count > 0);
@@ -278,5 +278,5 @@ fn counts(evolution: &Evolution) -> BTreeSet<(usize, &str, u64)> {
             .map(move |t| (index, topics[t.id as usize].name.as_str(), t.count))
             .collect::<Vec<_>>()
     };
-    evolution.windows.iter().flat_map(counted).collect()
+    mission.windows.iter().flat_map(counted).collect()
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::{Reading, Watch, read};
 use crate::bag::{self, Input, Kind};
-use crate::error::{Error, Result};
-use crate::info::{SurveyRow, info};
+use crate::base::error::{Error, Result};
+use crate::mission::info::{SurveyRow, info};
 
 /// How deep below the folder bags are looked for.
 const DEEPEST: usize = 16;
@@ -42,10 +42,10 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
             ..reading.clone()
         };
         match read(&one, watch) {
-            Ok(evolution) => SurveyRow {
+            Ok(mission) => SurveyRow {
                 path: shown,
                 error: None,
-                info: Some(info(&evolution)),
+                info: Some(info(&mission)),
             },
             Err(error) => SurveyRow {
                 path: shown,

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::cast::Cast;
+use super::items::Viewed;
 use super::{ArrowKind, Frame, Item, ItemKind, Mark, Shown};
-use crate::diff::{Change, ValueKind};
+use crate::base::name::last_part;
+use crate::graph::diff::{Change, ValueKind};
 use crate::graph::{Element, Elements, NodeId, TopicId};
-use crate::name::last_part;
 
 /// At most so many phrases in one caption; the rest is counted.
 const MOST_PHRASES: usize = 6;
@@ -32,8 +32,8 @@ pub fn hertz(hz: f64) -> String {
 }
 
 /// Puts changes into words. Names are short where that is clear: `planner`, `scan`, but `/cmd_vel` at the root.
-pub(super) struct Speaker<'a> {
-    cast: &'a Cast,
+pub(crate) struct Speaker<'a> {
+    viewed: &'a Viewed,
     elements: &'a Elements,
     /// Per item.
     names: Vec<String>,
@@ -41,9 +41,9 @@ pub(super) struct Speaker<'a> {
 }
 
 impl<'a> Speaker<'a> {
-    pub(super) fn new(elements: &'a Elements, cast: &'a Cast) -> Self {
+    pub(crate) fn new(elements: &'a Elements, viewed: &'a Viewed) -> Self {
         let mut last_parts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
-        for item in &cast.items {
+        for item in &viewed.items {
             *last_parts
                 .entry((item.kind.word(), spoken(item)))
                 .or_default() += 1;
@@ -62,15 +62,15 @@ impl<'a> Speaker<'a> {
             *node_names.entry(last_part(node.name.as_str())).or_default() += 1;
         }
         Self {
-            cast,
+            viewed,
             elements,
-            names: cast.items.iter().map(name).collect(),
+            names: viewed.items.iter().map(name).collect(),
             node_names,
         }
     }
 
     /// At most [`MOST_PHRASES`] phrases, and a last one that counts the rest.
-    pub(super) fn caption(&self, frame: &Frame, changes: &[Change]) -> Vec<String> {
+    pub(crate) fn caption(&self, frame: &Frame, changes: &[Change]) -> Vec<String> {
         let mut phrases = Vec::new();
         for (mark, verb) in [(Mark::Added, "appeared"), (Mark::Removed, "vanished")] {
             self.comings(frame, mark, verb, &mut phrases);
@@ -121,7 +121,7 @@ impl<'a> Speaker<'a> {
         let news: BTreeSet<u32> = marked(&frame.items, mark).collect();
         let mut owners: BTreeMap<u32, Option<u32>> = BTreeMap::new();
         for shown in &frame.arrows {
-            let Some(arrow) = self.cast.arrows.get(shown.id as usize) else {
+            let Some(arrow) = self.viewed.arrows.get(shown.id as usize) else {
                 continue;
             };
             if arrow.kind != ArrowKind::Publish || !news.contains(&arrow.to) {
@@ -198,7 +198,7 @@ impl<'a> Speaker<'a> {
             rates.extend(told(shown).map(|rate| (self.name(shown.id).to_owned(), rate)));
         }
         for shown in &frame.arrows {
-            let arrow = self.cast.arrows.get(shown.id as usize);
+            let arrow = self.viewed.arrows.get(shown.id as usize);
             if let Some(ArrowKind::Direct(topic)) = arrow.map(|a| &a.kind) {
                 rates.extend(told(shown).map(|rate| (clip(topic), rate)));
             }
@@ -222,7 +222,7 @@ impl<'a> Speaker<'a> {
         let handed: BTreeSet<u32> = changes
             .iter()
             .filter_map(|change| match change {
-                Change::HandedOver { topic, .. } => *self.cast.topic.get(*topic as usize)?,
+                Change::HandedOver { topic, .. } => *self.viewed.topic.get(*topic as usize)?,
                 _ => None,
             })
             .collect();
@@ -237,7 +237,7 @@ impl<'a> Speaker<'a> {
         ] {
             let mut all = Vec::new();
             for id in marked(&frame.arrows, mark) {
-                let Some(arrow) = self.cast.arrows.get(id as usize) else {
+                let Some(arrow) = self.viewed.arrows.get(id as usize) else {
                     continue;
                 };
                 if moving(arrow.from) || moving(arrow.to) || handed.contains(&arrow.to) {
@@ -261,27 +261,27 @@ impl<'a> Speaker<'a> {
     }
 
     fn is_node(&self, item: u32) -> bool {
-        let item = self.cast.items.get(item as usize);
+        let item = self.viewed.items.get(item as usize);
         item.is_some_and(|item| item.kind.word() == "node")
     }
 
     /// The name of a node that has a box of its own.
     fn node_name(&self, node: NodeId) -> Option<&str> {
-        let item = (*self.cast.node.get(node as usize)?)?;
-        let alone = self.cast.items.get(item as usize)?.kind == ItemKind::Node;
+        let item = (*self.viewed.node.get(node as usize)?)?;
+        let alone = self.viewed.items.get(item as usize)?.kind == ItemKind::Node;
         alone.then(|| self.name(item))
     }
 
     /// The name of a topic that has a box of its own in this window, or an arrow from node to node.
     fn topic_name(&self, frame: &Frame, topic: TopicId) -> Option<String> {
-        let carriers = self.cast.carriers.get(&Element::Topic(topic));
-        if let Some(arrows) = carriers.filter(|_| !self.cast.pairs.is_empty()) {
+        let carriers = self.viewed.carriers.get(&Element::Topic(topic));
+        if let Some(arrows) = carriers.filter(|_| !self.viewed.pairs.is_empty()) {
             let there = |id: &u32| frame.arrows.binary_search_by_key(id, |s| s.id).is_ok();
             let name = self.elements.topics.get(topic as usize)?.name.as_str();
             return arrows.iter().any(there).then(|| clip(name));
         }
-        let id = (*self.cast.topic.get(topic as usize)?)?;
-        let item = self.cast.items.get(id as usize)?;
+        let id = (*self.viewed.topic.get(topic as usize)?)?;
+        let item = self.viewed.items.get(id as usize)?;
         let alone =
             item.kind == ItemKind::Topic || item.kind == ItemKind::Group && item.members.len() == 1;
         let there = frame.items.binary_search_by_key(&id, |s| s.id).is_ok();
@@ -369,12 +369,12 @@ fn named_or_counted(all: Vec<String>, plural: &str, phrases: &mut Vec<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::testing::evolution;
+    use crate::view::testing::mission;
     use crate::view::{ViewOptions, view};
 
     /// The caption of the last window.
     fn caption(windows: &[&str]) -> String {
-        let (view, _) = view(&evolution(windows), &ViewOptions::default());
+        let (view, _) = view(&mission(windows), &ViewOptions::default());
         view.frames.last().unwrap().caption.join("; ")
     }
 
@@ -427,8 +427,8 @@ mod tests {
 
     #[test]
     fn a_hand_over_is_told_once() {
-        let evolution = evolution(&["/planner>/cmd_vel@2 /teleop", "/planner /teleop>/cmd_vel@2"]);
-        let (view, _) = view(&evolution, &ViewOptions::default());
+        let mission = mission(&["/planner>/cmd_vel@2 /teleop", "/planner /teleop>/cmd_vel@2"]);
+        let (view, _) = view(&mission, &ViewOptions::default());
         assert_eq!(
             view.frames[1].caption,
             ["/cmd_vel handed over from planner to teleop"]

@@ -13,7 +13,7 @@ const DEEPEST: usize = 16;
 /// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item stands in the box of its first N parts, or of
 /// its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are drawn, but a
 /// namespace around a single thing is left out.
-pub(super) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespace> {
+pub(crate) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespace> {
     let levels = depth.unwrap_or(DEEPEST).min(DEEPEST);
     let homes: Vec<String> = items.iter().map(|item| home(&item.name, levels)).collect();
     let mut spaces: BTreeSet<&str> = BTreeSet::new();

@@ -4,16 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{ItemKind, View, ViewOptions};
-use crate::name::namespace;
+use crate::base::name::namespace;
 
 /// The namespaces to collapse and those to keep open.
-pub(super) struct Collapse<'a> {
+pub(crate) struct Collapse<'a> {
     collapse: BTreeSet<&'a str>,
     expand: BTreeSet<&'a str>,
 }
 
 impl<'a> Collapse<'a> {
-    pub(super) fn new(options: &'a ViewOptions) -> Self {
+    pub(crate) fn new(options: &'a ViewOptions) -> Self {
         let set = |names: &'a [Arc<str>]| names.iter().map(|n| n.trim_end_matches('/')).collect();
         Self {
             collapse: set(&options.collapse),
@@ -23,7 +23,7 @@ impl<'a> Collapse<'a> {
 
     /// The collapsed namespace that swallows an element of this name: the outermost one that holds no namespace to
     /// keep open on the way to the name. A node that is called like the namespace itself goes inside too.
-    pub(super) fn of(&self, name: &str) -> Option<&'a str> {
+    pub(crate) fn of(&self, name: &str) -> Option<&'a str> {
         let mut found = None;
         let ends = name.match_indices('/').map(|(at, _)| at).skip(1);
         for space in ends.chain([name.len()]).filter_map(|end| name.get(..end)) {
@@ -36,7 +36,7 @@ impl<'a> Collapse<'a> {
         found
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.collapse.is_empty()
     }
 }
@@ -44,7 +44,7 @@ impl<'a> Collapse<'a> {
 /// The collapsed namespace that swallows a topic (or group): the one of all its `publishers` and `subscribers`, if it
 /// is the topic's `own` too or both kinds are there; with no connection at all, its `own`. What crosses the border of a namespace stays
 /// outside as the namespace's interface.
-pub(super) fn swallows<'a>(
+pub(crate) fn swallows<'a>(
     own: Option<&'a str>,
     publishers: &[Option<&'a str>],
     subscribers: &[Option<&'a str>],
@@ -110,7 +110,7 @@ impl View {
 mod tests {
     use super::*;
     use crate::view::outline;
-    use crate::view::testing::evolution;
+    use crate::view::testing::mission;
 
     fn options(collapse: &[&str], expand: &[&str]) -> ViewOptions {
         let names = |names: &[&str]| names.iter().map(|n| Arc::from(*n)).collect();
@@ -134,17 +134,17 @@ mod tests {
 
     #[test]
     fn topics_without_known_nodes_go_inside_by_their_name() {
-        let evolution = evolution(&["=/n/t =/t /m>/n/u /n/a>/w"]);
-        let view = outline(&evolution, &options(&["/n"], &[]));
+        let mission = mission(&["=/n/t =/t /m>/n/u /n/a>/w"]);
+        let view = outline(&mission, &options(&["/n"], &[]));
         let names: Vec<&str> = view.items.iter().map(|i| i.name.as_ref()).collect();
         assert_eq!(names, ["/m", "/n/u", "/t", "/w", "/n"]);
     }
 
     #[test]
     fn innermost_namespaces_are_collapsed_first_and_the_largest_of_them() {
-        let evolution = evolution(&["/a/b/x>/a/b/t /a/y /a/c/x>/a/c/t /a/c/u>/t /d/x /e>/e/t"]);
+        let mission = mission(&["/a/b/x>/a/b/t /a/y /a/c/x>/a/c/t /a/c/u>/t /d/x /e>/e/t"]);
         let candidates = |options: &ViewOptions| -> Vec<String> {
-            let all = outline(&evolution, options).collapsible(options);
+            let all = outline(&mission, options).collapsible(options);
             all.iter()
                 .map(|c| format!("{} {}", c.name, c.items))
                 .collect()

@@ -2,7 +2,7 @@
 
 use regex::Regex;
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 
 /// A list of names and patterns, some of them exclusions. The default lets every name pass.
 ///

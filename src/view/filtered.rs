@@ -1,22 +1,22 @@
 //! The viewed part of a mission as a mission of its own, for `--filtered`.
 
-use super::cast::Cast;
-use super::present::{shows_node, shows_topic};
+use super::items::Viewed;
+use super::state::{shows_node, shows_topic};
 use super::{Mode, ViewOptions};
-use crate::diff::Change;
-use crate::evolution::{Evolution, Window};
+use crate::graph::diff::Change;
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph};
+use crate::mission::{Mission, Window};
 
 /// The evolution without what the view leaves out. Topics in groups and what is inside collapsed namespaces are seen,
 /// so they stay, under their own names; so do changes, as they were found in the whole graph.
-pub fn filtered(evolution: &Evolution, options: &ViewOptions) -> Evolution {
-    let cast = Cast::new(&evolution.elements, options);
-    let keep = Keep::new(&evolution.elements, options, &cast);
-    let windows = evolution.windows.iter();
-    Evolution {
-        elements: keep.elements(&evolution.elements),
-        windows: windows.map(|w| keep.window(w, options, &cast)).collect(),
-        ..evolution.clone()
+pub fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
+    let viewed = Viewed::new(&mission.elements, options);
+    let keep = Keep::new(&mission.elements, options, &viewed);
+    let windows = mission.windows.iter();
+    Mission {
+        elements: keep.elements(&mission.elements),
+        windows: windows.map(|w| keep.window(w, options, &viewed)).collect(),
+        ..mission.clone()
     }
 }
 
@@ -29,12 +29,14 @@ struct Keep {
 }
 
 impl Keep {
-    fn new(elements: &Elements, options: &ViewOptions, cast: &Cast) -> Self {
-        let nodes = numbered(cast.node.iter().map(Option::is_some));
-        let topics = (0..).zip(&cast.topic).map(|(id, item)| match options.mode {
-            Mode::Nodes => cast.carriers.contains_key(&Element::Topic(id)),
-            _ => item.is_some(),
-        });
+    fn new(elements: &Elements, options: &ViewOptions, viewed: &Viewed) -> Self {
+        let nodes = numbered(viewed.node.iter().map(Option::is_some));
+        let topics = (0..)
+            .zip(&viewed.topic)
+            .map(|(id, item)| match options.mode {
+                Mode::Nodes => viewed.carriers.contains_key(&Element::Topic(id)),
+                _ => item.is_some(),
+            });
         let topics = numbered(topics);
         let stays =
             |e: &Edge| new_id(&nodes, e.node).is_some() && new_id(&topics, e.topic).is_some();
@@ -64,9 +66,9 @@ impl Keep {
         }
     }
 
-    fn window(&self, window: &Window, options: &ViewOptions, cast: &Cast) -> Window {
+    fn window(&self, window: &Window, options: &ViewOptions, viewed: &Viewed) -> Window {
         Window {
-            graph: self.graph(&window.graph, options, cast),
+            graph: self.graph(&window.graph, options, viewed),
             changes: window
                 .changes
                 .iter()
@@ -76,7 +78,7 @@ impl Keep {
         }
     }
 
-    fn graph(&self, graph: &Graph, options: &ViewOptions, cast: &Cast) -> Graph {
+    fn graph(&self, graph: &Graph, options: &ViewOptions, viewed: &Viewed) -> Graph {
         let nodes = graph.nodes.iter().filter(|n| shows_node(n.state, options));
         let topics = graph
             .topics
@@ -102,9 +104,9 @@ impl Keep {
             });
             states
         };
-        let mut publishes = edges(&graph.publishes, &self.publishes, &cast.published);
+        let mut publishes = edges(&graph.publishes, &self.publishes, &viewed.published);
         publishes.retain(|p| shows_topic(p.state, options));
-        let subscribes = edges(&graph.subscribes, &self.subscribes, &cast.subscribed);
+        let subscribes = edges(&graph.subscribes, &self.subscribes, &viewed.subscribed);
         Graph {
             nodes,
             topics,
@@ -175,12 +177,12 @@ fn kept<T: Clone>(all: &[T], ids: &[Option<u32>]) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::testing::{evolution, text};
+    use crate::view::testing::{mission, text};
     use crate::view::{Hide, NameFilter};
 
     #[test]
     fn what_is_left_out_is_gone_with_its_edges_and_changes() {
-        let all = evolution(&["/a>/t@1 /b</t", "/a>/t@1 /a>/clock@9 /c</t /b</t"]);
+        let all = mission(&["/a>/t@1 /b</t", "/a>/t@1 /a>/clock@9 /c</t /b</t"]);
         let view = filtered(&all, &ViewOptions::default());
         assert_eq!(
             text(&view),
@@ -201,7 +203,7 @@ mod tests {
 
     #[test]
     fn active_leaves_out_what_carries_no_message() {
-        let all = evolution(&["/a>/t~ /b</t~ /c>/u"]);
+        let all = mission(&["/a>/t~ /b</t~ /c>/u"]);
         let options = ViewOptions {
             mode: Mode::Active,
             ..ViewOptions::default()
@@ -211,7 +213,7 @@ mod tests {
 
     #[test]
     fn nodes_only_keeps_the_topics_between_nodes() {
-        let all = evolution(&["/a>/t /b</t /a>/lonely"]);
+        let all = mission(&["/a>/t /b</t /a>/lonely"]);
         let options = ViewOptions {
             mode: Mode::Nodes,
             ..ViewOptions::default()

@@ -3,23 +3,23 @@
 use std::collections::BTreeMap;
 
 use super::caption::Speaker;
-use super::cast::Cast;
-use super::news::{News, Told, alone};
-use super::present::{Present, present};
-use super::tally::tally;
+use super::counts::tally;
+use super::items::Viewed;
+use super::marks::{MarkedRate, News, alone};
+use super::state::{States, present};
 use super::{Frame, Mark, Shown, ViewOptions, hertz};
-use crate::diff::RATE_CHANGE;
-use crate::evolution::Evolution;
+use crate::graph::diff::RATE_CHANGE;
+use crate::mission::Mission;
 
 /// The windows one after the other.
-pub(super) fn frames(evolution: &Evolution, options: &ViewOptions, cast: &Cast) -> Vec<Frame> {
-    let speaker = Speaker::new(&evolution.elements, cast);
-    let mut before: Option<(Present, Present)> = None;
-    let mut frames = Vec::with_capacity(evolution.windows.len());
-    for window in &evolution.windows {
-        let now = present(&window.graph, options, cast);
-        let alone = alone(&window.graph, &evolution.elements);
-        let news = News::new(&window.changes, cast, &alone);
+pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Vec<Frame> {
+    let speaker = Speaker::new(&mission.elements, viewed);
+    let mut before: Option<(States, States)> = None;
+    let mut frames = Vec::with_capacity(mission.windows.len());
+    for window in &mission.windows {
+        let now = present(&window.graph, options, viewed);
+        let alone = alone(&window.graph, &mission.elements);
+        let news = News::new(&window.changes, viewed, &alone);
         let (items, arrows) = match &before {
             None => (
                 now.0.iter().flatten().cloned().collect(),
@@ -36,7 +36,7 @@ pub(super) fn frames(evolution: &Evolution, options: &ViewOptions, cast: &Cast) 
             span: window.span,
             partial: window.partial,
             messages: window.messages,
-            tally: tally(cast, &items, &arrows),
+            tally: tally(viewed, &items, &arrows),
             items,
             arrows,
             caption: Vec::new(),
@@ -48,7 +48,7 @@ pub(super) fn frames(evolution: &Evolution, options: &ViewOptions, cast: &Cast) 
 }
 
 /// The window's items or arrows with their marks, and the ghosts of what was there in the window before.
-fn marked(before: &Present, now: &Present, news: &BTreeMap<u32, Told>) -> Vec<Shown> {
+fn marked(before: &States, now: &States, news: &BTreeMap<u32, MarkedRate>) -> Vec<Shown> {
     let one = |(before, now): (&Option<Shown>, &Option<Shown>)| match (before, now) {
         (None, None) => None,
         (None, Some(now)) => Some(Shown {
@@ -77,7 +77,7 @@ fn marked(before: &Present, now: &Present, news: &BTreeMap<u32, Told>) -> Vec<Sh
 }
 
 /// Whether the rate of several together changed, when the rate of one of them did.
-fn summed(from: Option<f64>, to: Option<f64>) -> Option<Told> {
+fn summed(from: Option<f64>, to: Option<f64>) -> Option<MarkedRate> {
     let (from, to) = (from?, to?);
     let differs = (to - from).abs() > RATE_CHANGE * from && hertz(from) != hertz(to);
     let mark = if to > from {
@@ -90,13 +90,13 @@ fn summed(from: Option<f64>, to: Option<f64>) -> Option<Told> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::evolution;
     use super::super::{Grouping, Hide, ItemKind, Mode, View, view};
     use super::*;
+    use crate::view::testing::mission;
 
     /// Each window as text: items and arrows with a sign for their mark, hidden or not there if not named.
     fn seen(windows: &[&str], options: &ViewOptions) -> Vec<String> {
-        let (view, _) = view(&evolution(windows), options);
+        let (view, _) = view(&mission(windows), options);
         let frames = view.frames.iter();
         frames
             .map(|frame| text(&view, &frame.items, &frame.arrows))
@@ -146,12 +146,12 @@ mod tests {
             "/a /b v/t v/a>/t /t>/b",
         ];
         assert_eq!(seen(&windows, &ViewOptions::default()), want);
-        let (view, _) = view(&evolution(&windows), &ViewOptions::default());
+        let (view, _) = view(&mission(&windows), &ViewOptions::default());
         let topic = &view.frames[2].items[2];
         assert_eq!((topic.from_hz, topic.hz), (Some(20.0), Some(5.0)));
         assert_eq!(
             (view.frames[2].tally.rates, view.frames[0].tally),
-            (1, super::super::Tally::default())
+            (1, crate::view::Counts::default())
         );
     }
 
@@ -188,7 +188,7 @@ mod tests {
         let got = seen(&windows, &ViewOptions::default());
         assert_eq!(got[1], "/a /go/action_topics /a>/go/action_topics");
         assert_eq!(got[2], "/a ^/go/action_topics ^/a>/go/action_topics");
-        let (view, _) = view(&evolution(&windows), &ViewOptions::default());
+        let (view, _) = view(&mission(&windows), &ViewOptions::default());
         assert_eq!(view.frames[2].caption, ["go action 24 → 50 Hz"]);
     }
 
@@ -246,7 +246,7 @@ mod tests {
         let got = seen(&windows, &options);
         assert_eq!(got[0], "/c /n/out /x /n /n/out>/c /n>/n/out /n>/x");
         assert_eq!(got[1], "/c /n/out /x */n /n/out>/c /n>/n/out /n>/x");
-        let (view, _) = view(&evolution(&windows), &options);
+        let (view, _) = view(&mission(&windows), &options);
         let space = view
             .items
             .iter()

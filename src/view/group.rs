@@ -4,15 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::names::is_tf;
 use super::options::Grouping;
+use crate::base::name::namespace;
 use crate::graph::{Elements, TopicId};
-use crate::name::namespace;
 
 /// The groups by name, and the topics in each, sorted. No topic is in two groups.
-pub(super) type Groups = BTreeMap<String, Vec<TopicId>>;
+pub(crate) type Groups = BTreeMap<String, Vec<TopicId>>;
 
 /// Groups the topics that are still `seen`. ROS 1 actions, images and the transform tree follow `rqt_graph`'s rules;
 /// ROS 2 actions and service events, which it does not know, are grouped where two or more of their topics are there.
-pub(super) fn groups(elements: &Elements, seen: &[bool], wish: Grouping) -> Groups {
+pub(crate) fn groups(elements: &Elements, seen: &[bool], wish: Grouping) -> Groups {
     let topics = elements.topics.iter().zip(0..);
     let mut free: BTreeMap<&str, TopicId> = topics
         .zip(seen)
@@ -117,14 +117,14 @@ fn take<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::testing::evolution;
+    use crate::view::testing::mission;
 
     /// The groups of these topics, as `name: members` in order.
     fn grouped(topics: &[&str], wish: Grouping) -> Vec<String> {
         let windows: Vec<String> = topics.iter().map(|t| format!("/n>{t}")).collect();
-        let evolution = evolution(&[&windows.join(" ")]);
-        let names = &evolution.elements.topics;
-        let groups = groups(&evolution.elements, &vec![true; names.len()], wish);
+        let mission = mission(&[&windows.join(" ")]);
+        let names = &mission.elements.topics;
+        let groups = groups(&mission.elements, &vec![true; names.len()], wish);
         let name = |id: &TopicId| names[*id as usize].name.as_str();
         groups
             .iter()

@@ -1,7 +1,7 @@
 //! Which names are housekeeping: by our own short list, and by the lists of `rqt_graph`.
 
 /// Whether our default leaves out this node or topic: log, clock, parameters, statistics, recorder events.
-pub(super) fn is_quiet(name: &str) -> bool {
+pub(crate) fn is_quiet(name: &str) -> bool {
     const EXACT: [&str; 5] = [
         "/rosout",
         "/rosout_agg",
@@ -16,7 +16,7 @@ pub(super) fn is_quiet(name: &str) -> bool {
 }
 
 /// Whether `rqt_graph`'s "Debug" leaves out this node or topic (`_quiet_filter` of its `dotcode.py`).
-pub(super) fn is_debug(name: &str) -> bool {
+pub(crate) fn is_debug(name: &str) -> bool {
     const PARTS: [&str; 12] = [
         "/diag_agg",
         "/runtime_logger",
@@ -36,18 +36,18 @@ pub(super) fn is_debug(name: &str) -> bool {
 }
 
 /// Whether `rqt_graph`'s "Debug" leaves out an arrow from node to node over this topic.
-pub(super) fn is_debug_label(topic: &str) -> bool {
+pub(crate) fn is_debug_label(topic: &str) -> bool {
     matches!(topic, "/time" | "/clock" | "/rosout" | "/statistics")
 }
 
 /// Whether it is a topic of the transform tree at the root, which `rqt_graph` hides or groups.
-pub(super) fn is_tf(topic: &str) -> bool {
+pub(crate) fn is_tf(topic: &str) -> bool {
     matches!(topic, "/tf" | "/tf_static")
 }
 
 /// Whether `rqt_graph`'s "Params" leaves out this topic. Its rule for `parameter_updates` compares the wrong part of
 /// the name and so hides nothing; as in its first version, we hide them where `parameter_descriptions` stands beside.
-pub(super) fn is_params(topic: &str, exists: impl Fn(&str) -> bool) -> bool {
+pub(crate) fn is_params(topic: &str, exists: impl Fn(&str) -> bool) -> bool {
     let beside = |this: &str, other: &str| {
         topic
             .strip_suffix(this)

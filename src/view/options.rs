@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::filter::NameFilter;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 
 /// Which boxes and arrows there are, as in the first box of `rqt_graph`'s window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use super::names::{is_debug, is_params, is_quiet, is_tf};
 use super::options::{Mode, ViewOptions};
+use crate::base::name::{is_player, is_recorder};
 use crate::graph::{Elements, Node};
-use crate::name::{is_player, is_recorder};
 
 /// Why something is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Reason {
+pub(crate) enum Reason {
     NsFilter,
     TopicFilter,
     /// A topic all of whose nodes are filtered out.
@@ -25,9 +25,9 @@ pub(super) enum Reason {
 
 /// Per node and topic of the mission, why it is left out; `None` for what is seen.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Selection {
-    pub(super) nodes: Vec<Option<Reason>>,
-    pub(super) topics: Vec<Option<Reason>>,
+pub(crate) struct Selection {
+    pub(crate) nodes: Vec<Option<Reason>>,
+    pub(crate) topics: Vec<Option<Reason>>,
 }
 
 /// Whether a node is a recorder or player, by its name or by what it logs.
@@ -46,7 +46,7 @@ struct Ends {
 }
 
 /// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters, topics without a node left.
-pub(super) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
+pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     let hide_recorder = options.hide.quiet && !options.show_recorder;
     let recorders: Vec<bool> = elements
         .nodes
@@ -117,7 +117,7 @@ fn topic_reason(
 
 /// The last steps, after the grouping: topics of their own whose nodes are all filtered out, then "Debug". `grouped`
 /// tells of each topic whether it stands in a group, which these steps leave alone.
-pub(super) fn finish(
+pub(crate) fn finish(
     selection: &mut Selection,
     elements: &Elements,
     options: &ViewOptions,
@@ -162,12 +162,12 @@ impl Selection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::testing::evolution;
+    use crate::view::testing::mission;
     use crate::view::{Hide, NameFilter, outline};
 
     /// The names of the boxes that are left.
     fn left(window: &str, options: &ViewOptions) -> String {
-        let view = outline(&evolution(&[window]), options);
+        let view = outline(&mission(&[window]), options);
         let names: Vec<&str> = view.items.iter().map(|i| i.name.as_ref()).collect();
         names.join(" ")
     }
@@ -210,7 +210,7 @@ mod tests {
             mode: Mode::Nodes,
             ..hiding("debug")
         };
-        let view = outline(&evolution(&[graph]), &nodes);
+        let view = outline(&mission(&[graph]), &nodes);
         assert_eq!((view.items.len(), view.arrows.len()), (2, 2));
     }
 

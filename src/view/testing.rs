@@ -2,17 +2,17 @@
 
 use std::collections::BTreeSet;
 
+use crate::base::notice::Notices;
+use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::{Degree, Evidence};
-use crate::evolution::{Evolution, Window};
 use crate::graph::{Edge, EdgeState, Elements, Graph, Node, NodeState, State, Topic, TopicState};
-use crate::notice::Notices;
-use crate::time::{Period, Span, Stamp};
+use crate::mission::{Mission, Window};
 
 const SECOND: i64 = 1_000_000_000;
 
 /// A mission with a window per text. `/a>/t` is a publication and `/b</t` a subscription, `/a` alone a node, `=/t`
 /// a topic; `@15` after one of them is its rate (of the topic too, for a publication), `~` makes it silent. Windows last a second.
-pub(crate) fn evolution(windows: &[&str]) -> Evolution {
+pub(crate) fn mission(windows: &[&str]) -> Mission {
     let parsed: Vec<Vec<Word>> = windows
         .iter()
         .map(|w| w.split_whitespace().map(Word::new).collect())
@@ -28,7 +28,7 @@ pub(crate) fn evolution(windows: &[&str]) -> Evolution {
     });
     let windows: Vec<Window> = windows.collect();
     let period = Period::from_nanos(SECOND).unwrap();
-    let mut evolution = Evolution {
+    let mut mission = Mission {
         bags: Vec::new(),
         span: Span {
             start: span(0).start,
@@ -42,8 +42,8 @@ pub(crate) fn evolution(windows: &[&str]) -> Evolution {
         layout: None,
         notices: Notices::new(),
     };
-    evolution.find_changes(0.25, &[]);
-    evolution
+    mission.find_changes(0.25, &[]);
+    mission
 }
 
 fn span(index: usize) -> Span {
@@ -231,14 +231,14 @@ fn count(hz: Option<f64>) -> Option<u64> {
     hz.map(|hz| hz.round() as u64)
 }
 
-/// Each window of a mission as the text that [`evolution`] reads, without rates.
-pub(crate) fn text(evolution: &Evolution) -> Vec<String> {
-    let all = &evolution.elements;
+/// Each window of a mission as the text that [`mission`] reads, without rates.
+pub(crate) fn text(mission: &Mission) -> Vec<String> {
+    let all = &mission.elements;
     let ends = |edge: &Edge| {
         let node = all.nodes[edge.node as usize].name.to_string();
         (node, all.topics[edge.topic as usize].name.to_string())
     };
-    let windows = evolution.windows.iter().map(|window| {
+    let windows = mission.windows.iter().map(|window| {
         let graph = &window.graph;
         let nodes = graph
             .nodes

@@ -13,13 +13,13 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use bagreel::picture::{Picture, Sketch, Wish};
-use bagreel::pixels::{Canvas, Painter, Pixels};
-use bagreel::scene::Scene;
-use bagreel::style::Style;
-use bagreel::text::Fonts;
+use bagreel::draw::paint::raster::{Canvas, Painter, Pixels};
+use bagreel::draw::picture::{Measured, PageOptions, Picture};
+use bagreel::draw::scene::Scene;
+use bagreel::draw::style::Style;
+use bagreel::draw::text::Fonts;
 use bagreel::view::{View, ViewOptions, view};
-use bagreel::{evolution, layout};
+use bagreel::{layout, mission};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;
@@ -32,13 +32,12 @@ fn main() {
     };
     let frames: usize = words.next().map_or(3600, |n| n.parse().unwrap());
     let path = Path::new(&mission);
-    let mut evolution =
-        evolution::read_json(&std::fs::read_to_string(path).unwrap(), path).unwrap();
-    evolution.find_changes(0.25, &[]);
-    let (view, _) = view(&evolution, &ViewOptions::default());
+    let mut mission = mission::read_json(&std::fs::read_to_string(path).unwrap(), path).unwrap();
+    mission.find_changes(0.25, &[]);
+    let (view, _) = view(&mission, &ViewOptions::default());
     let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
-    let sketch = Sketch::new(&view, &style, &fonts, Wish::default());
-    let picture = sketch.laid_out(layout::engine("layered").unwrap());
+    let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
+    let picture = measured.laid_out(layout::engine("layered").unwrap());
     let painter = Painter::new(&fonts);
     println!(
         "{} boxes, {} arrows, {} windows",

@@ -16,14 +16,17 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use bagreel::encode::Output;
-use bagreel::film::{Choice, Film, Options};
-use bagreel::pixels::Painter;
-use bagreel::strip::{Source, strip};
-use bagreel::style::Style;
-use bagreel::text::Fonts;
+use bagreel::draw::paint::raster::Painter;
+use bagreel::draw::picture;
+use bagreel::draw::strip::{Source, strip};
+use bagreel::draw::style::Style;
+use bagreel::draw::text::Fonts;
+use bagreel::export::Output;
+use bagreel::export::options::{Choice, Options};
+use bagreel::export::run;
+use bagreel::export::sequence::Sequence;
 use bagreel::view::{ViewOptions, view};
-use bagreel::{evolution, layout, picture, reel};
+use bagreel::{layout, mission};
 
 fn main() {
     let mut words = std::env::args().skip(1).filter(|a| a != "--bench");
@@ -37,23 +40,23 @@ fn main() {
         .into();
     let outputs: Vec<String> = words.collect();
     let path = Path::new(&mission);
-    let evolution = evolution::read_json(&fs::read_to_string(path).unwrap(), path).unwrap();
-    let (view, _) = view(&evolution, &ViewOptions::default());
+    let mission = mission::read_json(&fs::read_to_string(path).unwrap(), path).unwrap();
+    let (view, _) = view(&mission, &ViewOptions::default());
     let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
     let title = path.file_name().unwrap().to_string_lossy().into_owned();
-    let wish = picture::Wish {
+    let options = picture::PageOptions {
         title,
-        ..picture::Wish::default()
+        ..picture::PageOptions::default()
     };
-    let sketch = picture::Sketch::new(&view, &style, &fonts, wish);
-    let picture = sketch.laid_out(layout::engine("layered").unwrap());
+    let measured = picture::Measured::new(&view, &style, &fonts, options);
+    let picture = measured.laid_out(layout::engine("layered").unwrap());
     let painter = Painter::new(&fonts);
     let variable = |name: &str| std::env::var(name).ok();
     let number = |name: &str| variable(name).and_then(|v| v.parse::<u32>().ok());
     let choice = variable("STRIP").map(|s| Choice::parse(&s).unwrap());
     let mm = number("MM").map(f64::from);
     let source = Source {
-        evolution: &evolution,
+        mission: &mission,
         view: &view,
         picture: &picture,
         style: &style,
@@ -74,9 +77,9 @@ fn main() {
         strip: choice,
         ..Options::default()
     };
-    let film = Film {
-        evolution: &evolution,
-        data: &evolution,
+    let sequence = Sequence {
+        mission: &mission,
+        data: &mission,
         view: &view,
         picture: &picture,
         painter: &painter,
@@ -84,12 +87,12 @@ fn main() {
         strip: Some(&page.scene),
         options,
     };
-    let shots = film.shots().len();
+    let frame_times = sequence.frame_times().len();
     let run = |names: &[&str]| {
         let output = |n: &&str| Output::parse(&folder.join(n).to_string_lossy(), None).unwrap();
         let outputs: Vec<Output> = names.iter().map(output).collect();
         let begin = Instant::now();
-        let written = reel::run(&film, &outputs, &mut |_, _| ControlFlow::Continue(())).unwrap();
+        let written = run::run(&sequence, &outputs, &mut |_, _| ControlFlow::Continue(())).unwrap();
         (written, begin.elapsed().as_secs_f64() * 1e3)
     };
     if !outputs.is_empty() {
@@ -110,7 +113,7 @@ fn main() {
         "a.csv",
     ] {
         let (written, ms) = run(&[name]);
-        let (bytes, each) = (written[0].bytes, ms / shots as f64);
+        let (bytes, each) = (written[0].bytes, ms / frame_times as f64);
         println!(
             "{name:14} {bytes:>9} bytes in {} files, {each:6.1} ms a frame with drawing",
             written[0].files
@@ -118,19 +121,19 @@ fn main() {
     }
     println!(
         "a.gif: worst frame {:.1} dB",
-        worst_psnr(&film, &folder.join("a.gif"))
+        worst_psnr(&sequence, &folder.join("a.gif"))
     );
 }
 
 /// The lowest PSNR of a frame of the GIF against the frame as it was drawn, in dB.
-fn worst_psnr(film: &Film<'_>, path: &Path) -> f64 {
+fn worst_psnr(sequence: &Sequence<'_>, path: &Path) -> f64 {
     let mut decoder = gif::DecodeOptions::new();
     decoder.set_color_output(gif::ColorOutput::RGBA);
     let mut decoder = decoder.read_info(fs::File::open(path).unwrap()).unwrap();
     let width = usize::from(decoder.width());
     let mut canvas = vec![0; width * usize::from(decoder.height()) * 4];
     let mut worst = f64::INFINITY;
-    for shot in film.shots() {
+    for frame_time in sequence.frame_times() {
         let Some(frame) = decoder.read_next_frame().unwrap() else {
             break;
         };
@@ -147,9 +150,12 @@ fn worst_psnr(film: &Film<'_>, path: &Path) -> f64 {
             );
             canvas[(y * width + x) * 4..][..4].copy_from_slice(pixel);
         }
-        let pixels = film
+        let pixels = sequence
             .painter
-            .paint(&film.picture.scene(shot.window, shot.phase), 1.0)
+            .paint(
+                &sequence.picture.scene(frame_time.window, frame_time.phase),
+                1.0,
+            )
             .unwrap();
         let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
         let sum: f64 = canvas.iter().zip(&pixels.rgba).map(square).sum();

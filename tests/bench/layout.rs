@@ -22,8 +22,8 @@ mod svg;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use bagreel::geometry::Size;
-use bagreel::layout::{self, Layout, Orientation, Wish};
+use bagreel::base::geometry::Size;
+use bagreel::layout::{self, Layout, Orientation};
 
 use graph::Graph;
 
@@ -72,13 +72,13 @@ fn main() {
                 std::fs::write(file, svg::svg(&graph, &layout)).unwrap();
             }
         };
-        let wish = Wish {
+        let options = layout::Options {
             page: PAGE,
             orientation,
         };
         show(
             "ours",
-            timed(|| layout::lay_out(&graph.plan, &wish, engine)),
+            timed(|| layout::lay_out(&graph.plan, &options, engine)),
         );
         if args.iter().any(|a| a == "--dot") {
             for (engine, orientation, clustered) in [

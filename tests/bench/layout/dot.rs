@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use bagreel::geometry::{Point, Rect, Size};
+use bagreel::base::geometry::{Point, Rect, Size};
 use bagreel::layout::{Layout, Orientation, Plan, Route};
 
 /// What `dot` makes of a plan; `None` if it is not installed or takes longer than `seconds`.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use bagreel::geometry::Size;
+use bagreel::base::geometry::Size;
 use bagreel::layout::{Cluster, Link, Outline, Plan, Vertex};
 
 /// A graph with its names.

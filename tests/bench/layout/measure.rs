@@ -6,7 +6,7 @@
     reason = "formulas of analytic geometry"
 )]
 
-use bagreel::geometry::{Point, Rect};
+use bagreel::base::geometry::{Point, Rect};
 use bagreel::layout::{Layout, Outline, Plan, Route};
 
 /// The numbers of one layout.

@@ -1,0 +1,268 @@
+//! Sinks that stand between a reader and the sink it was given: clipping to a range, gathering, changing threads.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
+use crate::base::notice::Notice;
+use crate::base::time::{Span, Stamp};
+
+/// Lets through what lies inside a range, and notes whether anything was lost.
+pub(crate) struct Clip<'a> {
+    range: Option<Span>,
+    sink: &'a mut dyn Sink,
+    /// Whether a notice said that data was skipped.
+    pub(crate) lost: bool,
+}
+
+impl<'a> Clip<'a> {
+    /// Before `sink`; without a range all goes through.
+    pub(crate) fn new(range: Option<Span>, sink: &'a mut dyn Sink) -> Self {
+        Self {
+            range,
+            sink,
+            lost: false,
+        }
+    }
+}
+
+impl Sink for Clip<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        self.sink.connection(connection)
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let Some(range) = self.range else {
+            return self.sink.stamps(connection, stamps, sizes);
+        };
+        if stamps.iter().all(|t| range.contains(*t)) {
+            return self.sink.stamps(connection, stamps, sizes);
+        }
+        let inside = |at: &usize| range.contains(stamps[*at]);
+        let kept: Vec<usize> = (0..stamps.len()).filter(inside).collect();
+        let stamps: Vec<Stamp> = kept.iter().map(|at| stamps[*at]).collect();
+        let sizes: Option<Vec<u32>> = sizes.map(|s| kept.iter().map(|at| s[*at]).collect());
+        if !stamps.is_empty() {
+            self.sink.stamps(connection, &stamps, sizes.as_deref());
+        }
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        if self.range.is_none_or(|r| r.contains(message.time)) {
+            self.sink.message(message);
+        }
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.lost |= notice.kind.is_loss();
+        self.sink.notice(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        self.sink.progress(done, total);
+    }
+}
+
+/// Stamps and sizes of single messages, gathered per connection so that a sink gets them in long runs.
+#[derive(Default)]
+pub(crate) struct Gather {
+    /// Whether the sizes are not known.
+    pub(crate) sizeless: bool,
+    runs: Vec<(Vec<Stamp>, Vec<u32>)>,
+    touched: Vec<ConnectionId>,
+    held: usize,
+}
+
+/// How many stamps are gathered at most: 3 MB.
+const MOST_GATHERED: usize = 1 << 18;
+
+impl Gather {
+    /// Adds one message.
+    pub(crate) fn add(&mut self, id: ConnectionId, time: Stamp, size: u32, sink: &mut dyn Sink) {
+        let at = id.0 as usize;
+        if self.runs.len() <= at {
+            self.runs.resize_with(at + 1, Default::default);
+        }
+        let run = &mut self.runs[at];
+        if run.0.is_empty() {
+            self.touched.push(id);
+        }
+        run.0.push(time);
+        run.1.push(size);
+        self.held += 1;
+        if self.held >= MOST_GATHERED {
+            self.flush(sink);
+        }
+    }
+
+    /// Hands over all that was gathered, by connection.
+    pub(crate) fn flush(&mut self, sink: &mut dyn Sink) {
+        self.touched.sort_unstable();
+        for id in self.touched.drain(..) {
+            let (stamps, sizes) = &mut self.runs[id.0 as usize];
+            sink.stamps(id, stamps, (!self.sizeless).then_some(sizes));
+            stamps.clear();
+            sizes.clear();
+        }
+        self.held = 0;
+    }
+}
+
+/// What one thread found, to be told to a sink on another.
+#[derive(Default)]
+struct Batch {
+    runs: Vec<(ConnectionId, usize, bool)>,
+    stamps: Vec<Stamp>,
+    sizes: Vec<u32>,
+    messages: Vec<(ConnectionId, Stamp, usize, u32)>,
+    bytes: Vec<u8>,
+    notices: Vec<Notice>,
+}
+
+impl Batch {
+    fn is_full(&self) -> bool {
+        self.stamps.len() > 1 << 14 || self.bytes.len() > 1 << 17
+    }
+
+    fn tell(&self, sink: &mut dyn Sink) {
+        let (mut at, mut size_at, mut byte_at) = (0, 0, 0);
+        for (id, count, sized) in &self.runs {
+            let sizes = sized.then(|| &self.sizes[size_at..size_at + count]);
+            sink.stamps(*id, &self.stamps[at..at + count], sizes);
+            at += count;
+            size_at += if *sized { *count } else { 0 };
+        }
+        for (connection, time, len, size) in &self.messages {
+            sink.message(Message {
+                connection: *connection,
+                time: *time,
+                data: &self.bytes[byte_at..byte_at + len],
+                size: *size,
+            });
+            byte_at += len;
+        }
+        for notice in &self.notices {
+            sink.notice(notice.clone());
+        }
+    }
+}
+
+/// The end of a thread's work on one part, or some of it.
+enum Sent {
+    Some(Batch),
+    Done,
+}
+
+struct Sender {
+    batch: Batch,
+    to: SyncSender<Sent>,
+    /// Nobody listens any more.
+    deaf: bool,
+}
+
+impl Sender {
+    fn flush(&mut self) {
+        let batch = std::mem::take(&mut self.batch);
+        self.deaf |= self.to.send(Sent::Some(batch)).is_err();
+    }
+
+    fn flush_if_full(&mut self) {
+        if self.batch.is_full() {
+            self.flush();
+        }
+    }
+
+    fn done(&mut self) {
+        self.flush();
+        self.deaf |= self.to.send(Sent::Done).is_err();
+    }
+}
+
+impl Sink for Sender {
+    fn connection(&mut self, _: &Connection) -> Want {
+        Want::Stamps
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        self.batch
+            .runs
+            .push((connection, stamps.len(), sizes.is_some()));
+        self.batch.stamps.extend_from_slice(stamps);
+        self.batch.sizes.extend_from_slice(sizes.unwrap_or(&[]));
+        self.flush_if_full();
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        let len = message.data.len();
+        self.batch
+            .messages
+            .push((message.connection, message.time, len, message.size));
+        self.batch.bytes.extend_from_slice(message.data);
+        self.flush_if_full();
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.batch.notices.push(notice);
+    }
+}
+
+/// How many chunks are one part: handing over to another thread costs more than reading a small index.
+pub(crate) const GROUP: usize = 16;
+
+/// Does `work` on the parts `0..count` on `threads` threads and tells `sink` what they find, in the order of the
+/// parts: the same calls as with one thread. `after` is called when a part has been told.
+///
+/// All connections must have been announced before; `work` cannot announce more.
+pub(crate) fn in_order(
+    count: usize,
+    threads: usize,
+    work: &(dyn Fn(usize, &mut dyn Sink) + Sync),
+    sink: &mut dyn Sink,
+    mut after: impl FnMut(usize, &mut dyn Sink),
+) {
+    if threads <= 1 {
+        for part in 0..count {
+            work(part, sink);
+            after(part, sink);
+        }
+        return;
+    }
+    thread::scope(|scope| {
+        let lines: Vec<Receiver<Sent>> = (0..threads)
+            .map(|first| {
+                let (to, from) = sync_channel(8);
+                scope.spawn(move || work_on(first, count, threads, work, to));
+                from
+            })
+            .collect();
+        for part in 0..count {
+            let line = &lines[part % threads];
+            while let Ok(Sent::Some(batch)) = line.recv() {
+                batch.tell(sink);
+            }
+            after(part, sink);
+        }
+    });
+}
+
+/// Every `step`th part from `first` on.
+fn work_on(
+    first: usize,
+    count: usize,
+    step: usize,
+    work: &(dyn Fn(usize, &mut dyn Sink) + Sync),
+    to: SyncSender<Sent>,
+) {
+    let mut sender = Sender {
+        batch: Batch::default(),
+        to,
+        deaf: false,
+    };
+    for part in (first..count).step_by(step) {
+        work(part, &mut sender);
+        sender.done();
+        if sender.deaf {
+            break;
+        }
+    }
+}

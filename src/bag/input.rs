@@ -1,0 +1,113 @@
+//! Where a bag lies, and its first bytes, which tell its format.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::model::{OpenOptions, Reader};
+use super::source::{Source, Stream};
+use crate::base::error::{Error, Result};
+
+/// One bag to read: a path, or standard input (`-`).
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Input {
+    /// A file or a folder.
+    Path(PathBuf),
+    /// Standard input: ROS 1 or MCAP.
+    Stdin,
+}
+
+impl Input {
+    /// The bag's own name, no path.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Path(path) => file_name(path),
+            Self::Stdin => "standard input".to_owned(),
+        }
+    }
+}
+
+/// A row of [`FORMATS`].
+pub struct FormatRow {
+    /// Its word in JSON.
+    pub name: &'static str,
+    /// What it is, for people.
+    pub what: &'static str,
+    /// The names that such bags usually end in. Only told, never asked: the first bytes decide.
+    pub extensions: &'static [&'static str],
+    /// What it is read from.
+    pub(crate) medium: Medium,
+    /// Whether a bag begins so.
+    pub(crate) sniff: fn(&Place, &[u8]) -> bool,
+    /// Makes a reader.
+    pub(crate) open: fn(Place, &OpenOptions) -> Result<Box<dyn Reader>>,
+}
+
+/// What a format is read from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Medium {
+    /// A file, or a pipe.
+    Stream,
+    /// A file.
+    File,
+    /// A folder.
+    Folder,
+    /// A file or a pipe with a bag of another format in it.
+    Wrapping,
+}
+
+/// Where a bag lies.
+pub(crate) enum Place {
+    /// A folder.
+    Folder(PathBuf),
+    /// A regular file.
+    File(Source),
+    /// A pipe: its name and its bytes.
+    Pipe(String, Stream<'static>),
+}
+
+/// How many first bytes tell a format.
+pub(crate) const HEAD: usize = 512;
+
+/// Opens what lies there, without reading more than its kind.
+pub(crate) fn place(input: &Input) -> Result<Place> {
+    let Input::Path(path) = input else {
+        return Ok(Place::Pipe(input.name(), Stream::of_reader(io::stdin())));
+    };
+    let meta = path.metadata().map_err(Error::io("read", path))?;
+    if meta.is_dir() {
+        return Ok(Place::Folder(path.clone()));
+    }
+    if meta.is_file() {
+        return Source::open(path).map(Place::File);
+    }
+    let pipe = File::open(path).map_err(Error::io("read", path))?;
+    Ok(Place::Pipe(file_name(path), Stream::of_reader(pipe)))
+}
+
+/// The first bytes; none for a folder.
+pub(crate) fn head(place: &mut Place) -> Result<Vec<u8>> {
+    match place {
+        Place::Folder(_) => Ok(Vec::new()),
+        Place::File(source) => {
+            let mut head = vec![0; HEAD];
+            let got = source.read_at(0, &mut head);
+            head.truncate(got.map_err(Error::io("read", source.path()))?);
+            Ok(head)
+        }
+        Place::Pipe(name, stream) => {
+            let head = stream.peek(HEAD).map(<[u8]>::to_vec);
+            head.map_err(Error::io("read", Path::new(name)))
+        }
+    }
+}
+
+/// The last part of a path as text.
+pub fn file_name(path: &Path) -> String {
+    let part = path.canonicalize().ok();
+    let part = part.as_deref().unwrap_or(path).file_name();
+    part.map_or_else(
+        || path.display().to_string(),
+        |n| n.to_string_lossy().into_owned(),
+    )
+}

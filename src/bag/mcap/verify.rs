@@ -1,0 +1,101 @@
+//! An MCAP file read a second time by somebody else's reader, the crate `mcap`, with all checksums.
+
+use std::io::{self, Read};
+
+use mcap::parse_record;
+use mcap::records::Record;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::records::{Table, op};
+use crate::bag::adapters::Gather;
+use crate::bag::index::{hand_over_slice, nameless};
+use crate::bag::model::{Sink, Want};
+use crate::base::time::Stamp;
+
+/// Longer records are not looked into, in bytes.
+const LONGEST_RECORD: usize = 256 << 20;
+
+/// The crate's findings on their way to a sink.
+struct Crate<'s> {
+    sink: &'s mut dyn Sink,
+    table: Table,
+    wants: Vec<Want>,
+    gather: Gather,
+}
+
+/// Tells `sink` all that the crate finds in `from`, which begins with the magic.
+///
+/// # Errors
+/// Why it did not get to the end: a wrong checksum, a cut, or anything else that is not as the format has it.
+pub(super) fn read(from: &mut dyn Read, sink: &mut dyn Sink) -> Result<(), String> {
+    let options = LinearReaderOptions::default()
+        .with_validate_chunk_crcs(true)
+        .with_validate_data_section_crc(true)
+        .with_validate_summary_section_crc(true)
+        .with_record_length_limit(LONGEST_RECORD);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut found = Crate {
+        sink,
+        table: Table::default(),
+        wants: Vec::new(),
+        gather: Gather::default(),
+    };
+    let told = found.records(&mut reader, from);
+    found.gather.flush(found.sink);
+    told
+}
+
+impl Crate<'_> {
+    fn records(&mut self, reader: &mut LinearReader, from: &mut dyn Read) -> Result<(), String> {
+        while let Some(event) = reader.next_event() {
+            match event.map_err(|e| e.to_string())? {
+                LinearReadEvent::ReadRequest(n) => {
+                    // Memory follows what came, not what was asked for.
+                    let got = read_some(from, reader.insert(n.min(1 << 20)))
+                        .map_err(|e| e.to_string())?;
+                    reader.notify_read(got);
+                }
+                LinearReadEvent::Record { data, opcode } => self.record(opcode, data)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Only these kinds are given to the crate's parser: it panics on a short attachment.
+    fn record(&mut self, kind: u8, data: &[u8]) -> Result<(), String> {
+        match kind {
+            op::SCHEMA => drop(self.table.schema(data)),
+            op::CHANNEL => {
+                if let Some(connection) = self.table.channel(data) {
+                    self.wants.push(self.sink.connection(connection));
+                }
+            }
+            op::MESSAGE => {
+                let record = parse_record(kind, data).map_err(|e| e.to_string())?;
+                if let Record::Message { header, data } = record {
+                    self.message(header.channel_id, Stamp::from_nanos(header.log_time), &data);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn message(&mut self, channel: u16, time: Stamp, data: &[u8]) {
+        let Some(id) = self.table.get(channel) else {
+            return nameless(self.sink, 1);
+        };
+        hand_over_slice(data, (id, time), self.wants[id.0 as usize], self.sink);
+        let size = u32::try_from(data.len()).unwrap_or(u32::MAX);
+        self.gather.add(id, time, size, self.sink);
+    }
+}
+
+fn read_some(from: &mut dyn Read, into: &mut [u8]) -> io::Result<usize> {
+    loop {
+        match from.read(into) {
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            other => return other,
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! What a bag holds and how it is told: connections, messages, the sink that takes them in, the reader that feeds it.
+
+use std::io;
+use std::sync::Arc;
+
+use crate::base::error::Result;
+use crate::base::name::{NodeName, TopicName};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::{Span, Stamp};
+
+/// How a payload is written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// ROS 1 serialisation: little-endian, packed.
+    Ros1,
+    /// ROS 2 serialisation: CDR behind a header of four bytes.
+    Cdr,
+    /// Anything else, by the name that the bag gives it; never decoded.
+    Other(String),
+}
+
+/// The place of a connection among those that one reader has announced: 0.., no holes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ConnectionId(pub u32);
+
+/// A publisher's connection (ROS 1), a channel (MCAP) or a topic row (sqlite3): one source of messages.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Connection {
+    /// Its place among the reader's connections.
+    pub id: ConnectionId,
+    /// The topic as recorded.
+    pub topic: TopicName,
+    /// The message type as recorded: `std_msgs/String`, `std_msgs/msg/String`; empty if the bag does not say.
+    pub type_name: Arc<str>,
+    /// The text of the message definition, if the bag holds one.
+    pub definition: Option<Arc<str>>,
+    /// The md5 sum (ROS 1) or RIHS01 hash (ROS 2) of the type, if the bag holds one.
+    pub type_hash: Option<Arc<str>>,
+    /// The node that publishes, if the header names one (`callerid`).
+    pub publisher: Option<NodeName>,
+    /// Whether the publisher latches (ROS 1 header).
+    pub latching: bool,
+    /// `offered_qos_profiles` as recorded (ROS 2): YAML text or YAML converted to JSON text; empty means none.
+    pub qos: Option<Arc<str>>,
+    /// How its payloads are written.
+    pub encoding: Encoding,
+}
+
+/// What a sink wants to see of a connection's payloads. Stamps come in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Want {
+    /// Nothing: the reader stays at its index.
+    #[default]
+    Stamps,
+    /// The size of each payload, even if that means reading more than the index.
+    Sizes,
+    /// The first bytes of each payload, at least this many if it is that long; more may come.
+    Head(usize),
+    /// Each payload whole.
+    Payload,
+}
+
+/// One wanted message.
+#[derive(Clone, Copy, Debug)]
+pub struct Message<'a> {
+    /// Its connection, announced before.
+    pub connection: ConnectionId,
+    /// When the recorder received it.
+    pub time: Stamp,
+    /// The payload, or its head ([`Want::Head`]).
+    pub data: &'a [u8],
+    /// The length of the whole payload in bytes.
+    pub size: u32,
+}
+
+/// What takes in what a reader finds.
+///
+/// Order: a connection is announced before its stamps and messages, otherwise anything may come in any order.
+/// Every message of the bag (inside the range asked for) is stamped exactly once through [`Sink::stamps`]; a wanted
+/// one comes through [`Sink::message`] as well, before or after.
+pub trait Sink {
+    /// A new connection; answers what is wanted of it.
+    fn connection(&mut self, connection: &Connection) -> Want;
+
+    /// Log times of messages of one connection, in file order. `sizes` holds each payload's bytes where the reader
+    /// knows them (always if wanted); then it is as long as `stamps`.
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
+
+    /// A wanted message.
+    fn message(&mut self, message: Message<'_>);
+
+    /// Something worth saying.
+    fn notice(&mut self, notice: Notice);
+
+    /// How far the reader is, in bytes of `total` (0 where the size is not known).
+    fn progress(&mut self, _done: u64, _total: u64) {}
+}
+
+/// The way a bag was read; `reading.md` calls them tiers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Tier {
+    /// By its index: no payload is read that is not wanted.
+    Index,
+    /// Record by record from the front.
+    Forward,
+    /// Everything, a second time, by an independent reader.
+    Verify,
+}
+
+impl Tier {
+    /// Its word in JSON.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Index => "index",
+            Self::Forward => "forward",
+            Self::Verify => "verify",
+        }
+    }
+}
+
+/// What a reader says about its bag when it is done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// The file's or folder's own name, no path.
+    pub name: String,
+    /// The format's word in JSON: `rosbag1`, `sqlite3`, `mcap`, `evolution`.
+    pub format: String,
+    /// Every compression seen, sorted: `none`, `bz2`, `lz4`, `zstd`.
+    pub compression: Vec<String>,
+    /// How it was read.
+    pub tier: Tier,
+    /// Why not by its index, if so.
+    pub tier_reason: Option<String>,
+    /// Whether nothing was lost.
+    pub complete: bool,
+    /// Bytes read from the file, for benchmarks; 0 where not known.
+    pub bytes_read: u64,
+    /// The size of the bag on disk in bytes; 0 where not known.
+    pub file_bytes: u64,
+    /// Stored facts worth telling in `info`: `ros_distro`, `library`, `storage`, …
+    pub facts: Vec<(String, String)>,
+}
+
+/// A bag, open.
+pub trait Reader: Send {
+    /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index tells it without
+    /// reading the bag. `None` when only reading will tell. A big bag with a lying tail may hold stamps outside.
+    fn span(&mut self) -> Result<Option<Span>>;
+
+    /// Reads the bag once, front to back or by its index, into `sink`. With `range` only messages inside it are
+    /// stamped, and parts of the bag outside are not read where the index allows; connections are announced anyway.
+    ///
+    /// # Errors
+    /// Only where nothing at all can be read. Whatever is lost on the way is a notice, and `Report::complete` false.
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report>;
+}
+
+/// How to open a bag.
+#[derive(Clone, Debug, Default)]
+pub struct OpenOptions {
+    /// Read everything by the second, independent reader instead (tier `verify`).
+    pub verify: bool,
+}
+
+/// The longest payload, or connection record, that is held in memory, in bytes.
+pub(crate) const MOST_PAYLOAD: usize = 16 << 20;
+
+/// Tells `sink` that something was lost because the system refused.
+pub(crate) fn lost(sink: &mut dyn Sink, what: &str, why: &io::Error) {
+    sink.notice(Notice::new(NoticeKind::Damaged, format!("{what}: {why}")));
+}

@@ -1,0 +1,160 @@
+//! `metadata.yaml` of a rosbag2 folder, versions 1 to 9, as a hint: which files, which quality of service.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use crate::base::yaml::{self, Value};
+
+/// What `metadata.yaml` says.
+#[derive(Default)]
+pub(super) struct Metadata {
+    /// Names of storage files, as written.
+    pub(super) files: Vec<String>,
+    pub(super) topics: BTreeMap<String, Topic>,
+    pub(super) facts: Vec<(String, String)>,
+}
+
+/// What it says of a topic.
+pub(super) struct Topic {
+    pub(super) type_name: Arc<str>,
+    pub(super) encoding: String,
+    pub(super) qos: Option<Arc<str>>,
+    pub(super) hash: Option<Arc<str>>,
+}
+
+/// The longest file that is read, in bytes.
+const LONGEST: u64 = 8 << 20;
+
+/// Reads `metadata.yaml` in `folder`: `Ok(None)` if there is none, the reason if it cannot be understood.
+pub(super) fn read(folder: &Path) -> Result<Option<Metadata>, String> {
+    let path = folder.join("metadata.yaml");
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let mut bytes = Vec::new();
+    let file = File::open(&path).map_err(|e| e.to_string())?;
+    let read = file.take(LONGEST).read_to_end(&mut bytes);
+    read.map_err(|e| e.to_string())?;
+    let data = yaml::parse(&String::from_utf8_lossy(&bytes))
+        .map_err(|e| format!("line {}: {}", e.line, e.reason))?;
+    let root = data.get("rosbag2_bagfile_information");
+    let root = root.ok_or("it has no `rosbag2_bagfile_information`")?;
+    Ok(Some(understand(root)))
+}
+
+fn understand(root: &Value) -> Metadata {
+    let mut metadata = Metadata::default();
+    let files = root.get("relative_file_paths").and_then(Value::as_array);
+    let names = files.into_iter().flatten().filter_map(Value::as_str);
+    metadata.files = names.map(str::to_owned).collect();
+    for name in [
+        "version",
+        "storage_identifier",
+        "ros_distro",
+        "compression_mode",
+    ] {
+        let text = match root.get(name) {
+            Some(Value::String(text)) if !text.is_empty() => text.clone(),
+            Some(Value::Number(number)) => number.to_string(),
+            _ => continue,
+        };
+        let name = if name == "version" {
+            "metadata_version"
+        } else {
+            name
+        };
+        metadata.facts.push((name.to_owned(), text));
+    }
+    let topics = root
+        .get("topics_with_message_count")
+        .and_then(Value::as_array);
+    for topic in topics.into_iter().flatten() {
+        let Some(topic) = topic.get("topic_metadata") else {
+            continue;
+        };
+        let text = |key| topic.get(key).and_then(Value::as_str).unwrap_or_default();
+        if !text("name").is_empty() {
+            metadata
+                .topics
+                .insert(text("name").to_owned(), of_topic(topic, text));
+        }
+    }
+    metadata
+}
+
+fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> Topic {
+    let some = |text: &str| (!text.is_empty()).then(|| Arc::from(text));
+    Topic {
+        type_name: text("type").into(),
+        encoding: text("serialization_format").to_owned(),
+        qos: match topic.get("offered_qos_profiles") {
+            // Up to version 8 the profiles are text, from 9 on they are data.
+            Some(Value::Array(all)) if !all.is_empty() => {
+                some(&Value::from(all.clone()).to_string())
+            }
+            Some(Value::String(profiles)) => some(profiles),
+            _ => None,
+        },
+        hash: some(text("type_description_hash")),
+    }
+}
+
+/// The file in `folder` that `name` means, if it is a plain name of a regular file there. Up to version 3 the folder's
+/// own name stands before it.
+///
+/// # Errors
+/// A sentence that says why not.
+pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
+    let path = Path::new(name);
+    if path
+        .components()
+        .any(|c| !matches!(c, Component::Normal(_) | Component::CurDir))
+    {
+        return Err(format!("`{name}` leaves the folder and was not followed"));
+    }
+    let Some(last) = path.file_name() else {
+        return Err(format!("`{name}` names no file"));
+    };
+    let plain = folder.join(last);
+    let found = [
+        plain.clone(),
+        with_end(&plain, ".zstd"),
+        plain.with_extension(""),
+    ];
+    let is_storage = |p: &&PathBuf| p.is_file() && is_storage(p);
+    let Some(found) = found.iter().find(is_storage) else {
+        return Err(format!("`{}` is missing", last.to_string_lossy()));
+    };
+    let inside = || {
+        Some(
+            found
+                .canonicalize()
+                .ok()?
+                .starts_with(folder.canonicalize().ok()?),
+        )
+    };
+    if inside() == Some(true) {
+        Ok(found.clone())
+    } else {
+        Err(format!(
+            "`{name}` is a link out of the folder and was not followed"
+        ))
+    }
+}
+
+fn with_end(path: &Path, end: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(end);
+    name.into()
+}
+
+/// Whether a file is named like the storage of a recording.
+pub(super) fn is_storage(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.strip_suffix(".zstd").unwrap_or(&name);
+    let end = Path::new(name).extension();
+    end.is_some_and(|e| e == "db3" || e == "mcap")
+}

@@ -1,0 +1,282 @@
+//! Where bytes come from: files read at any place, and streams that can be peeked into and skipped through.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::base::error::{Error, Result};
+
+/// A regular file that several threads read at any place at once. Counts the bytes it hands out.
+#[derive(Debug)]
+pub(crate) struct Source {
+    path: PathBuf,
+    file: File,
+    len: u64,
+    read: AtomicU64,
+}
+
+impl Source {
+    /// Opens the file at `path` for reading.
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(Error::io("read", path))?;
+        let len = file.metadata().map_err(Error::io("read", path))?.len();
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            len,
+            read: AtomicU64::new(0),
+        })
+    }
+
+    /// Its path, as it was opened.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its size in bytes when it was opened.
+    pub(crate) fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// The bytes read from it so far.
+    pub(crate) fn bytes_read(&self) -> u64 {
+        self.read.load(Ordering::Relaxed)
+    }
+
+    /// Reads from byte `at` on until `into` is full or the file ends; answers how many bytes came.
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub(crate) fn read_at(&self, at: u64, into: &mut [u8]) -> io::Result<usize> {
+        let mut filled = 0;
+        while filled < into.len() {
+            match read_once(&self.file, at + filled as u64, &mut into[filled..]) {
+                Ok(0) => break,
+                Ok(n) => filled += n,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
+        self.read.fetch_add(filled as u64, Ordering::Relaxed);
+        Ok(filled)
+    }
+}
+
+#[cfg(unix)]
+fn read_once(file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, into, at)
+}
+
+#[cfg(windows)]
+fn read_once(file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, into, at)
+}
+
+/// Elsewhere the place is shared, so one thread at a time.
+#[cfg(not(any(unix, windows)))]
+fn read_once(mut file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
+    use std::io::{Seek as _, SeekFrom};
+    static ONE: std::sync::Mutex<()> = std::sync::Mutex::new(());
+    let _one = ONE.lock();
+    file.seek(SeekFrom::Start(at))?;
+    file.read(into)
+}
+
+/// A folder of ours that is gone when this is dropped.
+pub(crate) struct Temporary(tempfile::TempDir);
+
+impl Temporary {
+    /// Makes one where the system keeps such folders.
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub(crate) fn new() -> Result<Self> {
+        let dir = tempfile::tempdir();
+        dir.map(Self)
+            .map_err(Error::io("make a folder in", &std::env::temp_dir()))
+    }
+
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+enum From<'a> {
+    /// Part of a file, up to byte `end`.
+    File { source: &'a Source, end: u64 },
+    /// Anything that can only be read on.
+    Reader(Box<dyn Read + Send + 'a>),
+}
+
+/// Bytes in order, with a look ahead; skipping costs nothing in a file.
+pub(crate) struct Stream<'a> {
+    from: From<'a>,
+    /// Where `buffer[used]` stands.
+    at: u64,
+    buffer: Vec<u8>,
+    used: usize,
+    /// How much is read at a time.
+    step: usize,
+}
+
+/// For reading through.
+pub(crate) const FAR: usize = 256 * 1024;
+/// For picking small records here and there.
+pub(crate) const NEAR: usize = 4096;
+
+impl<'a> Stream<'a> {
+    /// The bytes `start..end` of a file, `step` at a time.
+    pub(crate) fn of_file(source: &'a Source, start: u64, end: u64, step: usize) -> Self {
+        let end = end.min(source.len());
+        Self::new(From::File { source, end }, start, step)
+    }
+
+    /// All that `reader` gives, counted from 0.
+    pub(crate) fn of_reader(reader: impl Read + Send + 'a) -> Self {
+        Self::new(From::Reader(Box::new(reader)), 0, FAR)
+    }
+
+    fn new(from: From<'a>, at: u64, step: usize) -> Self {
+        Self {
+            from,
+            at,
+            buffer: Vec::new(),
+            used: 0,
+            step,
+        }
+    }
+
+    /// Where the next byte stands.
+    pub(crate) fn position(&self) -> u64 {
+        self.at
+    }
+
+    /// The next `n` bytes without taking them; fewer only where the stream ends. `n` must be bounded by the caller.
+    ///
+    /// # Errors
+    /// The system's refusal, or a decompressor's complaint.
+    pub(crate) fn peek(&mut self, n: usize) -> io::Result<&[u8]> {
+        if self.buffer.len() - self.used < n {
+            self.fill(n)?;
+        }
+        let end = self.buffer.len().min(self.used + n);
+        Ok(&self.buffer[self.used..end])
+    }
+
+    /// All that has been read ahead and not taken.
+    fn ahead(&self) -> usize {
+        self.buffer.len() - self.used
+    }
+
+    /// Reads on until `n` bytes are ahead or the stream ends.
+    fn fill(&mut self, n: usize) -> io::Result<()> {
+        self.buffer.drain(..self.used);
+        self.used = 0;
+        while self.buffer.len() < n {
+            let old = self.buffer.len();
+            let next = self.at + old as u64;
+            let mut size = self.step.max(n) - old;
+            if let From::File { end, .. } = self.from {
+                let left = end.saturating_sub(next);
+                size = size.min(usize::try_from(left).unwrap_or(usize::MAX));
+            }
+            self.buffer.resize(old + size, 0);
+            let got = match &mut self.from {
+                From::File { source, .. } => source.read_at(next, &mut self.buffer[old..]),
+                From::Reader(reader) => read_some(reader, &mut self.buffer[old..]),
+            };
+            self.buffer.truncate(old + *got.as_ref().unwrap_or(&0));
+            if got? == 0 {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes `n` bytes that were peeked at.
+    pub(crate) fn advance(&mut self, n: usize) {
+        let n = n.min(self.ahead());
+        self.used += n;
+        self.at += n as u64;
+    }
+
+    /// Passes over `n` bytes; answers how many there were, fewer only at the end. Past the end of a file the answer is
+    /// right without reading.
+    ///
+    /// # Errors
+    /// As [`Stream::peek`].
+    pub(crate) fn skip(&mut self, n: u64) -> io::Result<u64> {
+        let mut left = n;
+        loop {
+            let here = usize::try_from(left)
+                .unwrap_or(usize::MAX)
+                .min(self.ahead());
+            self.advance(here);
+            left -= here as u64;
+            if left == 0 {
+                return Ok(n);
+            }
+            if let From::File { end, .. } = self.from {
+                let step = left.min(end.saturating_sub(self.at));
+                self.at += step;
+                return Ok(n - left + step);
+            }
+            if self.peek(1)?.is_empty() {
+                return Ok(n - left);
+            }
+        }
+    }
+}
+
+impl Read for Stream<'_> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if self.ahead() == 0 {
+            self.peek(1)?;
+        }
+        let n = self.ahead().min(into.len());
+        into[..n].copy_from_slice(&self.buffer[self.used..self.used + n]);
+        self.advance(n);
+        Ok(n)
+    }
+}
+
+fn read_some(reader: &mut dyn Read, into: &mut [u8]) -> io::Result<usize> {
+    loop {
+        match reader.read(into) {
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            other => return other,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_peeks_takes_and_skips_the_same_from_a_file_and_a_reader() {
+        let bytes: Vec<u8> = (0..=255).cycle().take(10_000).collect();
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("bytes");
+        std::fs::write(&path, &bytes).unwrap();
+        let source = Source::open(&path).unwrap();
+        let streams = [
+            Stream::of_file(&source, 0, u64::MAX, 16),
+            Stream::of_reader(io::Cursor::new(bytes.clone())),
+        ];
+        for mut stream in streams {
+            assert_eq!(stream.peek(4).unwrap(), &bytes[..4]);
+            stream.advance(3);
+            assert_eq!(stream.skip(5000).unwrap(), 5000);
+            assert_eq!(stream.position(), 5003);
+            assert_eq!(stream.peek(300).unwrap(), &bytes[5003..5303]);
+            assert_eq!(stream.skip(u64::MAX).unwrap(), 4997);
+            assert!(stream.peek(1).unwrap().is_empty());
+        }
+    }
+}

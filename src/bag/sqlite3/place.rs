@@ -1,0 +1,97 @@
+//! Where a database can be opened so that no row is lost and nothing appears beside the user's file.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::bag::source::Temporary;
+use crate::base::error::{Error, Result};
+
+/// A database ready to be opened.
+pub(super) struct Ready {
+    pub(super) path: PathBuf,
+    /// Rows that are not looked at since the copy would be too large.
+    pub(super) left_behind: bool,
+    /// Removed when the bag has been read.
+    copy: Option<Temporary>,
+}
+
+impl Ready {
+    /// Whether it is a copy of ours, which SQLite may bring up to date; else it must not touch the file.
+    pub(super) fn is_copy(&self) -> bool {
+        self.copy.is_some()
+    }
+}
+
+/// Above this size in bytes nothing is copied: 16 GiB.
+const LARGEST_COPY: u64 = 16 << 30;
+
+/// Copies a database whose newest rows lie beside it, in a log or a journal that was never merged.
+pub(super) fn ready(path: &Path) -> Result<Ready> {
+    let beside: Vec<PathBuf> = ["-wal", "-journal"]
+        .iter()
+        .map(|end| with_suffix(path, end))
+        .filter(|p| p.metadata().is_ok_and(|m| m.is_file() && m.len() > 0))
+        .collect();
+    let mut ready = Ready {
+        path: path.to_owned(),
+        left_behind: false,
+        copy: None,
+    };
+    if beside.is_empty() {
+        return Ok(ready);
+    }
+    let all = || beside.iter().map(PathBuf::as_path).chain([path]);
+    let size: u64 = all().filter_map(|p| Some(p.metadata().ok()?.len())).sum();
+    if size > LARGEST_COPY {
+        ready.left_behind = true;
+        return Ok(ready);
+    }
+    let copy = Temporary::new()?;
+    for from in all() {
+        let to = copy.path().join(from.file_name().unwrap_or_default());
+        fs::copy(from, to).map_err(Error::io("copy", from))?;
+    }
+    ready.path = copy.path().join(path.file_name().unwrap_or_default());
+    ready.copy = Some(copy);
+    Ok(ready)
+}
+
+fn with_suffix(path: &Path, end: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(end);
+    name.into()
+}
+
+/// The address under which SQLite opens the file.
+pub(super) fn address(ready: &Ready) -> String {
+    let mut address = "file:".to_owned();
+    for byte in bytes(&ready.path) {
+        if byte.is_ascii_alphanumeric() || b"/._-~".contains(&byte) {
+            address.push(byte as char);
+        } else {
+            address.push('%');
+            for half in [byte >> 4, byte & 15] {
+                address.extend(char::from_digit(half.into(), 16));
+            }
+        }
+    }
+    address += if ready.is_copy() {
+        "?mode=rw"
+    } else {
+        "?mode=ro&immutable=1"
+    };
+    address
+}
+
+#[cfg(unix)]
+fn bytes(path: &Path) -> Vec<u8> {
+    std::os::unix::ffi::OsStrExt::as_bytes(path.as_os_str()).to_vec()
+}
+
+#[cfg(not(unix))]
+fn bytes(path: &Path) -> Vec<u8> {
+    let text = path.to_string_lossy().replace('\\', "/");
+    // A drive letter needs a slash before it.
+    let slash = if text.get(1..2) == Some(":") { "/" } else { "" };
+    format!("{slash}{text}").into_bytes()
+}

@@ -1,0 +1,107 @@
+//! Whole bags compressed by Zstandard (`.db3.zstd`, `.mcap.zstd`): streamed, or unpacked where nobody minds.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use crate::bag::FORMATS;
+use crate::bag::decompress::Compression;
+use crate::bag::input::{FormatRow, HEAD, Medium, Place, file_name};
+use crate::bag::model::{OpenOptions, Reader, Report, Sink};
+use crate::bag::source::{Source, Stream, Temporary};
+use crate::bag::unknown::explain;
+use crate::base::error::{Error, Result};
+use crate::base::time::Span;
+
+/// Compressed bags of any format.
+pub(crate) const FORMAT: FormatRow = FormatRow {
+    name: "zstd",
+    what: "any of these, compressed as a whole",
+    extensions: &["db3.zstd", "mcap.zstd"],
+    medium: Medium::Wrapping,
+    sniff: |_, head| head.starts_with(b"\x28\xb5\x2f\xfd"),
+    open,
+};
+
+/// A reader of the bag inside.
+struct Unpacked {
+    name: String,
+    inner: Box<dyn Reader>,
+    /// The unpacked file, removed when the bag has been read.
+    _copy: Option<Temporary>,
+    file_bytes: u64,
+}
+
+/// Unpacked files are not longer than this many times the packed one, in bytes, and 1 GiB.
+const MOST_UNPACKED: u64 = 1000;
+
+fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+    let (name, file_bytes, packed): (String, u64, Box<dyn Read + Send>) = match place {
+        Place::File(source) => {
+            let path = source.path().to_owned();
+            let file = File::open(&path).map_err(Error::io("read", &path))?;
+            (
+                path.to_string_lossy().into_owned(),
+                source.len(),
+                Box::new(file),
+            )
+        }
+        Place::Pipe(name, stream) => (name, 0, Box::new(stream)),
+        Place::Folder(path) => return Err(explain(&path, &[], true)),
+    };
+    let path = Path::new(&name);
+    let fail = || Error::io("decompress", path);
+    let plain = Compression::Zstd.reader(packed).map_err(fail())?;
+    let mut stream = Stream::of_reader(plain);
+    let head = stream.peek(HEAD).map_err(fail())?.to_vec();
+    let inside = |row: &&FormatRow| {
+        row.name != FORMAT.name && (row.sniff)(&Place::Folder(path.into()), &head)
+    };
+    let Some(row) = FORMATS.iter().find(inside) else {
+        return Err(explain(path, &head, false));
+    };
+    let (place, copy) = if row.medium == Medium::File {
+        let copy = Temporary::new()?;
+        let limit = file_bytes.saturating_mul(MOST_UNPACKED).max(1 << 30);
+        let source = unpack(&mut stream, &copy, limit).map_err(fail())?;
+        (Place::File(Source::open(&source)?), Some(copy))
+    } else {
+        (Place::Pipe(file_name(path), stream), None)
+    };
+    let inner = (row.open)(place, options)?;
+    Ok(Box::new(Unpacked {
+        name: file_name(path),
+        inner,
+        _copy: copy,
+        file_bytes,
+    }))
+}
+
+/// Writes what `stream` holds into a file of ours.
+fn unpack(stream: &mut Stream<'_>, to: &Temporary, limit: u64) -> io::Result<std::path::PathBuf> {
+    let path = to.path().join("unpacked");
+    let mut file = File::create(&path)?;
+    let most = limit.saturating_add(1);
+    if io::copy(&mut stream.take(most), &mut file)? > limit {
+        return Err(io::Error::other(
+            "it unfolds to more than a thousand times its size",
+        ));
+    }
+    Ok(path)
+}
+
+impl Reader for Unpacked {
+    fn span(&mut self) -> Result<Option<Span>> {
+        self.inner.span()
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        let report = self.inner.read(range, sink)?;
+        Ok(Report {
+            name: self.name.clone(),
+            compression: vec![Compression::Zstd.word().to_owned()],
+            file_bytes: self.file_bytes,
+            ..report
+        })
+    }
+}

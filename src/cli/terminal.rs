@@ -1,0 +1,199 @@
+//! What a person sees: progress, notices, errors and hints; the only file that prints or measures time.
+
+use std::collections::BTreeMap;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::base::error::Error;
+use crate::base::notice::Notices;
+use crate::pipeline::{Stage, Watch};
+
+/// Standard error and output, as the user set them up.
+#[derive(Debug)]
+pub struct Terminal {
+    quiet: bool,
+    colour: bool,
+    bar: Option<ProgressBar>,
+    stage: Option<(Stage, Instant)>,
+    spent: BTreeMap<Stage, Duration>,
+    begun: Instant,
+    interrupted: Arc<AtomicBool>,
+}
+
+impl Terminal {
+    /// A terminal that says nothing but errors if `quiet`. Colours only where standard error is a terminal and
+    /// `no_colour` is false; progress only on a terminal.
+    pub fn new(quiet: bool, no_colour: bool) -> Self {
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&interrupted);
+        // Without a handler an interrupt ends us at once, which is what it did before.
+        let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
+        Self {
+            quiet,
+            colour: io::stderr().is_terminal() && !no_colour,
+            bar: None,
+            stage: None,
+            spent: BTreeMap::new(),
+            begun: Instant::now(),
+            interrupted,
+        }
+    }
+
+    /// Prints an error and its way out.
+    pub fn error(&mut self, error: &Error) {
+        self.end_stage();
+        self.line("31", "error", &error.to_string());
+        let hint = error.hint();
+        if !hint.is_empty() {
+            self.line("36", "hint", &hint);
+        }
+    }
+
+    /// Prints notices, one line each.
+    pub fn notices(&mut self, notices: &Notices) {
+        if self.quiet {
+            return;
+        }
+        for notice in notices.iter() {
+            let (colour, label) = if notice.kind.is_loss() {
+                ("33", "warning")
+            } else {
+                ("36", "note")
+            };
+            let times = if notice.count > 1 {
+                format!(" ({} times)", notice.count)
+            } else {
+                String::new()
+            };
+            self.line(colour, label, &format!("{}{times}", notice.text));
+        }
+    }
+
+    /// Prints a line on standard error unless quiet.
+    pub fn say(&mut self, text: &str) {
+        if !self.quiet {
+            // A closed standard error is nobody to tell.
+            let _ = writeln!(io::stderr(), "{}", visible(text));
+        }
+    }
+
+    /// Prints results on standard output, as they are. A closed pipe ends nothing: the reader has what it wanted.
+    pub fn results(&mut self, text: &str) {
+        let mut out = io::stdout().lock();
+        let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    }
+
+    /// Prints something worth knowing unless quiet.
+    pub fn note(&mut self, text: &str) {
+        if !self.quiet {
+            self.line("36", "note", text);
+        }
+    }
+
+    /// Waits a moment before looking at a file again.
+    pub fn wait(&self) {
+        std::thread::sleep(Duration::from_millis(200));
+    }
+
+    /// Seconds since the command began.
+    pub fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// Prints how long each stage took.
+    pub fn timings(&mut self) {
+        self.end_stage();
+        let lines: Vec<String> = self
+            .spent
+            .iter()
+            .map(|(stage, time)| format!("{:>9.3} s  {}", time.as_secs_f64(), stage.word()))
+            .collect();
+        for line in &lines {
+            self.say(line);
+        }
+    }
+
+    fn line(&self, colour: &str, label: &str, text: &str) {
+        let text = visible(text);
+        let _ = if self.colour {
+            writeln!(io::stderr(), "\u{1b}[1;{colour}m{label}\u{1b}[0m: {text}")
+        } else {
+            writeln!(io::stderr(), "{label}: {text}")
+        };
+    }
+
+    fn end_stage(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+        if let Some((stage, since)) = self.stage.take() {
+            *self.spent.entry(stage).or_default() += since.elapsed();
+        }
+    }
+}
+
+impl Watch for Terminal {
+    fn stage(&mut self, stage: Stage) {
+        self.end_stage();
+        self.stage = Some((stage, Instant::now()));
+        if !self.quiet && io::stderr().is_terminal() {
+            self.bar = Some(bar(stage));
+        }
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        if let Some(bar) = &self.bar {
+            bar.set_length(total.max(done));
+            bar.set_position(done);
+        }
+    }
+
+    fn stopped(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+}
+
+fn bar(stage: Stage) -> ProgressBar {
+    let template = match stage {
+        Stage::Read | Stage::Verify => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
+        _ => "{msg:>9} [{bar:40}] {pos}/{len}",
+    };
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    bar.set_style(style.progress_chars("=> "));
+    bar.set_message(stage.word());
+    bar
+}
+
+/// Names come from bags: control characters and marks that turn the direction of text are shown, not obeyed.
+pub fn visible(text: &str) -> String {
+    let hidden = |c: char| {
+        (c.is_control() && c != '\n' && c != '\t')
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+    };
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if hidden(c) {
+            out.extend(c.escape_unicode());
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_steer_the_terminal() {
+        assert_eq!(visible("/a\u{1b}[2J\u{202e}b"), "/a\\u{1b}[2J\\u{202e}b");
+        assert_eq!(visible("/größe ✓"), "/größe ✓");
+    }
+}

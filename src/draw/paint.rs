@@ -1,0 +1,5 @@
+//! Painters of one shape: each turns a [`scene`](crate::draw::scene) into what can be written, and decides nothing.
+
+pub mod classes;
+pub mod raster;
+pub mod svg;

@@ -1,0 +1,444 @@
+//! The graph of a whole mission as one compact drawing without colours: what a window shows is said by classes, whose
+//! rules follow from the style. The player's page and the animated SVG are painted with it.
+
+mod css;
+
+pub use css::{base, rules, states, variables};
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use crate::base::geometry::Point;
+use crate::draw::paint::svg::{escape, units};
+use crate::draw::picture::{Part, Union};
+use crate::draw::scene::{Form, Group, Piece, Step};
+use crate::draw::style::Style;
+use crate::draw::text::is_invisible;
+use crate::view::runs::Runs;
+use crate::view::runs::word;
+use crate::view::{Mark, View};
+
+/// How much is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Detail {
+    /// Coordinates to a tenth of a pixel, not whole pixels.
+    pub is_fine: bool,
+    /// Names, as attributes and for hovering.
+    pub has_names: bool,
+}
+
+/// A graph in SVG.
+#[derive(Debug)]
+pub struct Classes<'a> {
+    view: &'a View,
+    union: &'a Union,
+    style: &'a Style,
+    detail: Detail,
+}
+
+/// What stands inside the group of an element before and after its drawing.
+pub trait ElementLook {
+    /// The words of its class attribute, after `node`, `topic` or `edge`.
+    fn class(&self) -> String;
+    /// What its live text says.
+    fn text(&self) -> String;
+    /// More elements inside it, such as animations.
+    fn more(&self) -> String {
+        String::new()
+    }
+}
+
+impl<'a> Classes<'a> {
+    /// The stage of a view whose union is `union`.
+    pub fn new(view: &'a View, union: &'a Union, style: &'a Style, detail: Detail) -> Self {
+        Self {
+            view,
+            union,
+            style,
+            detail,
+        }
+    }
+
+    /// The definitions of the badges that occur, `<symbol>`s without colours of their own.
+    pub fn signs(&self) -> String {
+        let parts = self.union.items.iter().chain(&self.union.arrows);
+        let marks: BTreeSet<Mark> = parts.flat_map(|p| p.marks.iter().copied()).collect();
+        let mut out = String::from("<defs>");
+        for mark in marks {
+            let _ = write!(out, "<g id=\"{}\">", word(mark));
+            for (at, piece) in crate::draw::picture::sign(self.style, mark)
+                .pieces
+                .iter()
+                .enumerate()
+            {
+                let Piece::Shape(shape) = piece else { continue };
+                let pen = if shape.stroke.width > 0.0 { "p" } else { "f" };
+                let class = if at == 0 { "b" } else { pen };
+                fine(&mut out, &shape.form, class);
+            }
+            out.push_str("</g>");
+        }
+        out.push_str("</defs>");
+        out
+    }
+
+    /// The boxes around namespaces.
+    pub fn spaces(&self, out: &mut String) {
+        for space in &self.union.spaces {
+            out.push_str("<g class=\"namespace\">");
+            self.pieces(out, space, None);
+            out.push_str("</g>\n");
+        }
+    }
+
+    /// The arrow at this place of the view.
+    pub fn arrow(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
+        let (part, arrow) = (&self.union.arrows[at], &self.view.arrows[at]);
+        let name = |id: u32| &*self.view.items[id as usize].name;
+        let ends = [("from", name(arrow.from)), ("to", name(arrow.to))];
+        let what = format!("edge {}", arrow.kind.word());
+        self.element(out, part, &what, &ends, dress, 0.8);
+    }
+
+    /// The item at this place of the view.
+    pub fn item(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
+        let (part, item) = (&self.union.items[at], &self.view.items[at]);
+        self.element(
+            out,
+            part,
+            item.kind.word(),
+            &[("name", &item.name)],
+            dress,
+            1.0,
+        );
+    }
+
+    fn element(
+        &self,
+        out: &mut String,
+        part: &Part,
+        what: &str,
+        data: &[(&str, &str)],
+        dress: &dyn ElementLook,
+        scale: f64,
+    ) {
+        let what = if self.detail.has_names {
+            what
+        } else {
+            what.split(' ').next().unwrap_or(what)
+        };
+        let class = format!("{what} {}", dress.class());
+        let _ = write!(out, "<g class=\"{}\"", class.trim_end());
+        if self.detail.has_names {
+            for (key, value) in data {
+                let _ = write!(out, " data-{key}=\"");
+                attribute(out, value);
+                out.push('"');
+            }
+        }
+        out.push('>');
+        out.push_str(&dress.more());
+        let text = dress.text();
+        let class = if part.tells_changes { "r c" } else { "r" };
+        self.pieces(out, &part.group, part.is_live.then_some((class, &text)));
+        for mark in &part.marks {
+            let word = word(*mark);
+            let Point { x, y } = part.badge;
+            let _ = write!(out, "<use href=\"#{word}\" class=\"{word}\" ");
+            if scale < 1.0 {
+                let _ = write!(
+                    out,
+                    "transform=\"translate({} {}) scale({scale})\"/>",
+                    whole(x),
+                    whole(y)
+                );
+            } else {
+                let _ = write!(out, "x=\"{}\" y=\"{}\"/>", whole(x), whole(y));
+            }
+        }
+        out.push_str("</g>\n");
+    }
+
+    /// Shapes and texts. `live` is what the last text says in place of its own words.
+    fn pieces(&self, out: &mut String, group: &Group, live: Option<(&str, &String)>) {
+        let texts = group
+            .pieces
+            .iter()
+            .filter(|p| matches!(p, Piece::Text(_)))
+            .count();
+        let mut seen = 0;
+        for piece in &group.pieces {
+            match piece {
+                Piece::Shape(shape) => self.form(out, &shape.form),
+                Piece::Text(text) => {
+                    seen += 1;
+                    let live = live.filter(|_| seen == texts);
+                    let class = match (live, seen) {
+                        (Some((class, _)), _) => format!(" class=\"{class}\""),
+                        (None, 2..) => " class=\"m\"".to_owned(),
+                        _ => String::new(),
+                    };
+                    let Point { x, y } = text.at;
+                    let _ = write!(out, "<text{class} x=\"{}\" y=\"{}\">", whole(x), whole(y));
+                    escape(out, live.map_or(&text.text, |(_, words)| words));
+                    out.push_str("</text>");
+                }
+            }
+        }
+    }
+
+    fn form(&self, out: &mut String, form: &Form) {
+        let n = |v: f64| {
+            if self.detail.is_fine {
+                tenth(v)
+            } else {
+                whole(v).to_string()
+            }
+        };
+        let _ = match form {
+            Form::Rect(r, radius) => {
+                // Edges are rounded, not lengths, so that what touches goes on touching.
+                let (w, h) = (n(r.right() - r.x), n(r.bottom() - r.y));
+                let radius = if *radius > 0.0 {
+                    format!(" rx=\"{}\"", tenth(*radius))
+                } else {
+                    String::new()
+                };
+                write!(
+                    out,
+                    "<rect x=\"{}\" y=\"{}\" width=\"{w}\" height=\"{h}\"{radius}/>",
+                    n(r.x),
+                    n(r.y)
+                )
+            }
+            Form::Ellipse(r) => {
+                let c = r.centre();
+                write!(
+                    out,
+                    "<ellipse cx=\"{}\" cy=\"{}\" rx=\"{}\" ry=\"{}\"/>",
+                    n(c.x),
+                    n(c.y),
+                    n(r.w / 2.0),
+                    n(r.h / 2.0)
+                )
+            }
+            Form::Path(steps) => {
+                let is_head = matches!(steps.last(), Some(Step::Close));
+                let parts = if self.detail.is_fine || is_head {
+                    10
+                } else {
+                    1
+                };
+                write!(out, "<path d=\"{}\"/>", path(steps, parts))
+            }
+        };
+    }
+}
+
+/// A name as the value of an attribute that reads back as itself; what would hide or turn round the page's own text is
+/// written as a number.
+fn attribute(out: &mut String, name: &str) {
+    let mut rest = name;
+    while let Some(at) = rest.find(|c: char| is_invisible(c) && !c.is_control()) {
+        escape(out, &rest[..at]);
+        let hidden = rest[at..].chars().next().unwrap_or_default();
+        let _ = write!(out, "&#{};", u32::from(hidden));
+        rest = &rest[at + hidden.len_utf8()..];
+    }
+    escape(out, rest);
+}
+
+fn fine(out: &mut String, form: &Form, class: &str) {
+    let _ = match form {
+        Form::Ellipse(r) => write!(
+            out,
+            "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
+            tenth(r.centre().x),
+            tenth(r.centre().y),
+            tenth(r.w / 2.0)
+        ),
+        Form::Path(steps) => write!(out, "<path class=\"{class}\" d=\"{}\"/>", path(steps, 10)),
+        Form::Rect(..) => Ok(()),
+    };
+}
+
+/// Rounds to whole pixels; what is no number becomes 0.
+fn whole(value: f64) -> i64 {
+    units(value, 1)
+}
+
+fn tenth(value: f64) -> String {
+    decimal(units(value, 10), 10)
+}
+
+/// `units` of 1/`parts` (1 or 10) as a decimal without a needless zero.
+fn decimal(units: i64, parts: i64) -> String {
+    let sign = if units < 0 { "-" } else { "" };
+    let (whole, rest) = (units.abs() / parts, units.abs() % parts);
+    match (whole, rest) {
+        (whole, 0) => format!("{}{whole}", if whole == 0 { "" } else { sign }),
+        (0, rest) => format!("{sign}.{rest}"),
+        (whole, rest) => format!("{sign}{whole}.{rest}"),
+    }
+}
+
+/// Path data as short as it gets: steps from point to point, lines where a curve is straight.
+fn path(steps: &[Step], parts: i64) -> String {
+    let mut pen = Pen {
+        out: String::new(),
+        here: (0, 0),
+        parts,
+        last: ' ',
+    };
+    for step in steps {
+        match step {
+            Step::Move(p) => {
+                let (x, y) = pen.grid(*p);
+                pen.letter('M');
+                pen.numbers(&[x, y]);
+                pen.here = (x, y);
+            }
+            Step::Line(p) => pen.line(*p),
+            Step::Curve([a, b, end]) => {
+                if pen.is_straight(*a, *b, *end) {
+                    pen.line(*end);
+                } else {
+                    pen.curve([*a, *b, *end]);
+                }
+            }
+            Step::Close => {
+                pen.out.push('z');
+                pen.last = 'z';
+            }
+        }
+    }
+    pen.out
+}
+
+struct Pen {
+    out: String,
+    /// In units.
+    here: (i64, i64),
+    parts: i64,
+    last: char,
+}
+
+impl Pen {
+    fn grid(&self, p: Point) -> (i64, i64) {
+        (units(p.x, self.parts), units(p.y, self.parts))
+    }
+
+    /// Writes the command, unless the one before was the same and so goes on.
+    fn letter(&mut self, letter: char) {
+        if self.last != letter || letter == 'M' {
+            self.out.push(letter);
+            self.last = letter;
+        } else {
+            self.last = '+';
+        }
+    }
+
+    fn numbers(&mut self, numbers: &[i64]) {
+        let repeated = self.last == '+';
+        for (at, number) in numbers.iter().enumerate() {
+            let text = decimal(*number, self.parts);
+            if (at > 0 || repeated) && !text.starts_with('-') {
+                self.out.push(' ');
+            }
+            self.out.push_str(&text);
+        }
+    }
+
+    fn go(&mut self, letter: char, numbers: &[i64], to: (i64, i64)) {
+        self.letter(letter);
+        self.numbers(numbers);
+        self.last = letter;
+        self.here = to;
+    }
+
+    fn line(&mut self, p: Point) {
+        let to = self.grid(p);
+        match (to.0 - self.here.0, to.1 - self.here.1) {
+            (0, 0) => {}
+            (dx, 0) => self.go('h', &[dx], to),
+            (0, dy) => self.go('v', &[dy], to),
+            (dx, dy) => self.go('l', &[dx, dy], to),
+        }
+    }
+
+    fn curve(&mut self, points: [Point; 3]) {
+        let places = points.map(|p| self.grid(p));
+        let steps: Vec<i64> = places
+            .iter()
+            .flat_map(|p| [p.0 - self.here.0, p.1 - self.here.1])
+            .collect();
+        self.go('c', &steps, places[2]);
+    }
+
+    /// Whether both controls lie within half a pixel of the line to the end, and between its ends.
+    fn is_straight(&self, a: Point, b: Point, end: Point) -> bool {
+        let parts = self.parts as f64;
+        let from = Point::new(self.here.0 as f64 / parts, self.here.1 as f64 / parts);
+        let (dx, dy) = (end.x - from.x, end.y - from.y);
+        let length = libm::hypot(dx, dy).max(1e-9);
+        [a, b].iter().all(|p| {
+            let (x, y) = (p.x - from.x, p.y - from.y);
+            let along = (x * dx + y * dy) / length;
+            let aside = (x * dy - y * dx) / length;
+            aside.abs() <= 0.5 && (-0.5..=length + 0.5).contains(&along)
+        })
+    }
+}
+
+/// How much changed, window by window, as paths in a box 60 high and a window wide for each: what was added above the
+/// line in the middle, what was removed below it, what changed on the ground.
+pub(crate) fn bars(runs: &Runs) -> String {
+    let mut out = String::new();
+    for (kind, base, up) in [
+        ("added", 30.0, -1.0),
+        ("removed", 30.0, 1.0),
+        ("changed", 60.0, -1.0),
+    ] {
+        let counts = runs.counts(kind);
+        let most = counts.values().max().copied().unwrap_or(1) as f64;
+        let _ = write!(out, "<path class=\"{kind}\" d=\"");
+        for (window, count) in counts {
+            // Logarithms, so that one change is seen beside a hundred.
+            let part = libm::log(count as f64) / libm::log(most.max(9.0));
+            let height = up * libm::round(6.0 + 20.0 * part);
+            let _ = write!(out, "M{window} {base}h1v{height}h-1z");
+        }
+        out.push_str("\"/>");
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn p(x: f64, y: f64) -> Point {
+        Point::new(x, y)
+    }
+
+    #[test]
+    fn paths_are_short() {
+        let steps = [
+            Step::Move(p(10.0, 20.0)),
+            Step::Curve([p(14.0, 20.0), p(18.0, 20.2), p(30.0, 20.0)]),
+            Step::Curve([p(40.0, 20.0), p(40.0, 50.0), p(60.0, 50.0)]),
+            Step::Curve([p(70.0, 50.0), p(70.0, 20.0), p(90.0, 20.0)]),
+        ];
+        assert_eq!(
+            path(&steps, 1),
+            "M10 20h20c10 0 10 30 30 30 10 0 10-30 30-30"
+        );
+        assert_eq!(path(&steps[..2], 10), "M10 20h20");
+    }
+
+    #[test]
+    fn decimals_have_no_needless_zero() {
+        let all = [-3.04, -0.25, 0.04, 0.5, 12.0, f64::NAN].map(tenth);
+        assert_eq!(all, ["-3", "-.3", "0", ".5", "12", "0"]);
+    }
+}

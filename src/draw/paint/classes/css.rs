@@ -1,0 +1,241 @@
+//! The style as rules for classes: what [`crate::draw::picture`] paints, said once per class instead of once per element.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use crate::draw::scene::Stroke;
+use crate::draw::style::{Body, Change, Color, Quiet, Style};
+use crate::view::runs::{STEPS, decades};
+
+/// The rules of the graph in every window: [`base`], then [`states`].
+pub fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
+    base(style) + &states(style, words)
+}
+
+/// How elements look that are active and did not change.
+pub fn base(style: &Style) -> String {
+    let mut out = String::from("text{text-anchor:middle}use,.c{visibility:hidden}");
+    let cluster = &style.cluster;
+    let _ = write!(
+        out,
+        ".namespace rect{{{}}}.namespace text{{text-anchor:start;font:600 {}px {FONT};fill:{}}}",
+        paint(cluster.fill, cluster.stroke, cluster.width, &cluster.dash),
+        cluster.size,
+        cluster.text
+    );
+    body(&mut out, ".node", &style.node);
+    body(&mut out, ".topic", &style.topic);
+    edges(&mut out, style);
+    badges(&mut out, style);
+    out
+}
+
+/// What classes change of that: how fast, how well known, how alive, what changed; a later rule counts more. Only
+/// these class words have rules.
+pub fn states(style: &Style, words: &BTreeSet<&str>) -> String {
+    // What is silent has no rate worth a place.
+    let mut out = String::from(
+        ".off,:is(.edge,.topic):is(.silent,.latched,.declared,.removed):not(.changed)>.r{visibility:hidden}",
+    );
+    for step in 1..=STEPS {
+        let word = format!("w{step}");
+        if words.contains(&*word) {
+            let edge = &style.edge;
+            let width = (edge.width + edge.per_decade * decades(step)).min(edge.most);
+            let _ = write!(out, ".{word} path{{stroke-width:{}}}", short(width));
+        }
+    }
+    if words.contains("inferred") {
+        known(&mut out, style);
+    }
+    let quiets = [("declared", &style.declared), ("silent", &style.silent)];
+    for (state, quiet) in quiets.iter().filter(|(word, _)| words.contains(word)) {
+        self::quiet(&mut out, state, quiet);
+    }
+    let changes = [
+        ("added", &style.added),
+        ("removed", &style.removed),
+        ("changed", &style.changed),
+    ];
+    for (kind, change) in changes.iter().filter(|(word, _)| words.contains(word)) {
+        self::change(&mut out, kind, change);
+    }
+    let badges = MARKS.iter().filter(|word| words.contains(*word));
+    let mut shown: Vec<String> = badges.map(|word| format!(".{word}>.{word}")).collect();
+    shown.push(":is(.faster,.slower)>.c".to_owned());
+    let _ = write!(out, "{}{{visibility:inherit}}", shown.join(","));
+    out
+}
+
+/// The class words of badges.
+const MARKS: [&str; 8] = [
+    "added",
+    "removed",
+    "faster",
+    "slower",
+    "handed-over",
+    "restarted",
+    "other",
+    "inside",
+];
+
+const FONT: &str = "Inter,Helvetica,Arial,sans-serif";
+
+fn body(out: &mut String, what: &str, body: &Body) {
+    let weight = if body.bold { "600 " } else { "" };
+    let _ = write!(
+        out,
+        "{what} :is(rect,ellipse){{{}}}{what} text{{font:{weight}{}px {FONT};fill:{}}}\
+         {what} :is(.r,.m){{font:{}px {FONT}}}",
+        paint(body.fill, body.stroke, body.width, &[]),
+        body.size,
+        body.text,
+        body.small
+    );
+}
+
+/// The line is the first path of an edge, its head the second.
+fn edges(out: &mut String, style: &Style) {
+    let edge = &style.edge;
+    let _ = write!(
+        out,
+        ".edge path{{fill:none;stroke:{c};stroke-width:{}}}.edge path+path{{fill:{c};stroke:none}}\
+         .edge text{{font:{}px {FONT};fill:{};paint-order:stroke;stroke:{};stroke-width:{};stroke-linejoin:round}}",
+        edge.width,
+        edge.size,
+        edge.text,
+        edge.halo,
+        edge.halo_width,
+        c = edge.stroke,
+    );
+}
+
+fn known(out: &mut String, style: &Style) {
+    let dash = dashes(&style.inferred.dash);
+    let _ = write!(
+        out,
+        ".inferred>:is(rect,ellipse,path){{stroke-dasharray:{dash}}}"
+    );
+}
+
+fn quiet(out: &mut String, state: &str, quiet: &Quiet) {
+    let line = paint(quiet.fill, quiet.stroke, quiet.width, &quiet.dash);
+    let (stroke, text) = (quiet.stroke, quiet.text);
+    let _ = write!(
+        out,
+        ".{state} :is(rect,ellipse,path){{{line}}}.edge.{state} path{{fill:none}}\
+         .edge.{state} path+path{{fill:{stroke};stroke:none}}.{state} text{{fill:{text}}}"
+    );
+}
+
+fn change(out: &mut String, kind: &str, change: &Change) {
+    let Change {
+        color,
+        fill,
+        text,
+        width,
+        dash,
+        ..
+    } = change;
+    let _ = write!(
+        out,
+        ".{kind} :is(rect,ellipse){{{}}}.{kind} text{{fill:{text}}}\
+         .edge.{kind} path{{fill:none;stroke:{color};stroke-width:{};stroke-dasharray:{}}}\
+         .edge.{kind} path+path{{fill:{color};stroke:none}}.edge.{kind} text{{fill:{color};font-weight:600}}",
+        paint(*fill, *color, *width, dash),
+        short(width * 0.8),
+        dashes(dash),
+    );
+}
+
+/// The colours of badges; they are hidden until their element has their class.
+fn badges(out: &mut String, style: &Style) {
+    let _ = write!(
+        out,
+        ".b{{stroke:{};stroke-width:1.2}}.p{{fill:none;stroke:{s};stroke-width:2}}\
+         .f{{fill:{s};stroke:none}}use{{fill:{}}}use.added{{fill:{}}}use.removed{{fill:{}}}",
+        style.badge.halo,
+        style.changed.color,
+        style.added.color,
+        style.removed.color,
+        s = style.badge.sign,
+    );
+}
+
+fn paint(fill: Color, stroke: Color, width: f64, dash: &[f64]) -> String {
+    format!(
+        "fill:{fill};stroke:{stroke};stroke-width:{};{}",
+        short(width),
+        dash_rule(width, dash)
+    )
+}
+
+fn dash_rule(width: f64, dash: &[f64]) -> String {
+    let stroke = Stroke {
+        color: Color::NONE,
+        width,
+        dash: dash.to_vec(),
+    };
+    let cap = if stroke.is_round() {
+        ";stroke-linecap:round"
+    } else {
+        ""
+    };
+    format!("stroke-dasharray:{}{cap}", dashes(dash))
+}
+
+fn dashes(dash: &[f64]) -> String {
+    if dash.is_empty() {
+        return "none".to_owned();
+    }
+    let all: Vec<String> = dash.iter().map(|d| short(*d)).collect();
+    all.join(" ")
+}
+
+/// To a hundredth.
+fn short(value: f64) -> String {
+    (libm::round(value * 100.0) / 100.0).to_string()
+}
+
+/// The style's colours for the page around the graph, as custom properties of CSS.
+pub fn variables(style: &Style) -> String {
+    let all = [
+        ("page", style.page.background),
+        ("text", style.page.text),
+        ("quiet", style.page.quiet),
+        ("bar", style.title.fill),
+        ("bar-line", style.title.line),
+        ("bar-text", style.title.text),
+        ("bar-quiet", style.title.quiet),
+        ("panel", style.legend.fill),
+        ("line", style.legend.line),
+        ("edge", style.edge.stroke),
+        ("past", style.timeline.past),
+        ("future", style.timeline.future),
+        ("now", style.timeline.now),
+        ("head", style.timeline.head),
+        ("axis", style.timeline.axis),
+        ("added", style.added.color),
+        ("removed", style.removed.color),
+        ("changed", style.changed.color),
+        ("added-chip", style.chip.added),
+        ("added-on", style.chip.added_text),
+        ("removed-chip", style.chip.removed),
+        ("removed-on", style.chip.removed_text),
+        ("changed-chip", style.chip.changed),
+        ("changed-on", style.chip.changed_text),
+    ];
+    let mut out = String::from(":root{");
+    for (name, color) in all {
+        match color.rgb() {
+            Some(_) => {
+                let _ = write!(out, "--{name}:{color};");
+            }
+            None => {
+                let _ = write!(out, "--{name}:transparent;");
+            }
+        }
+    }
+    out.push('}');
+    out
+}

@@ -1,0 +1,151 @@
+use super::*;
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::{Anchor, Fade, Form, Shape, Step, Stroke, Text};
+use crate::draw::style::Style;
+use crate::draw::text::Weight;
+
+fn painter() -> Painter {
+    Painter::new(&Fonts::bundled())
+}
+
+fn page(groups: Vec<Group>) -> Scene {
+    Scene {
+        size: Size::new(200.0, 120.0),
+        width_mm: None,
+        background: Style::builtin("light").unwrap().background(),
+        title: String::new(),
+        groups,
+    }
+}
+
+fn ink(pixels: &Pixels) -> usize {
+    pixels.rgba.chunks(4).filter(|p| p[..3] != [255; 3]).count()
+}
+
+fn words(id: &str, text: &str, weight: Weight) -> Group {
+    let mut group = Group::named(id);
+    group.text(Text {
+        at: Point::new(100.0, 60.0),
+        anchor: Anchor::Middle,
+        size: 14.0,
+        weight,
+        color: Style::builtin("light").unwrap().page.text,
+        halo: None,
+        text: text.to_owned(),
+    });
+    group
+}
+
+/// A blob and a line whose places depend on `at`.
+fn element(id: usize, at: usize) -> Group {
+    let style = Style::builtin("light").unwrap();
+    let x = (at * 37 % 170) as f64 + 0.3;
+    let y = (at * 53 % 100) as f64 + 0.7;
+    let mut group = Group::named(&format!("e{id}"));
+    group.fade = Fade(if at.is_multiple_of(5) { 0.5 } else { 1.0 });
+    let curve = [
+        Point::new(x, 0.0),
+        Point::new(199.0, y),
+        Point::new(190.0, 110.0),
+    ];
+    let path = Form::Path(vec![Step::Move(Point::new(x, y)), Step::Curve(curve)]);
+    group.shape(Shape::line(path, Stroke::solid(style.edge.stroke, 1.3)));
+    group.shape(Shape::filled(
+        Form::Ellipse(Rect::new(x, y, 30.0, 17.0)),
+        style.node.fill,
+    ));
+    group.text(Text {
+        at: Point::new(x, y + 10.0),
+        anchor: Anchor::Start,
+        size: 9.0,
+        weight: Weight::Regular,
+        color: style.page.text,
+        halo: Some((style.edge.halo, 2.0)),
+        text: format!("e{at}"),
+    });
+    group
+}
+
+#[test]
+fn text_is_drawn_in_both_weights_and_as_wide_as_measured() {
+    let (painter, fonts) = (painter(), Fonts::bundled());
+    let regular = ink(&painter
+        .paint(&page(vec![words("a", "planner", Weight::Regular)]), 1.0)
+        .unwrap());
+    let bold = ink(&painter
+        .paint(&page(vec![words("a", "planner", Weight::SemiBold)]), 1.0)
+        .unwrap());
+    assert!(regular > 100 && bold > regular, "{regular} {bold}");
+    let pixels = painter
+        .paint(&page(vec![words("a", "mmmm", Weight::Regular)]), 4.0)
+        .unwrap();
+    let dark = |x: u32| {
+        (0..pixels.height).any(|y| pixels.rgba[((y * pixels.width + x) * 4) as usize] < 128)
+    };
+    let (first, last) = (
+        (0..800).find(|x| dark(*x)).unwrap(),
+        (0..800).rev().find(|x| dark(*x)).unwrap(),
+    );
+    let measured = fonts.width("mmmm", 14.0, Weight::Regular) * 4.0;
+    assert!(
+        (f64::from(last - first) - measured).abs() < 14.0,
+        "{first} {last} {measured}"
+    );
+}
+
+#[test]
+fn groups_drawn_apart_equal_the_whole_document() {
+    let scene = page((0..12).map(|i| element(i, i)).collect());
+    let painter = painter();
+    let whole = Tree::from_str(&svg::write(&scene), &painter.options).unwrap();
+    let mut map = Pixmap::new(200, 120).unwrap();
+    resvg::render(&whole, Transform::identity(), &mut map.as_mut());
+    assert_eq!(painter.paint(&scene, 1.0).unwrap().rgba, map.take());
+}
+
+#[test]
+fn a_frame_drawn_over_the_last_equals_one_drawn_anew() {
+    let painter = painter();
+    for scale in [1.0, 1.5] {
+        let mut canvas = Canvas::new(&painter, scale);
+        for step in 0..40 {
+            let groups = (0..9).filter(|i| (i + step) % 7 != 0);
+            let scene = page(
+                groups
+                    .map(|i| element(i, i * 3 + (step + i) / 6 * 11))
+                    .collect(),
+            );
+            assert!(
+                canvas.draw(&scene).unwrap() == painter.paint(&scene, scale).unwrap(),
+                "step {step}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_changes_its_place_in_the_pile_is_drawn_anew() {
+    let painter = painter();
+    let mut canvas = Canvas::new(&painter, 1.0);
+    let scene = page(vec![element(0, 3), element(1, 3)]);
+    canvas.draw(&scene).unwrap();
+    let turned = page(vec![element(1, 3), element(0, 3)]);
+    assert!(canvas.draw(&turned).unwrap() == painter.paint(&turned, 1.0).unwrap());
+}
+
+#[test]
+fn absurd_sizes_are_refused() {
+    let mut scene = page(Vec::new());
+    for (w, h) in [
+        (0.0, 10.0),
+        (70_000.0, 10.0),
+        (60_000.0, 60_000.0),
+        (f64::NAN, 1.0),
+    ] {
+        scene.size = Size::new(w, h);
+        assert!(
+            painter().paint(&scene, 1.0).is_err_and(|e| e.is_usage()),
+            "{w} {h}"
+        );
+    }
+}

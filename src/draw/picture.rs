@@ -1,0 +1,422 @@
+//! The picture: a view, a layout and a style become one scene per window, with everything at the same place in each.
+
+mod arrows;
+mod badge;
+mod boxes;
+mod legend;
+mod measured;
+mod options;
+mod page;
+mod timeline;
+mod title;
+mod tween;
+mod union;
+mod words;
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use self::arrows::{ArrowPath, Arrows};
+use self::boxes::{Boxes, ItemBox};
+use self::measured::MeasuredGraph;
+use self::page::{Fit, Page};
+use self::timeline::Timeline;
+use self::title::Title;
+pub use self::union::{Part, Union, sign};
+use crate::base::geometry::Size;
+use crate::base::notice::{Notice, NoticeKind};
+use crate::draw::scene::{Group, Scene};
+use crate::draw::style::Style;
+use crate::draw::text::Fonts;
+use crate::layout::{self, Engine, Layout, Orientation, Plan};
+use crate::view::{Arrow, ArrowKind, Frame, Item, View};
+
+/// What the user wishes of the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PageOptions {
+    /// The page in pixels.
+    pub size: Size,
+    /// The page's width on paper in millimetres, for vector output.
+    pub width_mm: Option<f64>,
+    /// The graph alone, without title, caption, legend and timeline.
+    pub bare: bool,
+    /// The title, such as the bag's name.
+    pub title: String,
+    /// Which way the edges run; `None` takes what fits better.
+    pub orientation: Option<Orientation>,
+    /// The mission's phase in each window, by place among the view's frames; empty for none.
+    pub phases: Vec<String>,
+    /// From which relative change of a rate on it is told, for the legend.
+    pub rate_change: f64,
+}
+
+impl Default for PageOptions {
+    fn default() -> Self {
+        Self {
+            size: Size::new(1280.0, 720.0),
+            width_mm: None,
+            bare: false,
+            title: String::new(),
+            orientation: None,
+            phases: Vec::new(),
+            rate_change: 0.25,
+        }
+    }
+}
+
+/// What there is to lay out, with the page it is for: the stage before [`Picture`].
+pub struct Measured<'a> {
+    view: &'a View,
+    style: &'a Style,
+    fonts: &'a Fonts,
+    options: PageOptions,
+    graph: MeasuredGraph,
+    legend: Vec<Vec<(legend::Sign, String, f64)>>,
+    page: Page,
+}
+
+impl<'a> Measured<'a> {
+    /// Labels, sizes and namespaces of a view, and the parts of the page.
+    pub fn new(view: &'a View, style: &'a Style, fonts: &'a Fonts, options: PageOptions) -> Self {
+        let graph = MeasuredGraph::new(view, style, fonts);
+        let signs = legend::signs(view, options.rate_change);
+        let legend = legend::rows(
+            &signs,
+            style,
+            fonts,
+            page::unit(options.size),
+            options.size.w,
+        );
+        let page = Page::new(style, &options, legend.len());
+        Self {
+            view,
+            style,
+            fonts,
+            options,
+            graph,
+            legend,
+            page,
+        }
+    }
+
+    /// What to lay out: a vertex per item, a link per arrow, a cluster per namespace with a box.
+    pub fn plan(&self) -> &Plan {
+        &self.graph.plan
+    }
+
+    /// What to tell the layout engine of the page.
+    pub fn layout_options(&self) -> layout::Options {
+        layout::Options {
+            page: Size::new(self.page.graph.w, self.page.graph.h),
+            orientation: self.options.orientation,
+        }
+    }
+
+    /// The smallest text of the graph in pixels if it is laid out like this.
+    pub fn text_px(&self, layout: &Layout) -> f64 {
+        let (style, graph) = (self.style, &self.graph);
+        let mut smallest = style.topic.size.min(style.node.size);
+        if graph.rated.contains(&true) {
+            smallest = smallest.min(style.edge.size);
+        }
+        if graph.labels.iter().any(|l| l.second) {
+            smallest = smallest.min(style.node.small).min(style.topic.small);
+        }
+        smallest * self.page.fit(layout.size).scale
+    }
+
+    /// The picture with this layout, which must be one of [`Measured::plan`].
+    pub fn with(self, layout: Layout) -> Picture<'a> {
+        Picture::new(self, layout)
+    }
+
+    /// The picture as `engine` lays it out.
+    pub fn laid_out(self, engine: &dyn Engine) -> Picture<'a> {
+        let layout = layout::lay_out(self.plan(), &self.layout_options(), engine);
+        self.with(layout)
+    }
+}
+
+/// A sequence of scenes. It may be shared among threads.
+pub struct Picture<'a> {
+    measured: Measured<'a>,
+    layout: Layout,
+    fit: Fit,
+    /// What never changes of each item and each arrow.
+    cards: Vec<ItemBox>,
+    tracks: Vec<ArrowPath>,
+    /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
+    order: Vec<usize>,
+    title: Title<'a>,
+    timeline: Timeline<'a>,
+    /// What is the same in every frame, behind the graph and before what moves.
+    ground: Vec<Group>,
+}
+
+impl<'a> Picture<'a> {
+    fn new(measured: Measured<'a>, layout: Layout) -> Self {
+        let Measured {
+            view,
+            style,
+            fonts,
+            page,
+            ..
+        } = &measured;
+        let fit = page.fit(layout.size);
+        let tracks = tracks(&measured, &layout, fit);
+        let mut order: Vec<usize> = (0..tracks.len()).collect();
+        let is_publish = |at: usize| view.arrows[at].kind == ArrowKind::Publish;
+        order.sort_by(|&a, &b| {
+            let length = tracks[b].length.total_cmp(&tracks[a].length);
+            is_publish(a)
+                .cmp(&is_publish(b))
+                .then(length)
+                .then(a.cmp(&b))
+        });
+        let mut picture = Self {
+            cards: cards(&measured, &layout, fit),
+            tracks,
+            order,
+            title: Title::new(style, fonts, page, view, &measured.options),
+            timeline: Timeline::new(style, fonts, page, view),
+            ground: Vec::new(),
+            measured,
+            layout,
+            fit,
+        };
+        picture.ground = picture.ground();
+        picture
+    }
+
+    /// How many frames there are: one per window.
+    pub fn len(&self) -> usize {
+        self.measured.view.frames.len()
+    }
+
+    /// Whether there is no frame.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Where everything is, in the layout's own pixels.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The smallest text of the graph in pixels.
+    pub fn text_px(&self) -> f64 {
+        self.measured.text_px(&self.layout)
+    }
+
+    /// The window at place `k` of the view, settled. An empty page past the last one.
+    pub fn scene(&self, k: usize) -> Scene {
+        let measured = &self.measured;
+        let mut scene = Scene {
+            size: measured.options.size,
+            width_mm: measured.options.width_mm,
+            background: measured.style.background(),
+            title: String::new(),
+            groups: self.ground.clone(),
+        };
+        let Some(frame) = measured.view.frames.get(k) else {
+            return scene;
+        };
+        self.graph(frame, &mut scene.groups);
+        if !measured.options.bare {
+            self.furniture(k, frame, &mut scene.groups);
+        }
+        scene.title = format!(
+            "{}, window {} of {}",
+            measured.options.title,
+            frame.index + 1,
+            self.len()
+        );
+        if !frame.caption.is_empty() {
+            scene.title = format!("{}: {}", scene.title, frame.caption.join("; "));
+        }
+        scene
+    }
+
+    /// The way from window `k - 1` to window `k`, `phase` (0..=1) of it done: first what goes fades, then what changes
+    /// cross-fades in place, then what comes appears. Nothing moves. At 1 it is [`Picture::scene`].
+    pub fn between(&self, k: usize, phase: f64) -> Scene {
+        let after = self.scene(k);
+        if k == 0 || phase >= 1.0 {
+            return after;
+        }
+        tween::tween(&self.scene(k - 1), after, phase.max(0.0))
+    }
+
+    fn ground(&self) -> Vec<Group> {
+        let measured = &self.measured;
+        let mut groups = Vec::new();
+        if !measured.options.bare {
+            groups.push(self.title.ground());
+            groups.push(legend::legend(
+                &measured.legend,
+                measured.style,
+                &measured.page,
+            ));
+            groups.extend(self.timeline.ground(measured.view));
+        }
+        groups
+    }
+
+    fn furniture(&self, k: usize, frame: &Frame, groups: &mut Vec<Group>) {
+        let phase = self
+            .measured
+            .options
+            .phases
+            .get(k)
+            .map_or("", String::as_str);
+        groups.push(self.title.window(self.measured.view, frame));
+        groups.push(self.title.chips(frame));
+        groups.push(self.title.clock(frame));
+        groups.push(self.title.caption(frame, phase));
+        groups.extend(self.timeline.head(k));
+    }
+
+    fn graph(&self, frame: &Frame, groups: &mut Vec<Group>) {
+        let view = self.measured.view;
+        let boxes = self.boxes();
+        let full = self.inhabited(frame);
+        let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
+        for (at, (space, place)) in spaces.enumerate() {
+            groups.push(boxes.space(space, *place, &encoded(&space.name), !full[at]));
+        }
+        let arrows = Arrows {
+            style: self.measured.style,
+            fonts: self.measured.fonts,
+            fit: self.fit,
+        };
+        // What changed lies on top.
+        let mut changed = Vec::new();
+        for &at in &self.order {
+            let Some(shown) = measured::find(&frame.arrows, at) else {
+                continue;
+            };
+            let arrow = &view.arrows[at];
+            let ends = [arrow.from, arrow.to].map(|id| measured::find(&frame.items, id as usize));
+            let group = arrows.arrow(arrow, &self.tracks[at], shown, ends);
+            let pile = if shown.mark.is_some() {
+                &mut changed
+            } else {
+                &mut *groups
+            };
+            pile.push(group);
+        }
+        groups.append(&mut changed);
+        for shown in &frame.items {
+            let at = shown.id as usize;
+            if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
+                groups.push(boxes.item(item, card, shown));
+            }
+        }
+    }
+
+    /// For each namespace with a box, whether anything inside it is there.
+    fn inhabited(&self, frame: &Frame) -> Vec<bool> {
+        let view = self.measured.view;
+        let mut full = vec![false; view.namespaces.len()];
+        for shown in &frame.items {
+            let mut space = view.items.get(shown.id as usize).and_then(|i| i.cluster);
+            // Parents come first in the list, so that this ends.
+            while let Some(at) = space.filter(|at| full.get(*at) == Some(&false)) {
+                full[at] = true;
+                space = view.namespaces[at].parent;
+            }
+        }
+        full
+    }
+
+    fn boxes(&self) -> Boxes<'_> {
+        Boxes {
+            style: self.measured.style,
+            fonts: self.measured.fonts,
+            fit: self.fit,
+        }
+    }
+}
+
+fn cards(measured: &Measured<'_>, layout: &Layout, fit: Fit) -> Vec<ItemBox> {
+    let tells = measured::tells(measured.view);
+    let items = measured.view.items.iter().zip(&layout.boxes);
+    let labels = measured.graph.labels.iter().zip(tells);
+    items
+        .zip(labels)
+        .map(|((item, place), (label, tells))| ItemBox {
+            id: item_id(item),
+            label: label.clone(),
+            tells,
+            place: fit.rect(*place),
+        })
+        .collect()
+}
+
+fn tracks(measured: &Measured<'_>, layout: &Layout, fit: Fit) -> Vec<ArrowPath> {
+    let view = measured.view;
+    let name = |id: u32| view.items.get(id as usize).map_or("", |item| &*item.name);
+    let empty = layout::Route::default();
+    let arrows = view
+        .arrows
+        .iter()
+        .zip(&measured.graph.plan.links)
+        .enumerate();
+    arrows
+        .map(|(at, (arrow, link))| {
+            let ends = [arrow.from, arrow.to].map(|id| name(id).to_owned());
+            let route = layout.routes.get(at).unwrap_or(&empty);
+            ArrowPath::new(arrow_id(arrow, &ends), ends, route, link.label, fit)
+        })
+        .collect()
+}
+
+/// What to say of names with characters that no font has; `None` if there are none.
+pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
+    let names = view.items.iter().map(|item| &*item.name);
+    let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();
+    let first: Vec<String> = missing
+        .iter()
+        .take(3)
+        .map(|c| c.escape_unicode().to_string())
+        .collect();
+    let more = if missing.len() > 3 { ", …" } else { "" };
+    let text = format!(
+        "names hold characters that the font lacks; they are drawn as {}{more}; `--font FILE` adds a font",
+        first.join(", ")
+    );
+    (!missing.is_empty()).then(|| Notice::new(NoticeKind::Glyph, text))
+}
+
+fn item_id(item: &Item) -> String {
+    let prefix = if item.kind.word() == "node" { "n" } else { "t" };
+    format!("{prefix}{}", encoded(&item.name))
+}
+
+fn arrow_id(arrow: &Arrow, ends: &[String; 2]) -> String {
+    let [from, to] = ends.each_ref().map(|name| encoded(name));
+    match &arrow.kind {
+        ArrowKind::Publish => format!("p{from}..{to}"),
+        ArrowKind::Subscribe => format!("s{from}..{to}"),
+        ArrowKind::Direct(topic) => format!("d{from}..{to}..{}", encoded(topic)),
+    }
+}
+
+/// A name as part of an XML id, different for different names: `/` becomes `-`, anything but letters, digits and `_`
+/// becomes `.` with its number in six hexadecimal digits.
+fn encoded(name: &str) -> String {
+    let mut out = String::with_capacity(name.len());
+    for c in name.chars() {
+        match c {
+            '/' => out.push('-'),
+            '_' | 'a'..='z' | 'A'..='Z' | '0'..='9' => out.push(c),
+            _ => {
+                let _ = write!(out, ".{:06x}", u32::from(c));
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;

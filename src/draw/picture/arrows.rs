@@ -1,0 +1,259 @@
+//! Publications and subscriptions: their routes, rates and signs of change.
+
+use super::boxes::class;
+use super::measured::arrow_label;
+use super::options::{self, ArrowLook};
+use super::page::Fit;
+use super::{badge, words};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
+use crate::draw::style::{Color, Style};
+use crate::draw::text::{Fonts, Weight};
+use crate::layout::Route;
+use crate::view::{Arrow, Mark, Shown};
+
+/// What arrows are drawn with.
+pub(crate) struct Arrows<'a> {
+    pub(crate) style: &'a Style,
+    pub(crate) fonts: &'a Fonts,
+    pub(crate) fit: Fit,
+}
+
+/// Where the parts of one arrow stand on the page, the same in every frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ArrowPath {
+    pub(crate) id: String,
+    /// The names of its ends.
+    pub(crate) ends: [String; 2],
+    start: Point,
+    curves: Vec<[Point; 3]>,
+    /// The middle of its label.
+    label: Option<Point>,
+    /// The middle of its badge.
+    pub(crate) badge: Point,
+    /// Its length in pixels, about.
+    pub(crate) length: f64,
+}
+
+impl ArrowPath {
+    /// The route on the page. `room` is the size of its label, if it has one.
+    pub(crate) fn new(
+        id: String,
+        ends: [String; 2],
+        route: &Route,
+        room: Option<Size>,
+        fit: Fit,
+    ) -> Self {
+        let curves: Vec<[Point; 3]> = route
+            .curves
+            .iter()
+            .map(|c| c.map(|p| fit.point(p)))
+            .collect();
+        let start = fit.point(route.start);
+        let points = points_along(start, &curves);
+        let length = points.windows(2).map(|w| distance(w[0], w[1])).sum();
+        let middle = at_part(&points, length, 0.5);
+        let label = room.and(route.label.map(|p| fit.point(p)));
+        let badge = match (label, room) {
+            (Some(label), Some(room)) => {
+                let area = Rect::around(label, Size::new(room.w * fit.scale, room.h * fit.scale));
+                let free = [0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78]
+                    .map(|part| at_part(&points, length, part));
+                let clear = |p: &&Point| !area.overlaps(&Rect::around(**p, Size::new(12.0, 12.0)));
+                *free.iter().find(clear).unwrap_or(&middle)
+            }
+            _ => middle,
+        };
+        Self {
+            id,
+            ends,
+            start,
+            curves,
+            label,
+            badge,
+            length,
+        }
+    }
+}
+
+impl Arrows<'_> {
+    /// One arrow in one window, whose ends are `ends` there.
+    pub(crate) fn arrow(
+        &self,
+        arrow: &Arrow,
+        track: &ArrowPath,
+        shown: &Shown,
+        ends: [Option<&Shown>; 2],
+    ) -> Group {
+        let look = options::of_arrow(self.style, &arrow.kind, shown);
+        let [from, to] = &track.ends;
+        let kind = arrow.kind.word();
+        let mut group = Group {
+            id: track.id.clone(),
+            class: class(&format!("edge {kind}"), shown),
+            data: vec![("from", from.clone()), ("to", to.clone())],
+            title: format!("{from} → {to}\n{kind}: {}", words::facts(shown)),
+            ..Group::default()
+        };
+        self.line(&mut group, track, &look);
+        if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0]) {
+            self.label(&mut group, &text, is_pill, track, shown, &look);
+        }
+        if let Some(mark) = shown.mark.filter(|mark| is_badged(*mark, ends)) {
+            let size = self.fit.pen * 0.8;
+            badge::badge(&mut group, self.style, mark, track.badge, size);
+        }
+        group
+    }
+
+    fn line(&self, group: &mut Group, track: &ArrowPath, look: &ArrowLook) {
+        let Some(last) = track.curves.last() else {
+            return;
+        };
+        let scale = self.fit.pen;
+        let stroke = look.stroke.scaled(scale);
+        let before = match track.curves.len() {
+            1 => track.start,
+            n => track.curves[n - 2][2],
+        };
+        let along = direction(&[before, last[0], last[1]], last[2]);
+        let head = (self.style.edge.arrow + look.stroke.width) * scale;
+        // The line ends inside the head, so that its own blunt end does not show beside the tip; at the same place
+        // whatever its width.
+        let short = self.style.edge.arrow * 0.7 * scale;
+        let back = Point::new(last[2].x - along.x * short, last[2].y - along.y * short);
+        let mut steps = vec![Step::Move(track.start)];
+        steps.extend(track.curves.iter().map(|curve| Step::Curve(*curve)));
+        if let Some(Step::Curve(end)) = steps.last_mut() {
+            end[1] = Point::new(
+                end[1].x - along.x * short * 0.5,
+                end[1].y - along.y * short * 0.5,
+            );
+            end[2] = back;
+        }
+        let color = stroke.color;
+        let path = Form::Path(steps);
+        if look.glow != Color::NONE {
+            let width = stroke.width + 1.2 * self.style.badge.glow * scale;
+            group.shape(Shape::line(path.clone(), Stroke::solid(look.glow, width)));
+        }
+        group.shape(Shape::line(path, stroke));
+        group.shape(Shape::filled(arrow_head(last[2], along, head), color));
+        if look.dot {
+            let dot = Size::new(5.0 * scale, 5.0 * scale);
+            group.shape(Shape::filled(
+                Form::Ellipse(Rect::around(track.start, dot)),
+                color,
+            ));
+        }
+    }
+
+    fn label(
+        &self,
+        group: &mut Group,
+        text: &str,
+        is_pill: bool,
+        track: &ArrowPath,
+        shown: &Shown,
+        look: &ArrowLook,
+    ) {
+        let Some(centre) = track.label else { return };
+        let text = self.fonts.shown(text);
+        let style = &self.style.edge;
+        let size = style.size * self.fit.scale;
+        if is_pill {
+            let paint = (look.stroke.color, self.style.badge.sign);
+            badge::pill(group, self.fonts, paint, &text, centre, size);
+            return;
+        }
+        group.text(Text {
+            at: Point::new(centre.x, centre.y + size * 0.36),
+            anchor: Anchor::Middle,
+            size,
+            weight: if shown.mark.is_some() {
+                Weight::SemiBold
+            } else {
+                Weight::Regular
+            },
+            color: if shown.mark.is_some() {
+                look.stroke.color
+            } else {
+                look.text
+            },
+            halo: Some((style.halo, style.halo_width * self.fit.scale)),
+            text: text.into_owned(),
+        });
+    }
+}
+
+/// Whether a changed arrow carries a badge: not where one of its ends tells the same, and not where its rate does.
+pub(crate) fn is_badged(mark: Mark, ends: [Option<&Shown>; 2]) -> bool {
+    let rate = matches!(mark, Mark::Faster | Mark::Slower);
+    let mut marks = ends.into_iter().flatten().filter_map(|end| end.mark);
+    !rate && !marks.any(|m| m.class() == mark.class())
+}
+
+/// A triangle with its tip here, pointing along a direction of length 1.
+pub(crate) fn arrow_head(tip: Point, along: Point, length: f64) -> Form {
+    let base = Point::new(tip.x - along.x * length, tip.y - along.y * length);
+    let half = length * 0.38;
+    polygon(&[
+        tip,
+        Point::new(base.x - along.y * half, base.y + along.x * half),
+        Point::new(base.x + along.y * half, base.y - along.x * half),
+    ])
+}
+
+/// The direction in which a curve reaches `end`: from its last control that is not there already.
+fn direction(controls: &[Point], end: Point) -> Point {
+    for from in controls.iter().rev() {
+        let length = distance(*from, end);
+        if length > 0.01 {
+            return Point::new((end.x - from.x) / length, (end.y - from.y) / length);
+        }
+    }
+    Point::new(1.0, 0.0)
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    libm::hypot(a.x - b.x, a.y - b.y)
+}
+
+/// The route as short straight pieces.
+fn points_along(start: Point, curves: &[[Point; 3]]) -> Vec<Point> {
+    const PIECES: usize = 10;
+    let mut points = vec![start];
+    let mut here = start;
+    for [a, b, end] in curves {
+        for piece in 1..=PIECES {
+            let t = piece as f64 / PIECES as f64;
+            let u = 1.0 - t;
+            let mix = |p: f64, q: f64, r: f64, s: f64| {
+                u * u * u * p + 3.0 * u * u * t * q + 3.0 * u * t * t * r + t * t * t * s
+            };
+            points.push(Point::new(
+                mix(here.x, a.x, b.x, end.x),
+                mix(here.y, a.y, b.y, end.y),
+            ));
+        }
+        here = *end;
+    }
+    points
+}
+
+/// The point at `part` (0..=1) of the way.
+fn at_part(points: &[Point], length: f64, part: f64) -> Point {
+    let mut left = length * part;
+    for pair in points.windows(2) {
+        let step = distance(pair[0], pair[1]);
+        if step >= left && step > 0.0 {
+            let t = left / step;
+            return Point::new(
+                pair[0].x + (pair[1].x - pair[0].x) * t,
+                pair[0].y + (pair[1].y - pair[0].y) * t,
+            );
+        }
+        left -= step;
+    }
+    points.last().copied().unwrap_or_default()
+}

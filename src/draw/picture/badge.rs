@@ -1,0 +1,121 @@
+//! The signs of change: a round badge at a corner, and a pill with a rate on it.
+
+use super::measured::{PILL_HEIGHT, PILL_PAD};
+use super::options;
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
+use crate::draw::style::{Color, Style};
+use crate::draw::text::{Fonts, Weight};
+use crate::view::Mark;
+
+/// Draws the badge of `mark` around `centre`, `scale` times its size in the style.
+pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point, scale: f64) {
+    let radius = style.badge.radius * scale;
+    let around = |r: f64| Form::Ellipse(Rect::around(centre, Size::new(2.0 * r, 2.0 * r)));
+    let color = options::change(style, mark).color;
+    group.shape(Shape {
+        form: around(radius),
+        fill: color,
+        stroke: Stroke::solid(style.badge.halo, 1.2 * scale),
+    });
+    sign(group, style.badge.sign, mark, centre, radius * 0.56);
+}
+
+/// The sign of a mark inside a circle of radius `r`: plus, minus, triangles, two arrows, a turn, a diamond, a dot.
+fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
+    let at = |x: f64, y: f64| Point::new(centre.x + x * r, centre.y + y * r);
+    let stroke = |form| Shape::line(form, Stroke::solid(color, r * 0.5));
+    let lines = |points: &[(f64, f64)]| {
+        let steps = points.chunks(2).flat_map(|pair| {
+            [
+                Step::Move(at(pair[0].0, pair[0].1)),
+                Step::Line(at(pair[1].0, pair[1].1)),
+            ]
+        });
+        Form::Path(steps.collect())
+    };
+    match mark {
+        Mark::Added => group.shape(stroke(lines(&[
+            (-1.0, 0.0),
+            (1.0, 0.0),
+            (0.0, -1.0),
+            (0.0, 1.0),
+        ]))),
+        Mark::Removed => group.shape(stroke(lines(&[(-1.0, 0.0), (1.0, 0.0)]))),
+        Mark::Faster => group.shape(Shape::filled(
+            polygon(&[at(-1.0, 0.7), at(0.0, -0.95), at(1.0, 0.7)]),
+            color,
+        )),
+        Mark::Slower => group.shape(Shape::filled(
+            polygon(&[at(-1.0, -0.7), at(0.0, 0.95), at(1.0, -0.7)]),
+            color,
+        )),
+        Mark::HandedOver => {
+            group.shape(stroke(lines(&[
+                (-1.1, -0.45),
+                (0.6, -0.45),
+                (1.1, 0.5),
+                (-0.6, 0.5),
+            ])));
+            let head = |tip: Point, back: f64| {
+                polygon(&[
+                    tip,
+                    Point::new(tip.x + back, tip.y - 0.6 * r),
+                    Point::new(tip.x + back, tip.y + 0.6 * r),
+                ])
+            };
+            group.shape(Shape::filled(head(at(1.3, -0.45), -0.8 * r), color));
+            group.shape(Shape::filled(head(at(-1.3, 0.5), 0.8 * r), color));
+        }
+        Mark::Restarted => {
+            // Three quarters of a circle, open at the top right, where its arrow points.
+            const K: f64 = 0.5523;
+            group.shape(stroke(Form::Path(vec![
+                Step::Move(at(0.0, -0.9)),
+                Step::Curve([at(-0.9 * K, -0.9), at(-0.9, -0.9 * K), at(-0.9, 0.0)]),
+                Step::Curve([at(-0.9, 0.9 * K), at(-0.9 * K, 0.9), at(0.0, 0.9)]),
+                Step::Curve([at(0.9 * K, 0.9), at(0.9, 0.9 * K), at(0.9, 0.0)]),
+            ])));
+            group.shape(Shape::filled(
+                polygon(&[at(0.0, -1.6), at(0.95, -0.9), at(0.0, -0.2)]),
+                color,
+            ));
+        }
+        Mark::Changed => {
+            group.shape(Shape::filled(
+                polygon(&[at(0.0, -1.1), at(1.1, 0.0), at(0.0, 1.1), at(-1.1, 0.0)]),
+                color,
+            ));
+        }
+        Mark::Inside => {
+            group.shape(Shape::filled(
+                Form::Ellipse(Rect::around(centre, Size::new(1.1 * r, 1.1 * r))),
+                color,
+            ));
+        }
+    }
+}
+
+/// A pill around `text` with its middle at `centre`; `size` is its font size.
+pub(crate) fn pill(
+    group: &mut Group,
+    fonts: &Fonts,
+    paint: (Color, Color),
+    text: &str,
+    centre: Point,
+    size: f64,
+) {
+    let width = fonts.width(text, size, Weight::SemiBold) + size * PILL_PAD;
+    let height = size * PILL_HEIGHT;
+    let form = Form::Rect(Rect::around(centre, Size::new(width, height)), height / 2.0);
+    group.shape(Shape::filled(form, paint.0));
+    group.text(Text {
+        at: Point::new(centre.x, centre.y + size * 0.36),
+        anchor: Anchor::Middle,
+        size,
+        weight: Weight::SemiBold,
+        color: paint.1,
+        halo: None,
+        text: text.to_owned(),
+    });
+}

@@ -1,0 +1,266 @@
+//! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
+
+use super::measured::{LINE, Label, Space, Tells, pendant, second_line};
+use super::options::{self, BoxLook};
+use super::page::Fit;
+use super::{badge, words};
+use crate::base::geometry::{Point, Rect};
+use crate::draw::scene::{Anchor, Fade, Form, Group, Shape, Stroke, Text};
+use crate::draw::style::{Body, Color, Style};
+use crate::draw::text::{Fonts, Weight};
+use crate::graph::State;
+use crate::view::{Item, ItemKind, Mark, Shown};
+
+/// The opacity of a namespace in which nothing is.
+const EMPTY: f64 = 0.35;
+
+/// What boxes are drawn with.
+pub(crate) struct Boxes<'a> {
+    pub(crate) style: &'a Style,
+    pub(crate) fonts: &'a Fonts,
+    pub(crate) fit: Fit,
+}
+
+/// What is the same of an item in every window.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ItemBox {
+    pub(crate) id: String,
+    pub(crate) label: Label,
+    pub(crate) tells: Tells,
+    /// Its box on the page.
+    pub(crate) place: Rect,
+}
+
+impl Boxes<'_> {
+    /// The box around a namespace; pale while nothing inside it is there.
+    pub(crate) fn space(&self, space: &Space, place: Rect, id: &str, is_empty: bool) -> Group {
+        let style = &self.style.cluster;
+        let scale = self.fit.scale;
+        let place = self.fit.rect(place);
+        let mut group = Group {
+            id: format!("s{id}"),
+            class: "namespace".to_owned(),
+            data: vec![("name", space.name.clone())],
+            title: space.name.clone(),
+            fade: Fade(if is_empty { EMPTY } else { 1.0 }),
+            ..Group::default()
+        };
+        let stroke = Stroke {
+            color: style.stroke,
+            width: style.width,
+            dash: style.dash.clone(),
+        };
+        group.shape(Shape {
+            form: Form::Rect(place, style.radius * scale),
+            fill: style.fill,
+            stroke: stroke.scaled(self.fit.pen),
+        });
+        group.text(Text {
+            at: Point::new(
+                place.x + 8.0 * scale,
+                place.y + (4.0 + style.size * 0.9) * scale,
+            ),
+            anchor: Anchor::Start,
+            size: style.size * scale,
+            weight: Weight::SemiBold,
+            color: style.text,
+            halo: None,
+            text: space.title.clone(),
+        });
+        group
+    }
+
+    /// One item in one window.
+    pub(crate) fn item(&self, item: &Item, card: &ItemBox, shown: &Shown) -> Group {
+        let style = self.style;
+        let body = match item.kind {
+            ItemKind::Node | ItemKind::Namespace => &style.node,
+            ItemKind::Topic | ItemKind::Group => &style.topic,
+        };
+        let look = options::of_box(style, body, shown);
+        let place = card.place;
+        let mut group = Group {
+            id: card.id.clone(),
+            class: class(item.kind.word(), shown),
+            data: vec![("name", item.name.to_string())],
+            title: title(item, shown),
+            ..Group::default()
+        };
+        let inner = self.outline(&mut group, item.kind, body, place, &look);
+        if shown.state == State::Latched
+            && item.kind != ItemKind::Node
+            && shown.mark != Some(Mark::Removed)
+        {
+            self.latch(&mut group, inner, body);
+        }
+        let second = match card.label.fixed.as_str() {
+            "" => second_line(shown, card.tells).unwrap_or_default(),
+            fixed => fixed.to_owned(),
+        };
+        self.lines(&mut group, &card.label, &second, inner, body, &look);
+        if let Some(text) = pendant(shown, card.tells) {
+            let (below, size) = self.below(place);
+            let paint = (look.stroke.color, style.badge.sign);
+            badge::pill(&mut group, self.fonts, paint, &text, below, size);
+        }
+        if let Some(mark) = shown.mark {
+            badge::badge(
+                &mut group,
+                style,
+                mark,
+                corner(item.kind, place, self.fit.scale),
+                self.fit.pen,
+            );
+        }
+        group
+    }
+
+    /// The middle of what hangs on a box and its font size: over the lower edge, clear of the name, and at most as far
+    /// down as boxes are apart.
+    fn below(&self, place: Rect) -> (Point, f64) {
+        let size = self.style.edge.size * self.fit.scale * 0.95;
+        (
+            Point::new(place.centre().x, place.bottom() + size * 0.2),
+            size,
+        )
+    }
+
+    /// The words of what hangs on a box, without the pill.
+    pub(crate) fn pendant_text(&self, place: Rect, text: &str) -> Text {
+        let (below, size) = self.below(place);
+        Text {
+            at: Point::new(below.x, below.y + size * 0.36),
+            anchor: Anchor::Middle,
+            size,
+            weight: Weight::SemiBold,
+            color: self.style.changed.color,
+            halo: Some((self.style.edge.halo, self.style.edge.halo_width)),
+            text: text.to_owned(),
+        }
+    }
+
+    /// The outline, and the part inside it that the label stands in.
+    fn outline(
+        &self,
+        group: &mut Group,
+        kind: ItemKind,
+        body: &Body,
+        place: Rect,
+        look: &BoxLook,
+    ) -> Rect {
+        let scale = self.fit.scale;
+        let stroke = look.stroke.scaled(self.fit.pen);
+        let radius = body.radius * scale;
+        let form = match kind {
+            ItemKind::Node => Form::Ellipse(place),
+            _ => Form::Rect(place, radius),
+        };
+        if look.glow != Color::NONE {
+            let width = stroke.width + 2.0 * self.style.badge.glow * self.fit.pen;
+            let stroke = Stroke::solid(look.glow, width);
+            group.shape(Shape {
+                form: form.clone(),
+                fill: look.glow,
+                stroke,
+            });
+        }
+        group.shape(Shape {
+            form,
+            fill: look.fill,
+            stroke: stroke.clone(),
+        });
+        if matches!(kind, ItemKind::Node | ItemKind::Topic) {
+            return place;
+        }
+        // Several in one: a second card in front of the first.
+        let depth = self.style.stack.depth * scale;
+        let front = Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth);
+        group.shape(Shape {
+            form: Form::Rect(front, radius),
+            fill: look.fill,
+            stroke,
+        });
+        front
+    }
+
+    fn latch(&self, group: &mut Group, place: Rect, body: &Body) {
+        let width = self.style.latched.bar * self.fit.scale;
+        let inset = body.width * self.fit.pen / 2.0;
+        let bar = Rect::new(
+            place.x + inset,
+            place.y + inset,
+            width,
+            place.h - 2.0 * inset,
+        );
+        group.shape(Shape::filled(
+            Form::Rect(bar, 0.0),
+            self.style.latched.stroke,
+        ));
+    }
+
+    fn lines(
+        &self,
+        group: &mut Group,
+        label: &Label,
+        second: &str,
+        place: Rect,
+        body: &Body,
+        look: &BoxLook,
+    ) {
+        let scale = self.fit.scale;
+        let middle = place.centre();
+        let small = if label.second { body.small * LINE } else { 0.0 };
+        // A line that is missing in this window leaves its room, so that the name stays where it is.
+        let top = middle.y - (body.size * LINE + small) * scale / 2.0;
+        let line = |y: f64, size: f64, weight, color, text: &str| Text {
+            at: Point::new(middle.x, y),
+            anchor: Anchor::Middle,
+            size: size * scale,
+            weight,
+            color,
+            halo: None,
+            text: text.to_owned(),
+        };
+        let y = top + body.size * (LINE / 2.0 + 0.35) * scale;
+        group.text(line(y, body.size, body.weight(), look.text, &label.name));
+        let y = top + (body.size * LINE + body.small * (LINE / 2.0 + 0.28)) * scale;
+        let (weight, color) = look.small;
+        group.text(line(y, body.small, weight, color, second));
+    }
+}
+
+/// Where the badge of a box stands: at its top right, on its outline.
+pub(crate) fn corner(kind: ItemKind, place: Rect, scale: f64) -> Point {
+    match kind {
+        ItemKind::Node => {
+            let middle = place.centre();
+            Point::new(middle.x + place.w * 0.36, middle.y - place.h * 0.36)
+        }
+        _ => Point::new(place.right() - 2.0 * scale, place.y + scale),
+    }
+}
+
+/// `node added active measured`: what it is, what happened to it, how alive, how well known.
+pub(crate) fn class(what: &str, shown: &Shown) -> String {
+    let mut words = vec![what];
+    words.extend(shown.mark.map(Mark::class));
+    words.extend([shown.state.word(), shown.degree.word()]);
+    if matches!(shown.mark, Some(Mark::HandedOver)) {
+        words.push("handed-over");
+    }
+    if matches!(shown.mark, Some(Mark::Restarted)) {
+        words.push("restarted");
+    }
+    words.dedup();
+    words.join(" ")
+}
+
+fn title(item: &Item, shown: &Shown) -> String {
+    let what = match item.kind {
+        ItemKind::Node => "node",
+        ItemKind::Topic => "topic",
+        ItemKind::Group => "topics",
+        ItemKind::Namespace => "namespace",
+    };
+    format!("{}\n{what}: {}", item.name, words::facts(shown))
+}

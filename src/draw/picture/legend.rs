@@ -1,0 +1,302 @@
+//! What the signs mean: one row, or more on a narrow page, with only the signs that occur.
+
+use super::arrows::arrow_head;
+use super::badge::badge;
+use super::options;
+use super::page::Page;
+use super::words;
+use crate::base::geometry::{Point, Rect};
+use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
+use crate::draw::style::Style;
+use crate::draw::text::{Fonts, Weight};
+use crate::evidence::Degree;
+use crate::graph::State;
+use crate::view::{ArrowKind, ItemKind, Mark, Shown, View};
+
+/// A sign with its meaning.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Sign {
+    Node,
+    Topic,
+    Group,
+    Namespace,
+    Change(Mark),
+    Box(State),
+    Line(Degree),
+    Width,
+}
+
+/// The signs that occur in the view, with their words.
+pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
+    let kind = |kind| view.items.iter().any(|i| i.kind == kind);
+    let any = |is: &dyn Fn(&Shown) -> bool| {
+        view.frames
+            .iter()
+            .any(|f| f.items.iter().chain(&f.arrows).any(is))
+    };
+    let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
+    let state = |state| any(&|s| s.state == state && s.mark.is_none());
+    let degree = |degree| {
+        view.frames
+            .iter()
+            .any(|f| f.arrows.iter().any(|s| s.degree == degree))
+    };
+    let percent = words::percent(rate_change);
+    let all = [
+        (kind(ItemKind::Node), Sign::Node, "node"),
+        (kind(ItemKind::Topic), Sign::Topic, "topic"),
+        (kind(ItemKind::Group), Sign::Group, "group"),
+        (kind(ItemKind::Namespace), Sign::Namespace, "namespace"),
+        (mark(&[Mark::Added]), Sign::Change(Mark::Added), "added"),
+        (
+            mark(&[Mark::Removed]),
+            Sign::Change(Mark::Removed),
+            "removed",
+        ),
+        (
+            mark(&[Mark::Faster, Mark::Slower]),
+            Sign::Change(Mark::Slower),
+            &*format!("rate ± {percent} %"),
+        ),
+        (
+            mark(&[Mark::HandedOver]),
+            Sign::Change(Mark::HandedOver),
+            "handed over",
+        ),
+        (
+            mark(&[Mark::Restarted]),
+            Sign::Change(Mark::Restarted),
+            "restarted",
+        ),
+        (
+            mark(&[Mark::Changed]),
+            Sign::Change(Mark::Changed),
+            "changed",
+        ),
+        (
+            mark(&[Mark::Inside]),
+            Sign::Change(Mark::Inside),
+            "changed inside",
+        ),
+        (state(State::Silent), Sign::Box(State::Silent), "silent"),
+        (state(State::Latched), Sign::Box(State::Latched), "latched"),
+        (
+            state(State::Declared),
+            Sign::Box(State::Declared),
+            "declared only",
+        ),
+        (degree(Degree::Stated), Sign::Line(Degree::Stated), "stated"),
+        (
+            degree(Degree::Inferred),
+            Sign::Line(Degree::Inferred),
+            "inferred",
+        ),
+        (
+            any(&|s| s.hz.is_some()),
+            Sign::Width,
+            "thicker = higher rate",
+        ),
+    ];
+    let present = all.into_iter().filter(|(occurs, _, _)| *occurs);
+    present
+        .map(|(_, sign, words)| (sign, words.to_owned()))
+        .collect()
+}
+
+/// How wide a sign is, before its words.
+const SIGN: f64 = 24.0;
+const GAP: f64 = 6.0;
+const AFTER: f64 = 14.0;
+
+/// The signs in rows that fit the page's width.
+pub(crate) fn rows(
+    signs: &[(Sign, String)],
+    style: &Style,
+    fonts: &Fonts,
+    unit: f64,
+    width: f64,
+) -> Vec<Vec<(Sign, String, f64)>> {
+    let mut rows = vec![Vec::new()];
+    let start = style.page.margin * unit;
+    let mut x = start;
+    for (sign, words) in signs {
+        let wide = (SIGN + GAP + AFTER) * unit
+            + fonts.width(words, style.legend.size * unit, Weight::Regular);
+        if x + wide - AFTER * unit > width - start && x > start {
+            rows.push(Vec::new());
+            x = start;
+        }
+        if let Some(row) = rows.last_mut() {
+            row.push((sign.clone(), words.clone(), x));
+        }
+        x += wide;
+    }
+    rows
+}
+
+/// The legend, the same in every frame.
+pub(crate) fn legend(rows: &[Vec<(Sign, String, f64)>], style: &Style, page: &Page) -> Group {
+    let mut group = Group::named("legend");
+    let place = page.legend;
+    let unit = page.unit;
+    group.shape(Shape::filled(Form::Rect(place, 0.0), style.legend.fill));
+    let edge = line(
+        Point::new(place.x, place.y),
+        Point::new(place.right(), place.y),
+    );
+    group.shape(Shape::line(edge, Stroke::solid(style.legend.line, unit)));
+    let size = style.legend.size * unit;
+    let height = (place.h - 8.0 * unit) / rows.len().max(1) as f64;
+    for (at, row) in rows.iter().enumerate() {
+        let y = place.y + 7.0 * unit + (at as f64 + 0.5) * height;
+        for (sign, words, x) in row {
+            draw(
+                &mut group,
+                sign,
+                style,
+                Rect::new(*x, y - 6.0 * unit, SIGN * unit, 12.0 * unit),
+                unit,
+            );
+            group.text(Text {
+                at: Point::new(x + (SIGN + GAP) * unit, y + size * 0.36),
+                anchor: Anchor::Start,
+                size,
+                weight: Weight::Regular,
+                color: style.legend.text,
+                halo: None,
+                text: words.clone(),
+            });
+        }
+    }
+    group
+}
+
+fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
+    let arrow_of = |kind, degree, mark| {
+        options::of_arrow(style, &kind, &shown(State::Active, degree, mark))
+            .stroke
+            .scaled(unit)
+    };
+    match sign {
+        Sign::Node => card(group, style, place, true, State::Active, unit),
+        Sign::Topic => card(group, style, place, false, State::Active, unit),
+        Sign::Group => {
+            card(group, style, place, false, State::Active, unit);
+            card(
+                group,
+                style,
+                front(place, style, unit),
+                false,
+                State::Active,
+                unit,
+            );
+        }
+        Sign::Namespace => {
+            let stroke = Stroke::solid(style.node.stroke, style.node.width * unit);
+            for place in [place, front(place, style, unit)] {
+                let form = Form::Rect(place, 4.0 * unit);
+                group.shape(Shape {
+                    form,
+                    fill: style.node.fill,
+                    stroke: stroke.clone(),
+                });
+            }
+        }
+        Sign::Change(mark) => {
+            let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, Some(*mark));
+            group.shape(Shape::line(across(place), stroke));
+            badge(group, style, *mark, place.centre(), unit * 0.9);
+        }
+        Sign::Box(state) => {
+            card(group, style, place, false, *state, unit);
+            if *state == State::Latched {
+                let inset = style.topic.width * unit / 2.0;
+                let width = style.latched.bar * unit;
+                let bar = Rect::new(
+                    place.x + inset,
+                    place.y + inset,
+                    width,
+                    place.h - 2.0 * inset,
+                );
+                group.shape(Shape::filled(Form::Rect(bar, 0.0), style.latched.stroke));
+            }
+        }
+        Sign::Line(degree) => {
+            let stroke = arrow_of(ArrowKind::Subscribe, *degree, None);
+            arrow(group, place, stroke, style.edge.arrow * unit);
+        }
+        Sign::Width => widths(group, style, place, unit),
+    }
+}
+
+/// An element that stands for all of its kind.
+fn shown(state: State, degree: Degree, mark: Option<Mark>) -> Shown {
+    Shown {
+        id: 0,
+        state,
+        degree,
+        mark,
+        hz: None,
+        from_hz: None,
+        count: None,
+        lifecycle: None,
+    }
+}
+
+fn card(group: &mut Group, style: &Style, place: Rect, round: bool, state: State, unit: f64) {
+    let body = if round { &style.node } else { &style.topic };
+    let degree = match state {
+        State::Declared => Degree::Declared,
+        _ => Degree::Measured,
+    };
+    let look = options::of_box(style, body, &shown(state, degree, None));
+    let form = if round {
+        Form::Ellipse(place)
+    } else {
+        Form::Rect(place, body.radius * unit)
+    };
+    group.shape(Shape {
+        form,
+        fill: look.fill,
+        stroke: look.stroke.scaled(unit),
+    });
+}
+
+/// The second card of a stack.
+fn front(place: Rect, style: &Style, unit: f64) -> Rect {
+    let depth = style.stack.depth * 0.7 * unit;
+    Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth)
+}
+
+/// A thin line and a thick one.
+fn widths(group: &mut Group, style: &Style, place: Rect, unit: f64) {
+    let edge = &style.edge;
+    let y = place.centre().y;
+    for (part, width) in [
+        (0.0, edge.width),
+        (0.55, edge.width + 2.0 * edge.per_decade),
+    ] {
+        let from = Point::new(place.x + place.w * part, y);
+        let to = Point::new(from.x + place.w * 0.45, y);
+        group.shape(Shape::line(
+            line(from, to),
+            Stroke::solid(edge.stroke, width * unit),
+        ));
+    }
+}
+
+fn across(place: Rect) -> Form {
+    let y = place.centre().y;
+    line(Point::new(place.x, y), Point::new(place.right(), y))
+}
+
+fn arrow(group: &mut Group, place: Rect, stroke: Stroke, head: f64) {
+    let color = stroke.color;
+    let shorter = Rect::new(place.x, place.y, place.w - head * 0.7, place.h);
+    group.shape(Shape::line(across(shorter), stroke));
+    let tip = Point::new(place.right(), place.centre().y);
+    group.shape(Shape::filled(
+        arrow_head(tip, Point::new(1.0, 0.0), head),
+        color,
+    ));
+}

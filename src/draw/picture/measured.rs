@@ -1,0 +1,399 @@
+//! What to lay out: every label at its widest, every namespace that gets a box.
+
+use std::collections::BTreeSet;
+
+use super::words;
+use crate::base::geometry::Size;
+use crate::draw::style::{Body, Style};
+use crate::draw::text::{Fonts, Weight};
+use crate::graph::{Element, State};
+use crate::layout::{self, Link, Outline, Plan, Vertex};
+use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
+
+/// The widest that a name is drawn; longer ones are shortened in their middle.
+const WIDEST: f64 = 230.0;
+/// The height of a line of text over its font size.
+pub(crate) const LINE: f64 = 1.22;
+/// The height of a pill, and its width beyond its text, over the font size.
+pub(crate) const PILL_HEIGHT: f64 = 1.5;
+pub(crate) const PILL_PAD: f64 = 1.2;
+/// How much a subscription's rate must differ from its topic's to be written beside it.
+const OWN_RATE: f64 = 0.15;
+
+/// How a box is labelled.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Label {
+    /// The name as it is drawn.
+    pub(crate) name: String,
+    /// Whether a smaller line stands below it in some window.
+    pub(crate) second: bool,
+    /// The smaller line where it is the same in all windows.
+    pub(crate) fixed: String,
+}
+
+/// A namespace with a box around its members.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Space {
+    /// Its full name.
+    pub(crate) name: String,
+    /// Its title: the part inside the namespace around it.
+    pub(crate) title: String,
+}
+
+/// The labels of a view, and the plan that follows from them.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MeasuredGraph {
+    pub(crate) plan: Plan,
+    pub(crate) labels: Vec<Label>,
+    pub(crate) spaces: Vec<Space>,
+    /// Whether each arrow carries its rate.
+    pub(crate) rated: Vec<bool>,
+}
+
+impl MeasuredGraph {
+    pub(crate) fn new(view: &View, style: &Style, fonts: &Fonts) -> Self {
+        let spaces = spaces(view, fonts);
+        let drafter = Measurer { view, style, fonts };
+        let seconds = drafter.second_lines();
+        let mut labels = Vec::new();
+        let mut vertices = Vec::new();
+        for (at, item) in view.items.iter().enumerate() {
+            let inside = item
+                .cluster
+                .and_then(|c| spaces.get(c))
+                .map_or("", |space| space.name.as_str());
+            let label = drafter.label(item, inside, seconds[at].is_some());
+            vertices.push(Vertex {
+                size: drafter.size(item, &label, seconds[at].unwrap_or(0.0)),
+                outline: match item.kind {
+                    ItemKind::Node => Outline::Ellipse,
+                    _ => Outline::Box,
+                },
+                cluster: item.cluster,
+            });
+            labels.push(label);
+        }
+        let rooms = drafter.rooms();
+        let links = view.arrows.iter().zip(&rooms).map(|(arrow, room)| Link {
+            from: arrow.from as usize,
+            to: arrow.to as usize,
+            label: *room,
+        });
+        let clusters = view
+            .namespaces
+            .iter()
+            .zip(&spaces)
+            .map(|(namespace, space)| layout::Cluster {
+                parent: namespace.parent,
+                title: drafter.title(space),
+            });
+        let plan = Plan {
+            vertices,
+            links: links.collect(),
+            clusters: clusters.collect(),
+        };
+        let rated = rooms.iter().map(Option::is_some).collect();
+        Self {
+            plan,
+            labels,
+            spaces,
+            rated,
+        }
+    }
+}
+
+struct Measurer<'a> {
+    view: &'a View,
+    style: &'a Style,
+    fonts: &'a Fonts,
+}
+
+impl Measurer<'_> {
+    fn body(&self, item: &Item) -> &Body {
+        match item.kind {
+            ItemKind::Node | ItemKind::Namespace => &self.style.node,
+            ItemKind::Topic | ItemKind::Group => &self.style.topic,
+        }
+    }
+
+    fn title(&self, space: &Space) -> Size {
+        let size = self.style.cluster.size;
+        Size::new(
+            self.fonts.width(&space.title, size, Weight::SemiBold),
+            size * LINE,
+        )
+    }
+
+    fn label(&self, item: &Item, inside: &str, second: bool) -> Label {
+        let body = self.body(item);
+        let mut name = self
+            .fonts
+            .shown(short_name(&item.name, inside))
+            .into_owned();
+        let mut fixed = String::new();
+        if item.kind == ItemKind::Namespace {
+            name.push_str("/…");
+            fixed = members(item);
+        }
+        Label {
+            name: self
+                .fonts
+                .fit(&name, body.size, body.weight(), WIDEST)
+                .into_owned(),
+            second: second || !fixed.is_empty(),
+            fixed,
+        }
+    }
+
+    /// The size of a box with this label, whose changing smaller lines are at most `second` wide.
+    fn size(&self, item: &Item, label: &Label, second: f64) -> Size {
+        let body = self.body(item);
+        let width = self.fonts.width(&label.name, body.size, body.weight());
+        let fixed = self.fonts.width(&label.fixed, body.small, Weight::Regular);
+        let width = width.max(second).max(fixed);
+        let small = if label.second { body.small * LINE } else { 0.0 };
+        let height = body.size * LINE + small;
+        let depth = match item.kind {
+            ItemKind::Node => return ellipse(width, height, body),
+            ItemKind::Topic => 0.0,
+            ItemKind::Group | ItemKind::Namespace => self.style.stack.depth,
+        };
+        Size::new(
+            width + 2.0 * body.pad_x + depth,
+            height + 2.0 * body.pad_y + depth,
+        )
+    }
+
+    /// The width of the widest smaller line that each box shows in some window: lifecycle states and rates.
+    fn second_lines(&self) -> Vec<Option<f64>> {
+        let tells = tells(self.view);
+        let mut widest = vec![None; self.view.items.len()];
+        for shown in self.view.frames.iter().flat_map(|f| &f.items) {
+            let at = shown.id as usize;
+            let Some(item) = self.view.items.get(at) else {
+                continue;
+            };
+            if let Some(line) = second_line(shown, tells[at]) {
+                let width = self
+                    .fonts
+                    .width(&line, self.body(item).small, Weight::SemiBold);
+                widen(&mut widest[at], width);
+            }
+        }
+        widest
+    }
+
+    /// The room for the widest label that each arrow shows in some window.
+    fn rooms(&self) -> Vec<Option<Size>> {
+        let style = &self.style.edge;
+        let mut widest = vec![None; self.view.arrows.len()];
+        for frame in &self.view.frames {
+            for shown in &frame.arrows {
+                let at = shown.id as usize;
+                let Some(arrow) = self.view.arrows.get(at) else {
+                    continue;
+                };
+                let topic = find(&frame.items, arrow.from as usize);
+                let Some((text, is_pill)) = arrow_label(arrow, shown, topic) else {
+                    continue;
+                };
+                let (weight, pad) = if is_pill {
+                    (Weight::SemiBold, style.size * PILL_PAD)
+                } else {
+                    (Weight::Regular, style.halo_width)
+                };
+                widen(
+                    &mut widest[at],
+                    self.fonts.width(&text, style.size, weight) + pad,
+                );
+            }
+        }
+        let room = |width: Option<f64>| Some(Size::new(width?, style.size * PILL_HEIGHT));
+        widest.into_iter().map(room).collect()
+    }
+}
+
+fn widen(most: &mut Option<f64>, width: f64) {
+    *most = Some(most.map_or(width, |m: f64| m.max(width)));
+}
+
+/// Which rates a box tells itself, because no arrow does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tells {
+    /// None: the arrows of its publishers tell them.
+    Nothing,
+    /// Those that changed: in some window its publisher's arrow cannot tell, being gone or new.
+    Changes,
+    /// All: nobody is ever known to publish it.
+    Rates,
+}
+
+/// What each item tells of its rate.
+pub(crate) fn tells(view: &View) -> Vec<Tells> {
+    let first = |item: &Item| match item.kind {
+        ItemKind::Topic | ItemKind::Group => Tells::Rates,
+        ItemKind::Node | ItemKind::Namespace => Tells::Nothing,
+    };
+    let mut tells: Vec<Tells> = view.items.iter().map(first).collect();
+    for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
+        if let Some(tell) = tells.get_mut(arrow.to as usize) {
+            *tell = Tells::Nothing;
+        }
+    }
+    for frame in &view.frames {
+        let publishers = frame
+            .arrows
+            .iter()
+            .filter_map(|s| Some((view.arrows.get(s.id as usize)?, s)));
+        let told = publishers.filter(|(arrow, shown)| {
+            arrow.kind == ArrowKind::Publish && changed_rate(shown).is_some()
+        });
+        let told: BTreeSet<u32> = told.map(|(arrow, _)| arrow.to).collect();
+        for shown in frame
+            .items
+            .iter()
+            .filter(|s| changed_rate(s).is_some() && !told.contains(&s.id))
+        {
+            let topic = view
+                .items
+                .get(shown.id as usize)
+                .is_some_and(|item| first(item) == Tells::Rates);
+            match tells.get_mut(shown.id as usize) {
+                Some(tell) if topic && *tell == Tells::Nothing => *tell = Tells::Changes,
+                _ => {}
+            }
+        }
+    }
+    tells
+}
+
+/// The rates before and now of what is marked as faster or slower.
+fn changed_rate(shown: &Shown) -> Option<(f64, f64)> {
+    match shown.mark {
+        Some(Mark::Faster | Mark::Slower) => Some((shown.from_hz?, shown.hz?)),
+        _ => None,
+    }
+}
+
+/// What an arrow says in a window, and whether on a pill because it changed.
+pub(crate) fn arrow_label(
+    arrow: &Arrow,
+    shown: &Shown,
+    from: Option<&Shown>,
+) -> Option<(String, bool)> {
+    if shown.mark == Some(Mark::Removed) {
+        return None;
+    }
+    let topic = match &arrow.kind {
+        ArrowKind::Direct(topic) => format!("{topic} "),
+        _ => String::new(),
+    };
+    if let Some((before, now)) = changed_rate(shown) {
+        return Some((topic + &words::hz_change(before, now), true));
+    }
+    let rate = shown
+        .hz
+        .filter(|hz| *hz > 0.0 && shown.state == State::Active);
+    let told = match arrow.kind {
+        ArrowKind::Publish => rate,
+        ArrowKind::Subscribe => {
+            let of_topic = from.and_then(|s| s.hz).unwrap_or(0.0);
+            rate.filter(|hz| (hz - of_topic).abs() > OWN_RATE * of_topic.max(*hz))
+        }
+        ArrowKind::Direct(_) => {
+            let rate = rate.map(words::hz).unwrap_or_default();
+            return Some(((topic + &rate).trim_end().to_owned(), false));
+        }
+    };
+    told.map(|hz| (words::hz(hz), false))
+}
+
+/// The smaller line of a box in a window.
+pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
+    if shown.mark == Some(Mark::Removed) {
+        return None;
+    }
+    if let Some(state) = &shown.lifecycle {
+        return Some(state.to_string());
+    }
+    match (tells, changed_rate(shown), shown.hz) {
+        (Tells::Nothing | Tells::Changes, _, _) => None,
+        (Tells::Rates, Some((before, now)), _) => Some(words::hz_change(before, now)),
+        (Tells::Rates, None, rate) => rate.filter(|hz| *hz > 0.0).map(words::hz),
+    }
+}
+
+/// What hangs on a box for one window: the rate that changed, where neither an arrow nor its smaller line tells it.
+pub(crate) fn pendant(shown: &Shown, tells: Tells) -> Option<String> {
+    let (before, now) = changed_rate(shown).filter(|_| tells == Tells::Changes)?;
+    Some(words::hz_change(before, now))
+}
+
+/// The element with this id among those of a window, which are sorted.
+pub(crate) fn find(shown: &[Shown], id: usize) -> Option<&Shown> {
+    let at = shown.binary_search_by_key(&id, |s| s.id as usize).ok()?;
+    Some(&shown[at])
+}
+
+/// The size of an ellipse around a text of this size.
+fn ellipse(width: f64, height: f64, body: &Body) -> Size {
+    let full = height + 2.0 * body.pad_y;
+    // Letters fill about three quarters of their lines; the ellipse passes their corners.
+    let part = 0.75 * height / full;
+    let stretch = 1.0 / libm::sqrt(1.0 - part * part);
+    Size::new(width * stretch + 2.0 * body.pad_x, full)
+}
+
+/// The part of a name inside the namespace whose box it stands in.
+fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
+    let rest = name
+        .strip_prefix(inside)
+        .and_then(|rest| rest.strip_prefix('/'));
+    match rest {
+        Some(rest) if !inside.is_empty() && !rest.is_empty() => rest,
+        _ => name,
+    }
+}
+
+/// `5 nodes, 12 topics`.
+fn members(item: &Item) -> String {
+    let count = |is: fn(&Element) -> bool| item.members.iter().filter(|m| is(m)).count();
+    let nodes = count(|m| matches!(m, Element::Node(_)));
+    let topics = count(|m| matches!(m, Element::Topic(_)));
+    let parts = [(nodes, "node"), (topics, "topic")];
+    let parts = parts
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, word)| words::count(*n, word));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// The titles of the namespaces: the part of their names inside the namespace around them.
+fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
+    let title = |at: usize| {
+        let name = &*view.namespaces[at].name;
+        let around = view.namespaces[at]
+            .parent
+            .and_then(|p| view.namespaces.get(p));
+        around.map_or(name, |p| name.strip_prefix(&*p.name).unwrap_or(name))
+    };
+    (0..view.namespaces.len())
+        .map(|at| Space {
+            name: view.namespaces[at].name.to_string(),
+            title: fonts.shown(title(at)).into_owned(),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lose_the_namespace_they_stand_in() {
+        assert_eq!(short_name("/a/b/c", "/a"), "b/c");
+        assert_eq!(short_name("/a", ""), "/a");
+        assert_eq!(short_name("/a/", "/a"), "/a/");
+        assert_eq!(short_name("/ab/c", "/a"), "/ab/c");
+    }
+}

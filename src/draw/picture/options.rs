@@ -1,0 +1,196 @@
+//! Which paint an element gets: what changed counts more than how alive it is, and that more than how well it is known.
+
+use crate::draw::scene::Stroke;
+use crate::draw::style::{Body, Change, Color, Style};
+use crate::draw::text::Weight;
+use crate::evidence::Degree;
+use crate::graph::State;
+use crate::view::{ArrowKind, Mark, Shown};
+
+/// The paint of a box.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct BoxLook {
+    pub(crate) fill: Color,
+    pub(crate) stroke: Stroke,
+    pub(crate) text: Color,
+    /// The smaller line.
+    pub(crate) small: (Weight, Color),
+    /// A soft light around it, so that the eye finds it.
+    pub(crate) glow: Color,
+}
+
+/// The paint of an arrow.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ArrowLook {
+    pub(crate) stroke: Stroke,
+    pub(crate) text: Color,
+    /// Whether a dot stands at its beginning: alive by a latched message.
+    pub(crate) dot: bool,
+    /// A soft light around it.
+    pub(crate) glow: Color,
+}
+
+/// The section of the style for a mark.
+pub(crate) fn change(style: &Style, mark: Mark) -> &Change {
+    match mark {
+        Mark::Added => &style.added,
+        Mark::Removed => &style.removed,
+        _ => &style.changed,
+    }
+}
+
+/// The paint of a box.
+pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
+    if let Some(mark) = shown.mark {
+        let change = change(style, mark);
+        return BoxLook {
+            fill: change.fill,
+            stroke: line(change.color, change.width, &change.dash),
+            text: change.text,
+            small: (Weight::SemiBold, change.color),
+            glow: change.glow,
+        };
+    }
+    let quiet = match (shown.state, shown.degree) {
+        (State::Declared, _) | (_, Degree::Declared) => &style.declared,
+        (State::Silent, _) => &style.silent,
+        (State::Active | State::Latched, degree) => {
+            let dash: &[f64] = if degree == Degree::Inferred {
+                &style.inferred.dash
+            } else {
+                &[]
+            };
+            return BoxLook {
+                fill: body.fill,
+                stroke: line(body.stroke, body.width, dash),
+                text: body.text,
+                small: (Weight::Regular, style.page.quiet),
+                glow: Color::NONE,
+            };
+        }
+    };
+    BoxLook {
+        fill: quiet.fill,
+        stroke: line(quiet.stroke, quiet.width, &quiet.dash),
+        text: quiet.text,
+        small: (Weight::Regular, quiet.text),
+        glow: Color::NONE,
+    }
+}
+
+/// The paint of an arrow over which `hz` messages flow each second.
+pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowLook {
+    let edge = &style.edge;
+    let latched = shown.state == State::Latched;
+    if let Some(mark) = shown.mark {
+        let change = change(style, mark);
+        let width = match mark {
+            Mark::Removed => change.width * 0.8,
+            // As wide as its rate asks for, but never mistaken for one that did not change.
+            _ => (change.width * 0.65).max(width_of(style, shown.hz)),
+        };
+        return ArrowLook {
+            stroke: line(change.color, width, &change.dash),
+            text: change.text,
+            dot: latched,
+            glow: change.glow,
+        };
+    }
+    let quiet = match (shown.state, shown.degree) {
+        (State::Declared, _) | (_, Degree::Declared) => Some(&style.declared),
+        (State::Silent, _) => Some(&style.silent),
+        _ => None,
+    };
+    if let Some(quiet) = quiet {
+        return ArrowLook {
+            stroke: line(quiet.stroke, quiet.width, &quiet.dash),
+            text: quiet.text,
+            dot: false,
+            glow: Color::NONE,
+        };
+    }
+    let known = shown.hz.is_some() || *kind == ArrowKind::Publish;
+    let width = match shown.degree {
+        Degree::Stated if !known => style.stated.width,
+        _ => width_of(style, shown.hz),
+    };
+    let dash: &[f64] = if shown.degree == Degree::Inferred {
+        &style.inferred.dash
+    } else {
+        &[]
+    };
+    ArrowLook {
+        stroke: line(edge.stroke, width, dash),
+        text: edge.text,
+        dot: latched,
+        glow: Color::NONE,
+    }
+}
+
+/// Thicker for higher rates, by their logarithm.
+fn width_of(style: &Style, hz: Option<f64>) -> f64 {
+    let hz = hz.filter(|hz| hz.is_finite()).unwrap_or(0.0).max(0.0);
+    let edge = &style.edge;
+    (edge.width + edge.per_decade * libm::log10(1.0 + hz)).min(edge.most)
+}
+
+fn line(color: Color, width: f64, dash: &[f64]) -> Stroke {
+    Stroke {
+        color,
+        width,
+        dash: dash.to_vec(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(state: State, degree: Degree, mark: Option<Mark>, hz: f64) -> Shown {
+        Shown {
+            id: 0,
+            state,
+            degree,
+            mark,
+            hz: Some(hz),
+            from_hz: None,
+            count: None,
+            lifecycle: None,
+        }
+    }
+
+    #[test]
+    fn faster_arrows_are_thicker_but_not_without_end() {
+        let style = Style::builtin("light").unwrap();
+        let width = |hz| {
+            let shown = shown(State::Active, Degree::Measured, None, hz);
+            of_arrow(&style, &ArrowKind::Publish, &shown).stroke.width
+        };
+        assert!(width(0.0) < width(1.0) && width(1.0) < width(50.0) && width(50.0) < width(1e3));
+        assert!(width(1e300) <= style.edge.most && width(f64::NAN) <= width(0.0));
+    }
+
+    #[test]
+    fn every_difference_survives_in_grey() {
+        for name in ["light", "dark", "paper", "rqt"] {
+            let style = Style::builtin(name).unwrap();
+            let active = (State::Active, Degree::Measured, None);
+            let looks = [
+                active,
+                (State::Silent, Degree::Measured, None),
+                (State::Declared, Degree::Declared, None),
+                (State::Active, Degree::Inferred, None),
+                (State::Active, Degree::Measured, Some(Mark::Added)),
+                (State::Active, Degree::Measured, Some(Mark::Removed)),
+            ];
+            let shape = |(state, degree, mark)| {
+                let look = of_box(&style, &style.topic, &shown(state, degree, mark, 1.0));
+                (look.stroke.dash, (look.stroke.width * 100.0).to_string())
+            };
+            let mut shapes: Vec<_> = looks.map(shape).to_vec();
+            shapes.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            shapes.dedup();
+            assert_eq!(shapes.len(), looks.len(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The page: which part is title, caption, graph, legend and timeline, and how the graph is scaled into its part.
+
+use super::PageOptions;
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::style::Style;
+
+/// The page that furniture lengths are given for.
+const STANDARD: Size = Size::new(1280.0, 720.0);
+/// The largest that the graph is drawn, over its natural size.
+const LARGEST: f64 = 1.35;
+
+/// Where everything on the page stands, at the same place in every frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Page {
+    pub(crate) size: Size,
+    /// The scale of furniture: 1 on a page of 1280 × 720.
+    pub(crate) unit: f64,
+    /// Empty parts (`--bare`) have no height.
+    pub(crate) title: Rect,
+    pub(crate) caption: Rect,
+    pub(crate) graph: Rect,
+    pub(crate) legend: Rect,
+    pub(crate) timeline: Rect,
+}
+
+/// How the graph is brought into its part of the page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Fit {
+    pub(crate) scale: f64,
+    /// The scale of strokes and badges: they shrink less than what they surround, to stay visible.
+    pub(crate) pen: f64,
+    pub(crate) origin: Point,
+}
+
+impl Page {
+    /// The page that is wished for, with `rows` rows of legend.
+    pub(crate) fn new(style: &Style, options: &PageOptions, rows: usize) -> Self {
+        let size = options.size;
+        let unit = unit(size);
+        let strip = |y: f64, height: f64| Rect::new(0.0, y, size.w, height);
+        let (mut title, mut caption, mut legend, mut timeline) = (0.0, 0.0, 0.0, 0.0);
+        if !options.bare {
+            title = style.title.height * unit;
+            caption = style.caption.height * unit;
+            legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
+            timeline = (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit;
+        }
+        let margin = (style.page.margin * unit)
+            .min(size.w / 20.0)
+            .min(size.h / 20.0);
+        let top = title + caption;
+        let bottom = (size.h - legend - timeline).max(top + 1.0);
+        let above = if options.bare { margin } else { margin / 4.0 };
+        let graph = Rect::new(
+            margin,
+            top + above,
+            size.w - 2.0 * margin,
+            bottom - top - above - margin,
+        );
+        Self {
+            size,
+            unit,
+            title: strip(0.0, title),
+            caption: strip(title, caption),
+            graph: Rect::new(graph.x, graph.y, graph.w.max(1.0), graph.h.max(1.0)),
+            legend: strip(bottom, legend),
+            timeline: strip(bottom + legend, timeline),
+        }
+    }
+
+    /// The largest scale at which a layout of this size fits, and where its corner goes so that it stands in the middle.
+    pub(crate) fn fit(&self, layout: Size) -> Fit {
+        let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));
+        let scale = (self.graph.w / w)
+            .min(self.graph.h / h)
+            .min(LARGEST * self.unit.max(0.8));
+        let middle = self.graph.centre();
+        Fit {
+            scale,
+            pen: libm::sqrt(scale),
+            origin: Point::new(middle.x - w * scale / 2.0, middle.y - h * scale / 2.0),
+        }
+    }
+}
+
+/// The scale of furniture on a page of this size: on a larger page it grows less than the graph.
+pub(crate) fn unit(size: Size) -> f64 {
+    let ratio = (size.w / STANDARD.w)
+        .min(size.h / STANDARD.h)
+        .clamp(0.62, 4.0);
+    if ratio > 1.0 {
+        libm::pow(ratio, 0.7)
+    } else {
+        ratio
+    }
+}
+
+impl Fit {
+    pub(crate) fn point(&self, p: Point) -> Point {
+        Point::new(
+            self.origin.x + p.x * self.scale,
+            self.origin.y + p.y * self.scale,
+        )
+    }
+
+    pub(crate) fn rect(&self, r: Rect) -> Rect {
+        let corner = self.point(Point::new(r.x, r.y));
+        Rect::new(corner.x, corner.y, r.w * self.scale, r.h * self.scale)
+    }
+}

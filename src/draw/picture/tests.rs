@@ -1,0 +1,262 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::base::geometry::Rect;
+use crate::draw::paint::raster::{Canvas, Painter};
+use crate::draw::scene::{Form, Piece, Shape};
+use crate::view::testing::mission;
+use crate::view::{ViewOptions, view};
+
+/// What a mission of this description looks like, in this style.
+fn with_picture<T>(
+    windows: &[&str],
+    style: &str,
+    options: PageOptions,
+    then: impl FnOnce(&Picture<'_>) -> T,
+) -> T {
+    let (view, _) = view(&mission(windows), &ViewOptions::default());
+    let (style, fonts) = (Style::builtin(style).unwrap(), Fonts::bundled());
+    let engine = layout::engine("layered").unwrap();
+    then(&Measured::new(&view, &style, &fonts, options).laid_out(engine))
+}
+
+fn scenes(windows: &[&str]) -> Vec<Scene> {
+    with_picture(windows, "light", PageOptions::default(), |p| {
+        (0..p.len()).map(|k| p.scene(k)).collect()
+    })
+}
+
+const MISSION: [&str; 5] = [
+    "/cam>/image@15 /image@15 /viewer</image /base/driver>/base/odom@50 /nav/planner</base/odom /nav/planner>/cmd_vel@10",
+    "/cam>/image@7 /image@7 /viewer</image /base/driver>/base/odom@50 /nav/planner</base/odom /nav/planner>/cmd_vel@10",
+    "/viewer</image~ /base/driver>/base/odom@50 /nav/planner</base/odom /teleop>/cmd_vel@10 =/lonely@3",
+    "/base/driver>/base/odom@50 /nav/planner</base/odom /teleop>/cmd_vel@10 =/lonely@9",
+    "/cam>/image@15 /base/driver>/base/odom@50 /nav/planner</base/odom /teleop>/cmd_vel@10 =/lonely@9",
+];
+
+/// The first shape of a group, which is its box; for an arrow its route without its paint.
+fn body(group: &Group) -> Option<Form> {
+    group.pieces.iter().find_map(|piece| match piece {
+        Piece::Shape(shape) => Some(shape.form.clone()),
+        Piece::Text(_) => None,
+    })
+}
+
+#[test]
+fn nothing_ever_moves() {
+    let mut places: BTreeMap<String, Form> = BTreeMap::new();
+    for scene in scenes(&MISSION) {
+        for group in scene.groups.iter().filter(|g| !g.data.is_empty()) {
+            let here = body(group).unwrap();
+            let first = places
+                .entry(group.id.clone())
+                .or_insert_with(|| here.clone());
+            assert_eq!(*first, here, "{}", group.id);
+        }
+    }
+    assert!(places.len() > 12, "{}", places.len());
+}
+
+#[test]
+fn every_id_occurs_once_and_is_an_xml_name() {
+    for scene in scenes(&MISSION) {
+        let ids: BTreeSet<&str> = scene.groups.iter().map(|g| g.id.as_str()).collect();
+        assert_eq!(ids.len(), scene.groups.len());
+        assert!(
+            ids.iter()
+                .all(|id| id.starts_with(|c: char| c.is_ascii_alphabetic()))
+        );
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        assert!(ids.iter().all(|id| id.chars().all(plain)));
+    }
+    assert_ne!(encoded("/a-b"), encoded("/a/b"));
+    assert_ne!(encoded("/a.00002db"), encoded("/a-b"));
+}
+
+#[test]
+fn a_frame_says_what_changed_in_names_classes_and_words() {
+    let all = scenes(&MISSION);
+    let svg = |k: usize| crate::draw::paint::svg::write(&all[k]);
+    assert!(svg(1).contains("15 → 7 Hz"));
+    assert!(svg(1).contains("<g class=\"topic changed active measured\" data-name=\"/image\""));
+    assert!(svg(2).contains(
+        "<g class=\"node removed active measured\" data-name=\"/cam\" id=\"n-cam\"><title>/cam&#10;node"
+    ));
+    assert!(svg(2).contains("<g class=\"node added active measured\" data-name=\"/teleop\""));
+    assert!(svg(2).contains("data-from=\"/teleop\" data-to=\"/cmd_vel\""));
+    assert!(svg(2).contains("handed-over"));
+    assert!(
+        svg(3).contains("3 → 9 Hz"),
+        "a topic without a publisher tells its rate itself"
+    );
+    assert!(!svg(3).contains("n-cam\""), "a ghost stays for one window");
+    assert!(svg(0).contains("window 1 of 5") && svg(0).contains("no reconfiguration"));
+}
+
+#[test]
+fn names_are_shortened_inside_their_namespace_only() {
+    let nested = ["/base/driver>/base/odom@5 /base/ekf</base/odom /root</base/odom"];
+    let svg = crate::draw::paint::svg::write(&scenes(&nested)[0]);
+    assert!(
+        svg.contains(">driver</text>")
+            && svg.contains(">/root</text>")
+            && svg.contains(">/base</text>")
+    );
+    assert!(svg.contains("data-name=\"/base/driver\""));
+}
+
+#[test]
+fn characters_without_a_glyph_are_spelled_out_and_noticed() {
+    let mission = ["/机器>/t@1 /plain>/t@2"];
+    let (view, _) = view(
+        &crate::view::testing::mission(&mission),
+        &ViewOptions::default(),
+    );
+    let notice = unshown(&view, &Fonts::bundled()).unwrap();
+    assert!(
+        notice.text.contains("\\u{5668}, \\u{673a};"),
+        "{}",
+        notice.text
+    );
+    let svg = crate::draw::paint::svg::write(&scenes(&mission)[0]);
+    assert!(svg.contains(">/\\u{673a}\\u{5668}</text>") && svg.contains("data-name=\"/机器\""));
+    assert!(svg.contains("id=\"n-.00673a.005668\""));
+}
+
+#[test]
+fn colours_never_move_anything() {
+    let places = |style| {
+        with_picture(&MISSION, style, PageOptions::default(), |p| {
+            p.layout().clone()
+        })
+    };
+    assert_eq!(places("light"), places("dark"));
+    assert_eq!(places("light"), places("paper"));
+}
+
+#[test]
+fn a_bare_picture_is_the_graph_alone() {
+    let options = PageOptions {
+        bare: true,
+        ..PageOptions::default()
+    };
+    with_picture(&MISSION, "light", options, |p| {
+        assert!(p.scene(2).groups.iter().all(|g| !g.data.is_empty()));
+    });
+}
+
+#[test]
+fn a_tween_goes_changes_and_comes_and_nothing_moves() {
+    with_picture(&MISSION, "light", PageOptions::default(), |p| {
+        assert_eq!(p.between(2, 1.0), p.scene(2));
+        assert_eq!(p.between(0, 0.5), p.scene(0));
+        let fade = |phase: f64, id: &str| {
+            let scene = p.between(2, phase);
+            scene.groups.iter().find(|g| g.id == id).map(|g| g.fade.0)
+        };
+        assert_eq!(fade(0.3, "n-teleop"), None, "what comes waits for its turn");
+        let half = fade(0.8, "n-teleop").unwrap();
+        assert!((half - 0.5).abs() < 0.01, "{half}");
+        assert_eq!(fade(0.5, "n-base-driver"), Some(1.0), "what stays stays");
+        let went = |phase: f64| {
+            p.between(3, phase)
+                .groups
+                .iter()
+                .find(|g| g.id == "n-cam")
+                .map(|g| g.fade.0)
+        };
+        assert!(went(0.2).is_some_and(|f| f > 0.5) && went(0.5).is_none());
+        let (before, after) = (p.scene(1), p.scene(2));
+        let forms = |scene: &Scene| -> Vec<Form> { scene.groups.iter().filter_map(body).collect() };
+        let known: Vec<Form> = forms(&before).into_iter().chain(forms(&after)).collect();
+        assert!(forms(&p.between(2, 0.45)).iter().all(|f| known.contains(f)));
+    });
+}
+
+#[test]
+fn frames_drawn_one_over_the_other_equal_frames_drawn_anew() {
+    let painter = Painter::new(&Fonts::bundled());
+    let options = PageOptions {
+        size: Size::new(480.0, 300.0),
+        ..PageOptions::default()
+    };
+    with_picture(&MISSION, "light", options, |p| {
+        let mut canvas = Canvas::new(&painter, 1.0);
+        let steps = (0..p.len()).flat_map(|k| [0.2, 0.45, 0.7, 1.0].map(|phase| (k, phase)));
+        for (k, phase) in steps {
+            let scene = p.between(k, phase);
+            assert!(
+                canvas.draw(&scene).unwrap() == painter.paint(&scene, 1.0).unwrap(),
+                "{k} {phase}"
+            );
+        }
+    });
+}
+
+#[test]
+fn pages_of_any_size_hold_their_furniture() {
+    for (w, h) in [
+        (1920.0, 1080.0),
+        (800.0, 450.0),
+        (333.0, 200.0),
+        (60.0, 40.0),
+        (3.0, 2.0),
+        (300.0, 2000.0),
+    ] {
+        let options = PageOptions {
+            size: Size::new(w, h),
+            title: "a bag with a long name.bag".to_owned(),
+            ..PageOptions::default()
+        };
+        with_picture(&MISSION, "light", options, |p| {
+            let svg = crate::draw::paint::svg::write(&p.scene(2));
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{w} x {h}");
+        });
+    }
+}
+
+#[test]
+fn an_empty_view_is_an_empty_page() {
+    with_picture(&[], "light", PageOptions::default(), |p| {
+        assert!(p.is_empty() && p.scene(0).size == Size::new(1280.0, 720.0));
+    });
+    with_picture(&[""], "light", PageOptions::default(), |p| {
+        assert!(p.scene(0).groups.iter().any(|g| g.id == "title"));
+    });
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Any mission, with any names: no two boxes overlap, everything lies on the page, numbers are numbers.
+    #[test]
+    fn any_mission_stays_on_its_page(
+        windows in prop::collection::vec(prop::collection::vec((0usize..6, 0usize..6, any::<bool>(), 0u32..90), 0..9), 1..5)
+    ) {
+        let names = ["/a", "/ns/b", "/ns/deep/c", "/x_long_name_of_a_thing", "/d", "/ns/e"];
+        let word = |(n, t, publishes, hz): &(usize, usize, bool, u32)| {
+            let (n, t) = (names[*n], names[*t]);
+            if *publishes { format!("{n}>{t}_topic@{hz}") } else { format!("{n}<{t}_topic") }
+        };
+        let texts: Vec<String> = windows.iter().map(|w| w.iter().map(word).collect::<Vec<_>>().join(" ")).collect();
+        let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+        let page = Rect::new(-0.1, -0.1, 1280.2, 720.2);
+        for scene in scenes(&texts) {
+            let mut boxes: Vec<Rect> = Vec::new();
+            for group in scene.groups.iter().filter(|g| g.class.starts_with("node") || g.class.starts_with("topic")) {
+                let Some(Form::Rect(rect, _) | Form::Ellipse(rect)) = body(group) else { panic!("no box") };
+                prop_assert!(page.union(&rect) == page, "{rect:?}");
+                prop_assert!(!boxes.iter().any(|b| b.grown(-0.2).overlaps(&rect)));
+                boxes.push(rect);
+            }
+            let shapes = scene.groups.iter().flat_map(|g| &g.pieces);
+            for piece in shapes {
+                if let Piece::Shape(Shape { form: Form::Rect(r, _), .. }) = piece {
+                    prop_assert!(r.x.is_finite() && r.y.is_finite() && r.w >= 0.0 && r.h >= 0.0, "{r:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! The bar on top and the line below it: which bag, which window, what time, how many changes, and which in words.
+
+use super::page::Page;
+use super::{PageOptions, words};
+use crate::base::geometry::{Point, Rect};
+use crate::base::time::{offset, short};
+use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
+use crate::draw::style::{Color, Style};
+use crate::draw::text::{Fonts, Weight};
+use crate::view::{Counts, Frame, View};
+
+/// The bar's fixed places, decided once for all frames.
+pub(crate) struct Title<'a> {
+    style: &'a Style,
+    fonts: &'a Fonts,
+    page: Page,
+    name: String,
+    /// The left edges and widths of the chips for what came, went and changed.
+    chips: [(f64, f64); 3],
+    /// Where the words on the left must end.
+    end: f64,
+    /// How wide the widest phase is.
+    phase: f64,
+}
+
+impl<'a> Title<'a> {
+    pub(crate) fn new(
+        style: &'a Style,
+        fonts: &'a Fonts,
+        page: &Page,
+        view: &View,
+        options: &PageOptions,
+    ) -> Self {
+        let unit = page.unit;
+        let clock = fonts.width("00:00:00", style.title.clock_size * unit, Weight::SemiBold);
+        let mut right = page.size.w - (style.page.margin + 14.0) * unit - clock;
+        let mut chips = [(0.0, 0.0); 3];
+        for kind in [2, 1, 0] {
+            let widths = view.frames.iter().map(|frame| {
+                let text = &chip_texts(&frame.tally)[kind];
+                if text.is_empty() {
+                    0.0
+                } else {
+                    fonts.width(text, style.chip.size * unit, Weight::SemiBold) + 22.0 * unit
+                }
+            });
+            let widest = widths.fold(0.0, f64::max);
+            right -= widest;
+            chips[kind] = (right, widest);
+            right -= if widest > 0.0 { 8.0 * unit } else { 0.0 };
+        }
+        let none = fonts.width(NONE, style.chip.size * unit, Weight::SemiBold) + 22.0 * unit;
+        let end = right.min(chips[2].0 + chips[2].1 - none) - 10.0 * unit;
+        let widest = options
+            .phases
+            .iter()
+            .map(|p| fonts.width(&fonts.shown(p), style.caption.size * unit, Weight::SemiBold));
+        let phase = widest.fold(0.0, f64::max).min(page.size.w * 0.4);
+        Self {
+            style,
+            fonts,
+            page: page.clone(),
+            name: fonts.shown(&options.title).into_owned(),
+            chips,
+            end,
+            phase,
+        }
+    }
+
+    /// The bar without what changes from frame to frame.
+    pub(crate) fn ground(&self) -> Group {
+        let mut group = Group::named("title");
+        let (style, bar) = (&self.style.title, self.page.title);
+        group.shape(Shape::filled(Form::Rect(bar, 0.0), style.fill));
+        if style.line != Color::NONE {
+            let y = bar.bottom();
+            let edge = line(Point::new(bar.x, y), Point::new(bar.right(), y));
+            group.shape(Shape::line(edge, Stroke::solid(style.line, self.page.unit)));
+        }
+        let size = style.size * self.page.unit;
+        let name = self
+            .fonts
+            .fit(&self.name, size, Weight::SemiBold, self.end - self.left())
+            .into_owned();
+        group.text(self.words(name, 0.43, size, Weight::SemiBold, style.text));
+        group
+    }
+
+    /// The line under the name: which window, which part of the mission.
+    pub(crate) fn window(&self, view: &View, frame: &Frame) -> Group {
+        let mut group = Group::named("window");
+        let start = view
+            .frames
+            .first()
+            .map_or(frame.span.start, |f| f.span.start);
+        let end = view.frames.last().map_or(frame.span.end, |f| f.span.end);
+        let at = |stamp: crate::base::time::Stamp| offset(whole(stamp.since(start)));
+        let mut parts = vec![
+            format!("window {} of {}", frame.index + 1, view.frames.len()),
+            format!(
+                "{} – {} of {}",
+                at(frame.span.start),
+                at(frame.span.end),
+                offset(whole(end.since(start)))
+            ),
+        ];
+        if let Some(first) = view.frames.first().filter(|_| view.frames.len() > 1) {
+            parts.push(format!("{} per window", short(whole(first.span.nanos()))));
+        }
+        if frame.partial {
+            parts.push("partial".to_owned());
+        }
+        let size = self.style.title.quiet_size * self.page.unit;
+        // On a narrow page the least important part goes first.
+        while parts.len() > 1
+            && self.fonts.width(&parts.join(" · "), size, Weight::Regular) > self.end - self.left()
+        {
+            parts.pop();
+        }
+        group.text(self.words(
+            parts.join(" · "),
+            0.8,
+            size,
+            Weight::Regular,
+            self.style.title.quiet,
+        ));
+        group
+    }
+
+    fn left(&self) -> f64 {
+        self.style.page.margin * self.page.unit
+    }
+
+    fn words(&self, text: String, part: f64, size: f64, weight: Weight, color: Color) -> Text {
+        let bar = self.page.title;
+        Text {
+            at: Point::new(self.left(), bar.y + bar.h * part),
+            anchor: Anchor::Start,
+            size,
+            weight,
+            color,
+            halo: None,
+            text,
+        }
+    }
+
+    /// The UTC time at which the window begins.
+    pub(crate) fn clock(&self, frame: &Frame) -> Group {
+        let mut group = Group::named("clock");
+        let style = &self.style.title;
+        let (bar, size) = (self.page.title, style.clock_size * self.page.unit);
+        group.title = frame.span.start.rfc3339().unwrap_or_default();
+        group.text(Text {
+            at: Point::new(bar.right() - self.left(), bar.y + bar.h / 2.0 + size * 0.36),
+            anchor: Anchor::End,
+            size,
+            weight: Weight::SemiBold,
+            color: style.text,
+            halo: None,
+            text: frame.span.start.clock(),
+        });
+        group
+    }
+
+    /// What came, went and changed, in numbers; each at its own place.
+    pub(crate) fn chips(&self, frame: &Frame) -> Group {
+        let mut group = Group::named("chips");
+        let chip = &self.style.chip;
+        let texts = chip_texts(&frame.tally);
+        let paint = [
+            (chip.added, chip.added_text),
+            (chip.removed, chip.removed_text),
+            (chip.changed, chip.changed_text),
+        ];
+        for ((text, (x, width)), paint) in texts.iter().zip(self.chips).zip(paint) {
+            if !text.is_empty() {
+                self.chip(&mut group, text, x + width, paint);
+            }
+        }
+        if texts.iter().all(String::is_empty) {
+            let (x, width) = self.chips[2];
+            self.chip(&mut group, NONE, x + width, (chip.none, chip.none_text));
+        }
+        group
+    }
+
+    /// A chip that ends at `right`.
+    fn chip(&self, group: &mut Group, text: &str, right: f64, paint: (Color, Color)) {
+        let unit = self.page.unit;
+        let size = self.style.chip.size * unit;
+        let width = self.fonts.width(text, size, Weight::SemiBold) + 20.0 * unit;
+        let bar = self.page.title;
+        let place = Rect::new(
+            right - width,
+            bar.y + bar.h / 2.0 - 11.0 * unit,
+            width,
+            22.0 * unit,
+        );
+        group.shape(Shape {
+            form: Form::Rect(place, place.h / 2.0),
+            fill: paint.0,
+            // Of the bar's own colour, as on paper, it would not be seen.
+            stroke: Stroke::solid(
+                paint.1,
+                if paint.0 == self.style.title.fill {
+                    unit
+                } else {
+                    0.0
+                },
+            ),
+        });
+        group.text(Text {
+            at: Point::new(place.centre().x, place.centre().y + size * 0.36),
+            anchor: Anchor::Middle,
+            size,
+            weight: Weight::SemiBold,
+            color: paint.1,
+            halo: None,
+            text: text.to_owned(),
+        });
+    }
+
+    /// The line below the bar: the mission's phase, and what changed in words.
+    pub(crate) fn caption(&self, frame: &Frame, phase: &str) -> Group {
+        let mut group = Group::named("caption");
+        let (style, place) = (&self.style.caption, self.page.caption);
+        let size = style.size * self.page.unit;
+        if style.fill != self.style.page.background {
+            group.shape(Shape::filled(Form::Rect(place, 0.0), style.fill));
+        }
+        let y = place.centre().y + size * 0.36;
+        let text = |x: f64, weight, color, text: String| Text {
+            at: Point::new(x, y),
+            anchor: Anchor::Start,
+            size,
+            weight,
+            color,
+            halo: None,
+            text,
+        };
+        let mut x = self.left();
+        if self.phase > 0.0 {
+            let phase = self.fonts.shown(phase);
+            let phase = self
+                .fonts
+                .fit(&phase, size, Weight::SemiBold, self.phase)
+                .into_owned();
+            group.text(text(x, Weight::SemiBold, style.text, phase));
+            x += self.phase + 18.0 * self.page.unit;
+        }
+        let changes = self.sentence(&frame.caption, size, place.right() - self.left() - x);
+        let color = if self.phase > 0.0 {
+            style.quiet
+        } else {
+            style.text
+        };
+        group.title = frame.caption.join("; ");
+        group.text(text(x, Weight::Regular, color, changes));
+        group
+    }
+
+    /// As many of the changes as fit, the most important first.
+    fn sentence(&self, changes: &[String], size: f64, most: f64) -> String {
+        let fits = |text: &str| self.fonts.width(text, size, Weight::Regular) <= most;
+        let all = self.fonts.shown(&changes.join("; ")).into_owned();
+        if fits(&all) {
+            return all;
+        }
+        for keep in (1..changes.len()).rev() {
+            let text = format!(
+                "{}; and {} more",
+                self.fonts.shown(&changes[..keep].join("; ")),
+                changes.len() - keep
+            );
+            if fits(&text) {
+                return text;
+            }
+        }
+        self.fonts
+            .fit(&all, size, Weight::Regular, most)
+            .into_owned()
+    }
+}
+
+const NONE: &str = "no reconfiguration";
+
+fn chip_texts(tally: &Counts) -> [String; 3] {
+    [
+        words::chip(
+            '+',
+            tally.nodes_added,
+            tally.topics_added,
+            tally.edges_added,
+        ),
+        words::chip(
+            '−',
+            tally.nodes_removed,
+            tally.topics_removed,
+            tally.edges_removed,
+        ),
+        words::changed_chip(tally),
+    ]
+}
+
+/// Without fractions of a second where the time is a second or more, as on a clock.
+fn whole(nanos: i64) -> i64 {
+    const MILLI: i64 = 1_000_000;
+    let second = 1000 * MILLI;
+    // A window that ends 1 ns after the last message ends, to the eye, at it.
+    let rounded = nanos.saturating_add(MILLI / 2) / MILLI * MILLI;
+    if rounded.abs() > 20 * second {
+        (rounded.saturating_add(second / 2)) / second * second
+    } else {
+        rounded
+    }
+}

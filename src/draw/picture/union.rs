@@ -1,0 +1,177 @@
+//! The union of all windows, drawn once in the layout's own pixels, for pages where classes say what each window shows.
+
+use std::collections::BTreeSet;
+
+use super::arrows::{Arrows, is_badged};
+use super::boxes::{Boxes, corner};
+use super::measured::{self, Tells};
+use super::page::Fit;
+use super::{Picture, badge, cards, encoded, tracks};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::Group;
+use crate::draw::style::Style;
+use crate::evidence::Degree;
+use crate::graph::State;
+use crate::view::{Mark, Shown};
+
+/// The whole graph, every element once and as if it were active; a painter leaves out the colours.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Union {
+    /// The size of the whole.
+    pub size: Size,
+    /// The boxes around namespaces, outer ones first.
+    pub spaces: Vec<Group>,
+    /// The arrows in the order in which they are painted: places in the view.
+    pub order: Vec<usize>,
+    /// A part per arrow of the view. Its last text, if there is one, is its rate.
+    pub arrows: Vec<Part>,
+    /// A part per item of the view.
+    pub items: Vec<Part>,
+}
+
+/// One element of the union.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Its shapes and texts.
+    pub group: Group,
+    /// Whether its last text is another in other windows: a rate or a lifecycle state.
+    pub is_live: bool,
+    /// Whether that text is shown only in windows in which its rate changed.
+    pub tells_changes: bool,
+    /// Where an item stands; empty for an arrow.
+    pub rect: Rect,
+    /// Where its badge stands.
+    pub badge: Point,
+    /// The marks that it carries a badge for in some window.
+    pub marks: BTreeSet<Mark>,
+}
+
+/// The badge of a mark around (0, 0).
+pub fn sign(style: &Style, mark: Mark) -> Group {
+    let mut group = Group::default();
+    badge::badge(&mut group, style, mark, Point::default(), 1.0);
+    group
+}
+
+impl Picture<'_> {
+    /// How it looks.
+    pub fn style(&self) -> &Style {
+        self.measured.style
+    }
+
+    /// Its title, such as the bag's name.
+    pub fn title_text(&self) -> &str {
+        &self.measured.options.title
+    }
+
+    /// Everything that is ever in the picture.
+    pub fn union(&self) -> Union {
+        let (measured, layout) = (&self.measured, &self.layout);
+        let fit = Fit {
+            scale: 1.0,
+            pen: 1.0,
+            origin: Point::default(),
+        };
+        let boxes = Boxes {
+            style: measured.style,
+            fonts: measured.fonts,
+            fit,
+        };
+        let spaces = measured.graph.spaces.iter().zip(&layout.clusters);
+        Union {
+            size: layout.size,
+            spaces: spaces
+                .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name), false))
+                .collect(),
+            order: self.order.clone(),
+            arrows: self.union_arrows(fit),
+            items: self.union_items(&boxes, fit),
+        }
+    }
+
+    fn union_items(&self, boxes: &Boxes<'_>, fit: Fit) -> Vec<Part> {
+        let view = self.measured.view;
+        let mut marks = vec![BTreeSet::new(); view.items.len()];
+        for shown in view.frames.iter().flat_map(|f| &f.items) {
+            if let (Some(mark), Some(marks)) = (shown.mark, marks.get_mut(shown.id as usize)) {
+                marks.insert(mark);
+            }
+        }
+        let cards = cards(&self.measured, &self.layout, fit);
+        let items = view.items.iter().zip(cards).zip(marks);
+        items
+            .map(|((item, card), marks)| {
+                let label = &card.label;
+                let is_live = label.second && label.fixed.is_empty();
+                let mut shown = plain(is_live.then_some(1.0));
+                // Whatever it tells, it is a line to be filled.
+                shown.lifecycle = is_live.then(|| "-".into());
+                let mut group = boxes.item(item, &card, &shown);
+                let tells_changes = card.tells == Tells::Changes;
+                if tells_changes {
+                    group.text(boxes.pendant_text(card.place, "-"));
+                }
+                Part {
+                    group,
+                    is_live: is_live || tells_changes,
+                    tells_changes,
+                    rect: card.place,
+                    badge: corner(item.kind, card.place, 1.0),
+                    marks,
+                }
+            })
+            .collect()
+    }
+
+    fn union_arrows(&self, fit: Fit) -> Vec<Part> {
+        let (view, plan) = (self.measured.view, &self.measured.graph.plan);
+        let arrows = Arrows {
+            style: self.measured.style,
+            fonts: self.measured.fonts,
+            fit,
+        };
+        let mut marks = vec![BTreeSet::new(); view.arrows.len()];
+        for frame in &view.frames {
+            for shown in &frame.arrows {
+                let at = shown.id as usize;
+                let (Some(mark), Some(arrow)) = (shown.mark, view.arrows.get(at)) else {
+                    continue;
+                };
+                let ends =
+                    [arrow.from, arrow.to].map(|id| measured::find(&frame.items, id as usize));
+                if is_badged(mark, ends) {
+                    marks[at].insert(mark);
+                }
+            }
+        }
+        let tracks = tracks(&self.measured, &self.layout, fit);
+        let parts = view.arrows.iter().zip(tracks).zip(&plan.links).zip(marks);
+        parts
+            .map(|(((arrow, track), link), marks)| {
+                let shown = plain(link.label.map(|_| 1.0));
+                Part {
+                    group: arrows.arrow(arrow, &track, &shown, [None; 2]),
+                    is_live: link.label.is_some(),
+                    tells_changes: false,
+                    rect: Rect::default(),
+                    badge: track.badge,
+                    marks,
+                }
+            })
+            .collect()
+    }
+}
+
+/// An element of which nothing is to be told but, perhaps, a rate.
+fn plain(hz: Option<f64>) -> Shown {
+    Shown {
+        id: 0,
+        state: State::Active,
+        degree: Degree::Measured,
+        mark: None,
+        hz,
+        from_hz: None,
+        count: None,
+        lifecycle: None,
+    }
+}

@@ -1,0 +1,218 @@
+//! A drawing with every place and colour decided: groups of shapes and texts, in the order they are painted.
+//!
+//! Lengths are pixels of the page, x to the right, y down. Painters see only this.
+
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::style::Color;
+use crate::draw::text::Weight;
+
+/// A page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The size of the page in pixels.
+    pub size: Size,
+    /// The width of the page on paper in millimetres, for vector output; else a pixel is a pixel.
+    pub width_mm: Option<f64>,
+    /// What is behind everything.
+    pub background: Color,
+    /// What the page shows, for readers that cannot see.
+    pub title: String,
+    /// What is painted, from back to front. Each id occurs once.
+    pub groups: Vec<Group>,
+}
+
+/// Pieces that belong together: an element of the graph or of the furniture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Group {
+    /// Unique on the page and the same on every page of a sequence; an XML name.
+    pub id: String,
+    /// Class words, separated by blanks: `node added active measured`.
+    pub class: String,
+    /// More attributes, `data-` left out: `("name", "/planner")`.
+    pub data: Vec<(&'static str, String)>,
+    /// What it is in words; empty for none.
+    pub title: String,
+    /// How transparent it is: 0 (nothing is seen) to 1 (opaque, as in every settled frame).
+    pub fade: Fade,
+    /// What is painted, from back to front.
+    pub pieces: Vec<Piece>,
+}
+
+/// The opacity of a group, 0..=1; opaque unless said otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fade(pub f64);
+
+impl Default for Fade {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
+/// A shape or a text.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Piece {
+    /// A shape.
+    Shape(Shape),
+    /// A line of text.
+    Text(Text),
+}
+
+/// A shape with its paint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Its outline.
+    pub form: Form,
+    /// The colour inside.
+    pub fill: Color,
+    /// The line around.
+    pub stroke: Stroke,
+}
+
+/// The outline of a shape.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Form {
+    /// A rectangle with corners of this radius.
+    Rect(Rect, f64),
+    /// The ellipse inside a rectangle.
+    Ellipse(Rect),
+    /// A path; it begins with [`Step::Move`].
+    Path(Vec<Step>),
+}
+
+/// One step of a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Begin anew here.
+    Move(Point),
+    /// A straight line to here.
+    Line(Point),
+    /// A cubic curve: two controls and its end.
+    Curve([Point; 3]),
+    /// Back to where this part began.
+    Close,
+}
+
+/// A line; a width of 0 or the colour `none` paints nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stroke {
+    /// Its colour.
+    pub color: Color,
+    /// Its width.
+    pub width: f64,
+    /// Line, gap, line, gap, …; empty for a solid line. Drawn with round ends if its lines are shorter than its width.
+    pub dash: Vec<f64>,
+}
+
+/// Where a text stands against its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    /// It begins there.
+    Start,
+    /// Its middle is there.
+    Middle,
+    /// It ends there.
+    End,
+}
+
+/// One line of text in the bundled font; every character of it can be shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Text {
+    /// A point on its baseline.
+    pub at: Point,
+    /// Which point.
+    pub anchor: Anchor,
+    /// The font size in pixels.
+    pub size: f64,
+    /// How bold.
+    pub weight: Weight,
+    /// Its colour.
+    pub color: Color,
+    /// A line behind the letters that sets them off: colour and width.
+    pub halo: Option<(Color, f64)>,
+    /// The words.
+    pub text: String,
+}
+
+impl Shape {
+    /// A shape without a line around.
+    pub fn filled(form: Form, fill: Color) -> Self {
+        Self {
+            form,
+            fill,
+            stroke: Stroke::default(),
+        }
+    }
+
+    /// A line without a filling.
+    pub fn line(form: Form, stroke: Stroke) -> Self {
+        Self {
+            form,
+            fill: Color::NONE,
+            stroke,
+        }
+    }
+}
+
+impl Stroke {
+    /// A solid line.
+    pub fn solid(color: Color, width: f64) -> Self {
+        Self {
+            color,
+            width,
+            dash: Vec::new(),
+        }
+    }
+
+    /// The same line with everything `by` times as long and wide.
+    #[must_use]
+    pub fn scaled(&self, by: f64) -> Self {
+        Self {
+            color: self.color,
+            width: self.width * by,
+            dash: self.dash.iter().map(|d| d * by).collect(),
+        }
+    }
+
+    /// Whether its dashes are drawn with round ends: dots are lines of no length.
+    pub fn is_round(&self) -> bool {
+        self.dash.first().is_some_and(|first| *first < self.width)
+    }
+}
+
+impl Group {
+    /// A group of furniture: an id, which is its class too, and nothing in it yet.
+    pub fn named(id: &str) -> Self {
+        Self {
+            id: id.to_owned(),
+            class: id.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Adds a shape.
+    pub fn shape(&mut self, shape: Shape) {
+        self.pieces.push(Piece::Shape(shape));
+    }
+
+    /// Adds a text, unless it is empty.
+    pub fn text(&mut self, text: Text) {
+        if !text.text.is_empty() {
+            self.pieces.push(Piece::Text(text));
+        }
+    }
+}
+
+/// A path through these points, closed.
+pub fn polygon(points: &[Point]) -> Form {
+    let mut steps: Vec<Step> = points.iter().map(|p| Step::Line(*p)).collect();
+    if let Some(first) = points.first() {
+        steps[0] = Step::Move(*first);
+        steps.push(Step::Close);
+    }
+    Form::Path(steps)
+}
+
+/// A straight line.
+pub fn line(from: Point, to: Point) -> Form {
+    Form::Path(vec![Step::Move(from), Step::Line(to)])
+}

@@ -1,0 +1,539 @@
+//! The film strip: chosen windows side by side on one page, with one legend and the time under each.
+
+pub(crate) mod choice;
+
+use crate::base::error::{Error, Result};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::base::time;
+use crate::draw::picture::{Measured, PageOptions, Picture};
+use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
+use crate::draw::style::Style;
+use crate::draw::text::{Fonts, Weight};
+use crate::layout::{self, Engine, Layout};
+use crate::mission::Mission;
+use crate::view::View;
+pub use choice::Choice;
+
+/// The smallest text that can be read on paper, in points.
+const SMALLEST_PT: f64 = 6.0;
+/// Points per pixel, 96 pixels to the inch.
+const PT_PER_PX: f64 = 0.75;
+/// Pixels per millimetre, 96 to the inch.
+const PX_PER_MM: f64 = 96.0 / 25.4;
+/// The smallest text that can be read on a screen, in pixels.
+const SMALLEST_PX: f64 = 9.0;
+/// The font size of times and captions in pixels: on paper (6.75 pt) and on a screen.
+const CAPTION: (f64, f64) = (9.0, 14.0);
+/// Space between panels, in pixels.
+const GAP: f64 = 10.0;
+/// Shapes of panels that are tried on paper: height over width.
+const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
+/// How many times as high as wide a strip becomes at most, if there is a choice.
+const HIGHEST: f64 = 1.3;
+
+/// A strip and what the user should know about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strip {
+    /// The page.
+    pub scene: Scene,
+    /// What would make it more readable; lower case, no period.
+    pub remarks: Vec<String>,
+}
+
+/// What a strip is made from.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    /// For the mission's start.
+    pub mission: &'a Mission,
+    /// What is shown.
+    pub view: &'a View,
+    /// Where everything stands.
+    pub picture: &'a Picture<'a>,
+    /// How it looks.
+    pub style: &'a Style,
+    /// What is written with.
+    pub fonts: &'a Fonts,
+    /// What lays out anew where room is scarce.
+    pub engine: &'a dyn Engine,
+}
+
+/// The strip of `choice`. With `width_mm` the page is that wide on paper; otherwise as wide as it needs to be read on a
+/// screen, `width` pixels at least.
+///
+/// # Errors
+/// [`Error::Usage`] for a window that does not exist.
+pub fn strip(
+    source: Source<'_>,
+    choice: &Choice,
+    width_mm: Option<f64>,
+    width: f64,
+) -> Result<Strip> {
+    let windows = choice.places(source.view)?;
+    let mut best: Option<(f64, Page, Picture<'_>)> = None;
+    for layout in source.layouts(width_mm.is_some()) {
+        let bare = source.bare(&layout);
+        let page = Page::new(choice, windows.len(), &bare, width_mm, width);
+        // A page that is too high counts as if it were shrunk until it is not.
+        let high = page.corner(windows.len().next_multiple_of(page.columns)).y;
+        let text = page.text / (high / page.width / HIGHEST).max(1.0);
+        if best.as_ref().is_none_or(|(most, ..)| text > *most) {
+            best = Some((text, page, bare));
+        }
+    }
+    let Some((_, page, bare)) = best else {
+        return Err(Error::usage("there is nothing to show", ""));
+    };
+    let mut groups = Vec::new();
+    for (at, window) in windows.iter().enumerate() {
+        source.panel(&bare.scene(*window), &page, at, *window, &mut groups);
+    }
+    let rows = windows.len().div_ceil(page.columns);
+    let graphs = page.corner(rows * page.columns).y;
+    let height = graphs + source.legend(&page, graphs, &mut groups);
+    let remarks = width_mm.map(|mm| remark(page.text, mm)).into_iter();
+    let scene = Scene {
+        size: Size::new(page.width, height),
+        width_mm,
+        background: source.style.background(),
+        title: format!("{} of {} windows", windows.len(), source.view.frames.len()),
+        groups,
+    };
+    Ok(Strip {
+        scene,
+        remarks: remarks.flatten().collect(),
+    })
+}
+
+/// What to say about the smallest text on paper, in pixels.
+fn remark(text_px: f64, mm: f64) -> Option<String> {
+    let points = text_px * PT_PER_PX;
+    (points < SMALLEST_PT).then(|| {
+        let wide = libm::ceil(mm * SMALLEST_PT / points);
+        format!(
+            "the smallest text on the strip is {points:.1} pt; `--width {wide}mm`, fewer columns, or fewer elements \
+             (`--ns-filter`, `--collapse`) would bring it to {SMALLEST_PT} pt"
+        )
+    })
+}
+
+/// How many panels stand side by side: as given, else as few as keep the page from being too high.
+fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
+    if let Choice::Grid(columns, _) = choice {
+        return (*columns).min(panels).max(1);
+    }
+    let high = |columns: usize| {
+        let rows = panels.div_ceil(columns) as f64;
+        rows * natural.h / natural.w.max(1.0) / columns as f64
+    };
+    (1..=panels).find(|c| high(*c) <= HIGHEST).unwrap_or(1)
+}
+
+/// How many square pixels of panels a strip on a screen may take for the sake of its text.
+const LARGEST_STRIP: f64 = 24e6;
+
+/// The grid of panels.
+struct Page {
+    columns: usize,
+    width: f64,
+    /// The size of a graph on it.
+    panel: Size,
+    /// The font size of what is not graph.
+    caption: f64,
+    /// The smallest font size in the graphs.
+    text: f64,
+}
+
+impl Page {
+    fn new(
+        choice: &Choice,
+        panels: usize,
+        bare: &Picture<'_>,
+        width_mm: Option<f64>,
+        width: f64,
+    ) -> Self {
+        let natural = bare.scene(0).size;
+        let columns = columns(choice, panels, natural);
+        let (mut width, mut caption) = (width, CAPTION.1);
+        if let Some(mm) = width_mm {
+            (width, caption) = (mm * PX_PER_MM, CAPTION.0);
+        } else {
+            let legible = natural.w * SMALLEST_PX / bare.text_px().max(0.1);
+            let rows = panels.div_ceil(columns) as f64;
+            let square = natural.h / natural.w.max(1.0) / columns as f64 * rows;
+            let widest = (LARGEST_STRIP / square.max(0.01)).sqrt();
+            width = width.max(((legible + GAP) * columns as f64 + GAP).min(widest));
+        }
+        let wide = ((width - GAP * (columns as f64 + 1.0)) / columns as f64).max(1.0);
+        let scale = wide / natural.w.max(1.0);
+        Self {
+            columns,
+            width,
+            panel: Size::new(wide, natural.h * scale),
+            caption,
+            text: bare.text_px() * scale,
+        }
+    }
+
+    /// The top left corner of a panel.
+    fn corner(&self, at: usize) -> Point {
+        let (row, column) = (at / self.columns, at % self.columns);
+        let high = self.panel.h + 2.0 * 1.3 * self.caption + GAP;
+        Point::new(
+            GAP + column as f64 * (self.panel.w + GAP),
+            GAP + row as f64 * high,
+        )
+    }
+}
+
+impl<'a> Source<'a> {
+    /// Ways to lay out the graph: as in the picture, and on paper, where room is scarce, for other shapes of panels.
+    fn layouts(&self, on_paper: bool) -> Vec<Layout> {
+        let mut layouts = vec![self.picture.layout().clone()];
+        if on_paper {
+            let measured = Measured::new(self.view, self.style, self.fonts, PageOptions::default());
+            layouts.extend(SHAPES.map(|high| {
+                let page = Size::new(1000.0, 1000.0 * high);
+                let orientation = None;
+                let options = layout::Options { page, orientation };
+                layout::lay_out(measured.plan(), &options, self.engine)
+            }));
+        }
+        layouts
+    }
+
+    /// The picture without furniture, at its natural size.
+    fn bare(&self, layout: &Layout) -> Picture<'a> {
+        let options = PageOptions {
+            size: Size::new(layout.size.w * 1.06 + 8.0, layout.size.h * 1.06 + 8.0),
+            bare: true,
+            ..PageOptions::default()
+        };
+        Measured::new(self.view, self.style, self.fonts, options).with(layout.clone())
+    }
+
+    /// One window with its frame, its time and what changed.
+    fn panel(&self, scene: &Scene, page: &Page, at: usize, window: usize, groups: &mut Vec<Group>) {
+        let corner = page.corner(at);
+        let frame = &self.view.frames[window];
+        let mut panel = Group::named(&format!("panel-{}", frame.index));
+        "panel".clone_into(&mut panel.class);
+        let border = Rect::new(corner.x, corner.y, page.panel.w, page.panel.h);
+        let line = Stroke::solid(self.style.legend.line, 0.5);
+        panel.shape(Shape::line(Form::Rect(border, 0.0), line));
+        let start = self.mission.span.start;
+        let time = |at: time::Stamp| time::offset(at.since(start));
+        let lines = [
+            (
+                format!("{}–{}", time(frame.span.start), time(frame.span.end)),
+                Weight::SemiBold,
+            ),
+            (self.caption(&frame.caption, page), Weight::Regular),
+        ];
+        for (row, (words, weight)) in (1_u8..).zip(lines) {
+            let most = page.panel.w;
+            panel.text(Text {
+                at: Point::new(
+                    corner.x,
+                    border.bottom() + f64::from(row) * 1.3 * page.caption,
+                ),
+                anchor: Anchor::Start,
+                size: page.caption,
+                weight,
+                color: self.style.legend.text,
+                halo: None,
+                text: self
+                    .fonts
+                    .fit(&self.fonts.shown(&words), page.caption, weight, most)
+                    .into_owned(),
+            });
+        }
+        groups.push(panel);
+        let by = page.panel.w / scene.size.w.max(1.0);
+        for group in &scene.groups {
+            let mut group = moved(group, by, corner);
+            group.id = format!("w{}-{}", frame.index, group.id);
+            groups.push(group);
+        }
+    }
+
+    /// As many of the changes, the most important first, as fit under a panel; the first in any case.
+    fn caption(&self, changes: &[String], page: &Page) -> String {
+        let mut words = String::new();
+        for change in changes {
+            let longer = if words.is_empty() {
+                change.clone()
+            } else {
+                format!("{words}; {change}")
+            };
+            let width = self.fonts.width(&longer, page.caption, Weight::Regular);
+            if !words.is_empty() && width > page.panel.w {
+                break;
+            }
+            words = longer;
+        }
+        words
+    }
+
+    /// The shared legend from `y` on; returns its height.
+    fn legend(&self, page: &Page, y: f64, groups: &mut Vec<Group>) -> f64 {
+        // A page so small that its legend has the smallest type, then enlarged to that of captions.
+        let small = Size::new(page.width, 300.0);
+        let size_on = |size: Size| {
+            let options = PageOptions {
+                size,
+                ..PageOptions::default()
+            };
+            let picture = Measured::new(self.view, self.style, self.fonts, options);
+            let scene = picture.with(self.picture.layout().clone()).scene(0);
+            scene.groups.into_iter().find(|g| g.id == "legend")
+        };
+        let text_of = |group: &Group| {
+            group.pieces.iter().find_map(|p| match p {
+                Piece::Text(text) => Some(text.size),
+                Piece::Shape(_) => None,
+            })
+        };
+        let Some(size) = size_on(small).as_ref().and_then(text_of) else {
+            return GAP;
+        };
+        let by = page.caption / size.max(0.1);
+        let Some(legend) = size_on(Size::new(page.width / by, 300.0)) else {
+            return GAP;
+        };
+        let bounds = legend
+            .pieces
+            .iter()
+            .filter_map(piece_bounds)
+            .reduce(|a, b| a.union(&b));
+        let Some(bounds) = bounds else { return GAP };
+        groups.push(moved(&legend, by, Point::new(0.0, y - bounds.y * by)));
+        bounds.h * by + GAP
+    }
+}
+
+/// The upright box around a piece; of a text only its height and beginning.
+fn piece_bounds(piece: &Piece) -> Option<Rect> {
+    match piece {
+        Piece::Shape(shape) => match &shape.form {
+            Form::Rect(rect, _) | Form::Ellipse(rect) => Some(*rect),
+            Form::Path(steps) => {
+                let points = steps.iter().filter_map(|step| match step {
+                    Step::Move(p) | Step::Line(p) | Step::Curve([_, _, p]) => Some(*p),
+                    Step::Close => None,
+                });
+                let boxes = points.map(|p| Rect::new(p.x, p.y, 0.0, 0.0));
+                boxes.reduce(|a, b| a.union(&b))
+            }
+        },
+        Piece::Text(text) => Some(Rect::new(
+            text.at.x,
+            text.at.y - text.size,
+            0.0,
+            text.size * 1.3,
+        )),
+    }
+}
+
+/// A group `by` times as large, its page's corner at `to`.
+fn moved(group: &Group, by: f64, to: Point) -> Group {
+    let point = |p: Point| Point::new(to.x + p.x * by, to.y + p.y * by);
+    let rect = |r: Rect| {
+        let corner = point(Point::new(r.x, r.y));
+        Rect::new(corner.x, corner.y, r.w * by, r.h * by)
+    };
+    let step = |step: &Step| match step {
+        Step::Move(p) => Step::Move(point(*p)),
+        Step::Line(p) => Step::Line(point(*p)),
+        Step::Curve(points) => Step::Curve(points.map(point)),
+        Step::Close => Step::Close,
+    };
+    let form = |form: &Form| match form {
+        Form::Rect(r, radius) => Form::Rect(rect(*r), radius * by),
+        Form::Ellipse(r) => Form::Ellipse(rect(*r)),
+        Form::Path(steps) => Form::Path(steps.iter().map(step).collect()),
+    };
+    let piece = |piece: &Piece| match piece {
+        Piece::Shape(shape) => Piece::Shape(Shape {
+            form: form(&shape.form),
+            fill: shape.fill,
+            stroke: shape.stroke.scaled(by),
+        }),
+        Piece::Text(text) => Piece::Text(Text {
+            at: point(text.at),
+            size: text.size * by,
+            halo: text.halo.map(|(color, width)| (color, width * by)),
+            ..text.clone()
+        }),
+    };
+    Group {
+        pieces: group.pieces.iter().map(piece).collect(),
+        ..group.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::base::notice::Notices;
+    use crate::base::time::{Period, Span, Stamp};
+    use crate::evidence::Degree;
+    use crate::graph::{Element, Elements, State};
+    use crate::layout;
+    use crate::view::{Counts, Frame, Item, ItemKind, Mark, Shown};
+
+    /// Four minutes in which a node is there and another comes and goes.
+    fn two_nodes() -> (Mission, View) {
+        let minute = |i: usize| Stamp(i64::try_from(i).unwrap() * 60_000_000_000);
+        let period = Period::parse("1m").unwrap();
+        let mission = Mission {
+            bags: Vec::new(),
+            span: Span {
+                start: minute(0),
+                end: minute(4),
+            },
+            messages: 0,
+            period,
+            step: period,
+            elements: Elements::default(),
+            windows: Vec::new(),
+            layout: None,
+            notices: Notices::new(),
+        };
+        let item = |(id, name): (u32, &str)| Item {
+            kind: ItemKind::Node,
+            name: Arc::from(name),
+            members: vec![Element::Node(id)],
+            cluster: None,
+        };
+        let shown = |id, mark| Shown {
+            id,
+            state: State::Active,
+            degree: Degree::Measured,
+            mark,
+            hz: None,
+            from_hz: None,
+            count: None,
+            lifecycle: None,
+        };
+        let frame = |(index, mark): (usize, Option<Mark>)| Frame {
+            index,
+            span: Span {
+                start: minute(index),
+                end: minute(index + 1),
+            },
+            partial: false,
+            messages: 0,
+            items: std::iter::once(shown(0, None))
+                .chain(mark.map(|m| shown(1, Some(m))))
+                .collect(),
+            arrows: Vec::new(),
+            tally: Counts::default(),
+            caption: mark
+                .map(|m| format!("/planner {}", m.class()))
+                .into_iter()
+                .collect(),
+        };
+        let marks = [None, Some(Mark::Added), None, Some(Mark::Removed)];
+        let view = View {
+            items: (0..).zip(["/driver", "/planner"]).map(item).collect(),
+            frames: marks.into_iter().enumerate().map(frame).collect(),
+            ..View::default()
+        };
+        (mission, view)
+    }
+
+    fn strip_of(choice: &str, width_mm: Option<f64>) -> Strip {
+        let (mission, view) = two_nodes();
+        let (style, fonts) = (Style::builtin("paper").unwrap(), Fonts::bundled());
+        let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
+        let picture = measured.laid_out(layout::engine("layered").unwrap());
+        let source = Source {
+            mission: &mission,
+            view: &view,
+            picture: &picture,
+            style: &style,
+            fonts: &fonts,
+            engine: layout::engine("layered").unwrap(),
+        };
+        strip(source, &Choice::parse(choice).unwrap(), width_mm, 1280.0).unwrap()
+    }
+
+    fn texts(strip: &Strip) -> Vec<&Text> {
+        let pieces = strip.scene.groups.iter().flat_map(|g| &g.pieces);
+        let mut texts = Vec::new();
+        for piece in pieces {
+            if let Piece::Text(text) = piece {
+                texts.push(text);
+            }
+        }
+        texts
+    }
+
+    #[test]
+    fn every_panel_tells_its_time_and_change_and_the_legend_stands_once() {
+        let strip = strip_of("changes", None);
+        let words: Vec<&str> = texts(&strip).iter().map(|t| t.text.as_str()).collect();
+        for expected in [
+            "00:00–01:00",
+            "01:00–02:00",
+            "03:00–04:00",
+            "/planner added",
+        ] {
+            assert_eq!(
+                words.iter().filter(|w| **w == expected).count(),
+                1,
+                "{expected}"
+            );
+        }
+        assert!(!words.contains(&"02:00–03:00"));
+        assert_eq!(words.iter().filter(|w| **w == "node").count(), 1);
+    }
+
+    #[test]
+    fn ids_stay_unique() {
+        let strip = strip_of("2x2", None);
+        let ids: BTreeSet<&str> = strip.scene.groups.iter().map(|g| g.id.as_str()).collect();
+        assert_eq!(ids.len(), strip.scene.groups.len());
+    }
+
+    #[test]
+    fn on_paper_the_width_is_exact_and_captions_can_be_read() {
+        let strip = strip_of("2x2", Some(88.0));
+        assert_eq!(strip.scene.width_mm, Some(88.0));
+        assert!((strip.scene.size.w - 88.0 * PX_PER_MM).abs() < 1e-9);
+        assert_eq!(strip.remarks, Vec::<String>::new());
+        let smallest = texts(&strip)
+            .iter()
+            .map(|t| t.size)
+            .fold(f64::MAX, f64::min);
+        assert!(smallest * PT_PER_PX >= SMALLEST_PT);
+    }
+
+    #[test]
+    fn text_that_is_too_small_is_told_with_what_would_help() {
+        let strip = strip_of("2x2", Some(20.0));
+        assert!(strip.remarks[0].contains("mm`"), "{:?}", strip.remarks);
+    }
+
+    #[test]
+    fn everything_stands_on_the_page() {
+        for choice in ["2x2", "0", "changes"] {
+            let strip = strip_of(choice, None);
+            let page = strip.scene.size;
+            for piece in strip.scene.groups.iter().flat_map(|g| &g.pieces) {
+                let bounds = piece_bounds(piece).unwrap();
+                assert!(
+                    bounds.x >= -1.0 && bounds.right() <= page.w + 1.0,
+                    "{choice}: {piece:?}"
+                );
+                assert!(
+                    bounds.y >= -1.0 && bounds.bottom() <= page.h + 1.0,
+                    "{choice}: {piece:?}"
+                );
+            }
+        }
+    }
+}

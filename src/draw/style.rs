@@ -1,0 +1,405 @@
+//! How it looks: every colour, stroke and font size, read from `styles/*.toml`; no colour literal stands anywhere else.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::Path;
+
+use serde::{Deserialize, Deserializer, de};
+use toml::de::DeTable;
+use toml::{Spanned, Table, Value};
+
+use crate::base::error::{Error, Result};
+use crate::draw::text::Weight;
+
+/// The built-in styles by name; the first is the default and complete, the others say what differs from their `base`.
+pub const BUILTIN: &[(&str, &str)] = &[
+    ("light", include_str!("../../styles/light.toml")),
+    ("dark", include_str!("../../styles/dark.toml")),
+    ("paper", include_str!("../../styles/paper.toml")),
+    ("rqt", include_str!("../../styles/rqt.toml")),
+];
+
+/// A colour, or none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Color(Option<[u8; 3]>);
+
+impl Color {
+    /// Nothing is painted.
+    pub const NONE: Self = Self(None);
+
+    /// Red, green and blue; `None` where nothing is painted.
+    pub fn rgb(self) -> Option<[u8; 3]> {
+        self.0
+    }
+
+    /// Reads `#RRGGBB` or `none`.
+    fn parse(text: &str) -> Option<Self> {
+        if text == "none" {
+            return Some(Self::NONE);
+        }
+        let hex = text
+            .strip_prefix('#')
+            .filter(|h| h.len() == 6 && h.is_ascii())?;
+        let byte = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).ok();
+        hex.chars().all(|c| c.is_ascii_hexdigit()).then_some(())?;
+        Some(Self(Some([byte(0)?, byte(2)?, byte(4)?])))
+    }
+
+    /// `part` (0..=1) of the way from here to `other`; where one of them is none, the nearer.
+    #[must_use]
+    pub fn towards(self, other: Self, part: f64) -> Self {
+        let (Some(a), Some(b)) = (self.0, other.0) else {
+            return if part < 0.5 { self } else { other };
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between two bytes"
+        )]
+        let mix = |at: usize| {
+            let (a, b) = (f64::from(a[at]), f64::from(b[at]));
+            libm::round(a + (b - a) * part.clamp(0.0, 1.0)) as u8
+        };
+        Self(Some([mix(0), mix(1), mix(2)]))
+    }
+}
+
+impl fmt::Display for Color {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some([r, g, b]) => write!(f, "#{r:02X}{g:02X}{b:02X}"),
+            None => f.write_str("none"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Color {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(from)?;
+        Self::parse(&text).ok_or_else(|| de::Error::custom("no colour"))
+    }
+}
+
+/// Declares the kinds of sections with their keys.
+macro_rules! sections {
+    ($($Type:ident { $($key:ident: $value:ty),* $(,)? })*) => {
+        $(#[derive(Clone, Debug, PartialEq, Deserialize)]
+        pub(crate) struct $Type { $(pub(crate) $key: $value),* })*
+    };
+}
+
+sections! {
+    Page { background: Color, margin: f64, text: Color, quiet: Color }
+    Title { fill: Color, line: Color, text: Color, quiet: Color, size: f64, quiet_size: f64, clock_size: f64, height: f64 }
+    Caption { fill: Color, text: Color, quiet: Color, size: f64, height: f64 }
+    Legend { fill: Color, line: Color, text: Color, size: f64 }
+    Timeline { past: Color, future: Color, now: Color, head: Color, axis: Color, text: Color, size: f64, height: f64 }
+    Cluster { fill: Color, stroke: Color, width: f64, dash: Vec<f64>, radius: f64, text: Color, size: f64 }
+    Body {
+        fill: Color, stroke: Color, width: f64, radius: f64, text: Color, size: f64, bold: bool,
+        pad_x: f64, pad_y: f64, small: f64,
+    }
+    Stack { depth: f64 }
+    Edge {
+        stroke: Color, width: f64, per_decade: f64, most: f64, arrow: f64,
+        text: Color, size: f64, halo: Color, halo_width: f64,
+    }
+    Quiet { fill: Color, stroke: Color, text: Color, width: f64, dash: Vec<f64> }
+    Latched { stroke: Color, bar: f64 }
+    Stated { width: f64 }
+    Inferred { dash: Vec<f64> }
+    Change { glow: Color, color: Color, fill: Color, text: Color, width: f64, dash: Vec<f64> }
+    Badge { glow: f64, radius: f64, sign: Color, halo: Color }
+    Chip {
+        added: Color, added_text: Color, removed: Color, removed_text: Color, changed: Color, changed_text: Color,
+        none: Color, none_text: Color, size: f64,
+    }
+}
+
+/// How it looks; a section of the file per field, explained in `styles/light.toml`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Style {
+    pub(crate) page: Page,
+    pub(crate) title: Title,
+    pub(crate) caption: Caption,
+    pub(crate) legend: Legend,
+    pub(crate) timeline: Timeline,
+    pub(crate) cluster: Cluster,
+    pub(crate) node: Body,
+    pub(crate) topic: Body,
+    pub(crate) stack: Stack,
+    pub(crate) edge: Edge,
+    pub(crate) silent: Quiet,
+    pub(crate) latched: Latched,
+    pub(crate) declared: Quiet,
+    pub(crate) stated: Stated,
+    pub(crate) inferred: Inferred,
+    pub(crate) added: Change,
+    pub(crate) removed: Change,
+    pub(crate) changed: Change,
+    pub(crate) badge: Badge,
+    pub(crate) chip: Chip,
+    #[serde(skip)]
+    palette: Vec<Color>,
+}
+
+impl Body {
+    /// The weight of its names.
+    pub(crate) fn weight(&self) -> Weight {
+        if self.bold {
+            Weight::SemiBold
+        } else {
+            Weight::Regular
+        }
+    }
+}
+
+impl Style {
+    /// The built-in style of this name.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where there is none; the hint lists them.
+    pub fn builtin(name: &str) -> Result<Self> {
+        Self::from_toml(builtin_text(name)?, Path::new(name))
+    }
+
+    /// The style that `text`, read from `path`, describes: its keys over those of the built-in style it names as
+    /// `base` (default `light`).
+    ///
+    /// # Errors
+    /// [`Error::BadFile`] with the line, for what is no TOML, an unknown section or key, or a value of the wrong kind.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
+        let file = File::read(text, path)?;
+        let mut keys = match file.values.get("base") {
+            None => complete(BUILTIN[0].1, path)?,
+            Some(Value::String(base)) => builtin_text(base)
+                .and_then(|text| complete(text, path))
+                .map_err(|e| file.bad(&["base"], e.to_string()))?,
+            Some(_) => return Err(file.bad(&["base"], "`base` is no name of a style".to_owned())),
+        };
+        file.overlay(&mut keys)?;
+        Self::from_keys(keys, path)
+    }
+
+    fn from_keys(keys: Table, path: &Path) -> Result<Self> {
+        let mut palette = BTreeSet::new();
+        for value in keys
+            .values()
+            .filter_map(Value::as_table)
+            .flat_map(Table::values)
+        {
+            palette.extend(
+                value
+                    .as_str()
+                    .and_then(Color::parse)
+                    .filter(|c| *c != Color::NONE),
+            );
+        }
+        let mut style: Self = keys
+            .try_into()
+            .map_err(|e: toml::de::Error| Error::BadFile {
+                path: path.to_owned(),
+                line: 0,
+                reason: e.message().to_owned(),
+                hint: HINT.to_owned(),
+            })?;
+        style.palette = palette.into_iter().collect();
+        Ok(style)
+    }
+
+    /// Every colour of the style, once, sorted.
+    pub fn palette(&self) -> &[Color] {
+        &self.palette
+    }
+
+    /// The colour behind everything.
+    pub fn background(&self) -> Color {
+        self.page.background
+    }
+}
+
+const HINT: &str = "`bagreel styles light` prints a complete style with every key explained";
+
+/// The text of the built-in style of this name.
+///
+/// # Errors
+/// [`Error::Usage`] where there is none; the hint lists them.
+pub fn builtin_text(name: &str) -> Result<&'static str> {
+    let found = BUILTIN.iter().find(|(known, _)| *known == name);
+    found.map(|(_, text)| *text).ok_or_else(|| {
+        let names: Vec<_> = BUILTIN.iter().map(|(name, _)| *name).collect();
+        let hint = format!(
+            "styles: {}; or the path of a file of your own",
+            names.join(", ")
+        );
+        Error::usage(format!("unknown style `{name}`"), hint)
+    })
+}
+
+/// All keys of a built-in style: those it has over those of the first.
+fn complete(text: &str, path: &Path) -> Result<Table> {
+    let mut keys: Table = BUILTIN[0].1.parse().unwrap_or_default();
+    File::read(text, path)?.overlay(&mut keys)?;
+    Ok(keys)
+}
+
+/// A style file with the places of its keys.
+struct File<'a> {
+    text: &'a str,
+    path: &'a Path,
+    values: Table,
+    places: Spanned<DeTable<'a>>,
+}
+
+impl<'a> File<'a> {
+    fn read(text: &'a str, path: &'a Path) -> Result<Self> {
+        let no_toml = |e: toml::de::Error| Error::BadFile {
+            path: path.to_owned(),
+            line: e.span().map_or(0, |span| line_at(text, span.start)),
+            reason: e.message().replace('\n', " "),
+            hint: HINT.to_owned(),
+        };
+        Ok(Self {
+            text,
+            path,
+            values: text.parse().map_err(no_toml)?,
+            places: DeTable::parse(text).map_err(no_toml)?,
+        })
+    }
+
+    /// What is wrong with the value at `[section]` or `[section, key]`.
+    fn bad(&self, at: &[&str], reason: String) -> Error {
+        let mut table = Some(self.places.get_ref());
+        let mut line = 0;
+        for key in at {
+            let found = table.and_then(|t| t.iter().find(|(k, _)| k.get_ref() == key));
+            line = found.map_or(line, |(k, _)| line_at(self.text, k.span().start));
+            table = found.and_then(|(_, value)| value.get_ref().as_table());
+        }
+        Error::BadFile {
+            path: self.path.to_owned(),
+            line,
+            reason,
+            hint: HINT.to_owned(),
+        }
+    }
+
+    /// Puts this file's values over `keys`, which knows all sections, keys and their kinds.
+    fn overlay(&self, keys: &mut Table) -> Result<()> {
+        for (section, value) in self.values.iter().filter(|(name, _)| *name != "base") {
+            let known = keys.get_mut(section).and_then(Value::as_table_mut);
+            let known = known
+                .ok_or_else(|| self.bad(&[section], format!("unknown section `{section}`")))?;
+            let table = value.as_table();
+            let table =
+                table.ok_or_else(|| self.bad(&[section], format!("`{section}` is no section")))?;
+            for (key, value) in table {
+                let at = [section.as_str(), key.as_str()];
+                let old = known.get_mut(key);
+                let old = old.ok_or_else(|| {
+                    self.bad(&at, format!("unknown key `{key}` in `[{section}]`"))
+                })?;
+                if let Some(kind) = misfit(old, value) {
+                    return Err(self.bad(&at, format!("`{key}` must be {kind}, not `{value}`")));
+                }
+                *old = value.clone();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What `new` should be to stand for `old`; `None` if it can.
+fn misfit(old: &Value, new: &Value) -> Option<&'static str> {
+    let length = |v: &Value| {
+        #[expect(clippy::cast_precision_loss, reason = "only its range matters")]
+        let number = v.as_float().or_else(|| v.as_integer().map(|n| n as f64));
+        number.is_some_and(|n| (0.0..=500.0).contains(&n))
+    };
+    let (fits, kind) = match old {
+        Value::String(_) => (
+            new.as_str().and_then(Color::parse).is_some(),
+            "a colour such as `#1B2430`, or `none`",
+        ),
+        Value::Boolean(_) => (new.is_bool(), "`true` or `false`"),
+        Value::Array(_) => (
+            new.as_array()
+                .is_some_and(|a| a.len() <= 8 && a.iter().all(length)),
+            "a list of at most 8 lengths of 0 to 500 pixels",
+        ),
+        _ => (length(new), "a length of 0 to 500 pixels"),
+    };
+    (!fits).then_some(kind)
+}
+
+/// The line, 1.., of a byte.
+fn line_at(text: &str, byte: usize) -> usize {
+    text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Style> {
+        Style::from_toml(text, Path::new("mine.toml"))
+    }
+
+    fn refusal(text: &str) -> String {
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_builtin_style_is_whole() {
+        for (name, _) in BUILTIN {
+            let style = Style::builtin(name).unwrap();
+            assert!(style.palette().len() >= 2, "{name}");
+        }
+        assert_ne!(
+            Style::builtin("light").unwrap(),
+            Style::builtin("dark").unwrap()
+        );
+    }
+
+    #[test]
+    fn a_printed_style_reads_back_as_itself() {
+        for (name, text) in BUILTIN {
+            assert_eq!(read(text).unwrap(), Style::builtin(name).unwrap(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_style_may_hold_only_what_differs() {
+        let mine = read("base = \"dark\"\n[added]\ncolor = \"#0000ff\"\nwidth = 4").unwrap();
+        let dark = Style::builtin("dark").unwrap();
+        assert_eq!(mine.added.color.to_string(), "#0000FF");
+        assert!((mine.added.width - 4.0).abs() < 1e-9);
+        assert_eq!(mine.removed, dark.removed);
+        assert!(mine.palette().contains(&mine.added.color));
+    }
+
+    #[test]
+    fn errors_name_file_line_and_key() {
+        let e = refusal("[node]\nfill = \"#FFFFFF\"\nfil = 3");
+        assert_eq!(e, "`mine.toml` line 3: unknown key `fil` in `[node]`");
+        assert!(refusal("\n[nodes]\n").contains("line 2: unknown section `nodes`"));
+        assert!(refusal("[node]\nfill = \"blue\"").contains("line 2: `fill` must be a colour"));
+        assert!(refusal("[node]\n\nsize = -1").contains("line 3: `size` must be a length"));
+        assert!(refusal("[node]\nsize = nan").contains("a length"));
+        assert!(refusal("node = 3").contains("line 1: `node` is no section"));
+        assert!(refusal("base = \"neon\"").contains("line 1: unknown style `neon`"));
+        assert!(refusal("[node\nfill").contains("line 1"));
+    }
+
+    #[test]
+    fn colours_mix() {
+        let (black, white) = (
+            Color::parse("#000000").unwrap(),
+            Color::parse("#ffffff").unwrap(),
+        );
+        assert_eq!(black.towards(white, 0.5).to_string(), "#808080");
+        assert_eq!(Color::NONE.towards(white, 0.6), white);
+        assert_eq!(Color::parse("#12345"), None);
+        assert_eq!(Color::parse("#+2345f"), None);
+    }
+}

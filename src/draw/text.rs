@@ -1,0 +1,294 @@
+//! How wide a label is in the bundled font, and how to show what the font lacks.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+use skrifa::instance::{LocationRef, Size};
+use skrifa::{FontRef, MetadataProvider as _};
+
+use crate::base::error::{Error, Result};
+
+/// The bundled font's Regular: a subset of Inter, see `styles/fonts/README.md`.
+pub const REGULAR: &[u8] = include_bytes!("../../styles/fonts/Inter-Regular.ttf");
+/// The bundled font's `SemiBold`.
+pub const SEMIBOLD: &[u8] = include_bytes!("../../styles/fonts/Inter-SemiBold.ttf");
+
+/// How bold a text is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Weight {
+    /// 400.
+    #[default]
+    Regular,
+    /// 600.
+    SemiBold,
+}
+
+/// The width of every character of one font, in em.
+#[derive(Debug)]
+struct Face {
+    data: Cow<'static, [u8]>,
+    /// Sorted by character.
+    advances: Vec<(u32, f32)>,
+}
+
+impl Face {
+    /// `None` if the bytes are no font, or one without characters.
+    fn read(data: Cow<'static, [u8]>) -> Option<Self> {
+        let font = FontRef::from_index(&data, 0).ok()?;
+        let em = font
+            .metrics(Size::unscaled(), LocationRef::default())
+            .units_per_em;
+        let widths = font.glyph_metrics(Size::unscaled(), LocationRef::default());
+        let mut advances: Vec<(u32, f32)> = font
+            .charmap()
+            .mappings()
+            .filter_map(|(c, glyph)| Some((c, widths.advance_width(glyph)? / f32::from(em.max(1)))))
+            .collect();
+        advances.sort_by_key(|(c, _)| *c);
+        advances.dedup_by_key(|(c, _)| *c);
+        (!advances.is_empty()).then_some(Self { data, advances })
+    }
+
+    fn advance(&self, c: char) -> Option<f32> {
+        let at = self
+            .advances
+            .binary_search_by_key(&u32::from(c), |(c, _)| *c)
+            .ok()?;
+        Some(self.advances[at].1)
+    }
+}
+
+/// The fonts that labels are measured and drawn with: the bundled one, then the user's. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Fonts {
+    regular: Arc<Face>,
+    semibold: Arc<Face>,
+    extra: Vec<Arc<Face>>,
+}
+
+impl Default for Fonts {
+    fn default() -> Self {
+        Self::bundled()
+    }
+}
+
+impl Fonts {
+    /// The family name of the bundled font.
+    pub const FAMILY: &'static str = "Inter";
+
+    /// The bundled font alone.
+    pub fn bundled() -> Self {
+        let face = |data| {
+            let broken = Face {
+                data: Cow::Borrowed(data),
+                advances: Vec::new(),
+            };
+            Arc::new(Face::read(Cow::Borrowed(data)).unwrap_or(broken))
+        };
+        Self {
+            regular: face(REGULAR),
+            semibold: face(SEMIBOLD),
+            extra: Vec::new(),
+        }
+    }
+
+    /// With one more font for characters that the ones before lack.
+    ///
+    /// # Errors
+    /// [`Error::BadFile`] where `data`, read from `path`, is no TrueType or OpenType font.
+    pub fn with(mut self, data: Vec<u8>, path: &Path) -> Result<Self> {
+        let face = Face::read(Cow::Owned(data)).ok_or_else(|| Error::BadFile {
+            path: path.to_owned(),
+            line: 0,
+            reason: "no TrueType or OpenType font with characters".to_owned(),
+            hint: "give `--font` a .ttf, .otf or .ttc file".to_owned(),
+        })?;
+        self.extra.push(Arc::new(face));
+        Ok(self)
+    }
+
+    /// The bytes of the font files: Regular, `SemiBold`, then the user's.
+    pub fn files(&self) -> impl Iterator<Item = &[u8]> {
+        [&self.regular, &self.semibold]
+            .into_iter()
+            .chain(&self.extra)
+            .map(|face| &*face.data)
+    }
+
+    /// The place in [`Fonts::files`] of the font that draws `c` in this weight; that of the weight where none has it.
+    pub fn file_of(&self, c: char, weight: Weight) -> usize {
+        let (place, first) = match weight {
+            Weight::Regular => (0, &self.regular),
+            Weight::SemiBold => (1, &self.semibold),
+        };
+        if first.advance(c).is_some() {
+            return place;
+        }
+        let extra = self.extra.iter().position(|f| f.advance(c).is_some());
+        extra.map_or(place, |at| at + 2)
+    }
+
+    /// The width of `c` in em; `None` where no font has it.
+    fn advance(&self, c: char, weight: Weight) -> Option<f32> {
+        let first = match weight {
+            Weight::Regular => &self.regular,
+            Weight::SemiBold => &self.semibold,
+        };
+        std::iter::once(first)
+            .chain(&self.extra)
+            .find_map(|face| face.advance(c))
+    }
+
+    /// The width of `text` in pixels at a font size of `size` pixels; exact for the bundled font, which has no kerning.
+    /// A character that no font has counts as one em.
+    pub fn width(&self, text: &str, size: f64, weight: Weight) -> f64 {
+        let em: f64 = text
+            .chars()
+            .map(|c| f64::from(self.advance(c, weight).unwrap_or(1.0)))
+            .sum();
+        em * size
+    }
+
+    /// `text` as it can be drawn: control characters, invisible and direction marks, and characters that no font has,
+    /// are written as `\u{…}`, so that different names never look the same.
+    pub fn shown<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        if text.chars().all(|c| self.can_show(c)) {
+            return Cow::Borrowed(text);
+        }
+        let mut out = String::new();
+        for c in text.chars() {
+            if self.can_show(c) {
+                out.push(c);
+            } else {
+                let _ = write!(out, "\\u{{{:x}}}", u32::from(c));
+            }
+        }
+        Cow::Owned(out)
+    }
+
+    /// The characters of `text` that have to be written as an escape, in order.
+    pub fn missing<'a>(&'a self, text: &'a str) -> impl Iterator<Item = char> + 'a {
+        text.chars().filter(|c| !self.can_show(*c))
+    }
+
+    fn can_show(&self, c: char) -> bool {
+        !is_invisible(c) && self.advance(c, Weight::Regular).is_some()
+    }
+
+    /// `text` shortened in the middle by `…` until it is at most `most` pixels wide; at least its ends are kept.
+    pub fn fit<'a>(&self, text: &'a str, size: f64, weight: Weight, most: f64) -> Cow<'a, str> {
+        if self.width(text, size, weight) <= most {
+            return Cow::Borrowed(text);
+        }
+        let chars: Vec<char> = text.chars().collect();
+        let short = |keep: usize| -> String {
+            // A name is told by its end rather than by its beginning.
+            let head = keep * 2 / 5;
+            let tail = &chars[chars.len() - (keep - head)..];
+            chars[..head].iter().chain(&['…']).chain(tail).collect()
+        };
+        // The more is kept the wider it is, so that the most that fits is found by halving.
+        let most_kept = chars.len().saturating_sub(2);
+        let (mut fits, mut wide) = (most_kept.min(2), most_kept + 1);
+        while wide - fits > 1 {
+            let keep = fits.midpoint(wide);
+            if self.width(&short(keep), size, weight) <= most {
+                fits = keep;
+            } else {
+                wide = keep;
+            }
+        }
+        Cow::Owned(short(fits))
+    }
+}
+
+/// `text` with control characters, invisible and direction marks written as `\u{…}`, so that it cannot hide or turn
+/// round what stands beside it; for pages, where the reader's own fonts show the rest.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_invisible) {
+        return Cow::Borrowed(text);
+    }
+    let spelled = |c: char| {
+        if is_invisible(c) {
+            c.escape_unicode().to_string()
+        } else {
+            c.to_string()
+        }
+    };
+    Cow::Owned(text.chars().map(spelled).collect())
+}
+
+/// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
+pub(crate) fn is_invisible(c: char) -> bool {
+    c.is_control()
+        || (c.is_whitespace() && c != ' ')
+        || matches!(c, '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180e}' | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}'
+            | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e0fff}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widths_are_sums_of_advances() {
+        let fonts = Fonts::bundled();
+        let width = |t| fonts.width(t, 2048.0, Weight::Regular);
+        assert!((width("scan") - (width("s") + width("c") + width("a") + width("n"))).abs() < 1e-6);
+        assert!(
+            fonts.width("scan", 10.0, Weight::SemiBold)
+                > fonts.width("scan", 10.0, Weight::Regular)
+        );
+    }
+
+    #[test]
+    fn digits_are_equally_wide_so_that_clocks_stand_still() {
+        let fonts = Fonts::bundled();
+        for weight in [Weight::Regular, Weight::SemiBold] {
+            let of = |t: &str| fonts.width(t, 100.0, weight);
+            assert!(
+                "023456789"
+                    .chars()
+                    .all(|d| (of(&d.to_string()) - of("1")).abs() < 1e-3)
+            );
+        }
+    }
+
+    #[test]
+    fn the_signs_that_we_draw_are_in_the_font() {
+        let fonts = Fonts::bundled();
+        let signs = "≥≤×·→←−–—▲▼◆…éÿąłŠωΩЖя±²\"'&<>";
+        assert_eq!(fonts.missing(signs).collect::<String>(), "");
+    }
+
+    #[test]
+    fn what_the_font_lacks_is_spelled_out() {
+        let fonts = Fonts::bundled();
+        assert_eq!(fonts.shown("/scan"), "/scan");
+        assert_eq!(fonts.shown("/机\n"), "/\\u{673a}\\u{a}");
+        assert_eq!(fonts.shown("a\u{202e}b"), "a\\u{202e}b");
+        assert_eq!(fonts.missing("机a").collect::<Vec<_>>(), ['机']);
+    }
+
+    #[test]
+    fn long_names_keep_their_ends() {
+        let fonts = Fonts::bundled();
+        let name = "a_very_long_name_of_a_topic_that_nobody_should_ever_use";
+        let short = fonts.fit(name, 12.0, Weight::Regular, 120.0);
+        assert!(fonts.width(&short, 12.0, Weight::Regular) <= 120.0);
+        assert!(
+            short.starts_with("a_v") && short.ends_with("ever_use"),
+            "{short}"
+        );
+        assert_eq!(fonts.fit("ab", 12.0, Weight::Regular, 0.0), "…");
+    }
+
+    #[test]
+    fn a_file_that_is_no_font_is_refused() {
+        let error = Fonts::bundled().with(b"no font".to_vec(), Path::new("x.ttf"));
+        assert!(error.is_err_and(|e| e.to_string().contains("x.ttf")));
+    }
+}

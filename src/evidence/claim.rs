@@ -1,0 +1,322 @@
+//! What the messages of a mission claim about its graph: who says what, how strongly, and when.
+//!
+//! A claim is kept once per source with the times at which it was made, so that millions of messages that repeat
+//! themselves take no more room than their (compressed) times.
+
+use std::collections::{BTreeMap, HashMap};
+use std::io;
+use std::sync::Arc;
+
+use crate::base::time::Stamp;
+use crate::evidence::times::{SeriesId, Stamps};
+
+/// How well something is known. Ordered: the stronger is the smaller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Degree {
+    /// Messages of this very connection, or the middleware's own statistics.
+    Measured,
+    /// Somebody says so: a log record's topic list, a graph snapshot, the user's own file.
+    Stated,
+    /// A convention says so: an action, a bond, every node publishes `/rosout`.
+    Inferred,
+    /// Known from a header or metadata only.
+    Declared,
+}
+
+impl Degree {
+    /// All of them, strongest first.
+    pub const ALL: [Self; 4] = [Self::Measured, Self::Stated, Self::Inferred, Self::Declared];
+
+    /// Its word in JSON and in class names.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Stated => "stated",
+            Self::Inferred => "inferred",
+            Self::Declared => "declared",
+        }
+    }
+}
+
+/// A text seen in the mission: the name of a node or topic, a type, a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Name(pub(crate) u32);
+
+/// What a source can claim. The number of a name says nothing: order by its text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Claim {
+    /// This node is alive.
+    Node(Name),
+    /// This node is gone.
+    NodeGone(Name),
+    /// This topic exists.
+    Topic(Name),
+    /// A recorder of all topics has just seen this topic for the first time.
+    Appears(Name),
+    /// This node publishes this topic.
+    Publish(Name, Name),
+    /// This node subscribes this topic.
+    Subscribe(Name, Name),
+    /// This node has just begun to subscribe this topic.
+    Joins(Name, Name),
+    /// This node no longer subscribes this topic.
+    Unsubscribe(Name, Name),
+    /// This node names this topic as its own, as publisher or as subscriber.
+    Lists(Name, Name),
+    /// Log records of the second node come over a connection that names the first as publisher.
+    Carries(Name, Name),
+    /// A logger of this name, which is a node or a part of one, logs to this topic.
+    Logger(Name, Name),
+    /// A status on this topic (second) is named after this node (first).
+    Reports(Name, Name),
+    /// This node is in this lifecycle state.
+    Lifecycle(Name, Name),
+    /// This service (by the topic of its events) has this client.
+    Client(Name, Name),
+    /// This service (by the topic of its events) was called: a request or a reply was sent or received.
+    Called(Name, Name),
+    /// This topic has this type.
+    Type(Name, Name),
+    /// This topic is offered with this quality of service.
+    Quality(Name, Name),
+    /// A snapshot was taken: what the source claims in it but not in a later one of the same name is gone.
+    Snapshot(Name),
+}
+
+impl Claim {
+    /// The names in it.
+    pub(crate) fn names(self) -> [Option<Name>; 2] {
+        match self {
+            Self::Node(a)
+            | Self::NodeGone(a)
+            | Self::Topic(a)
+            | Self::Appears(a)
+            | Self::Snapshot(a) => [Some(a), None],
+            Self::Publish(a, b)
+            | Self::Subscribe(a, b)
+            | Self::Joins(a, b)
+            | Self::Unsubscribe(a, b)
+            | Self::Lists(a, b)
+            | Self::Carries(a, b)
+            | Self::Reports(a, b)
+            | Self::Logger(a, b)
+            | Self::Lifecycle(a, b)
+            | Self::Client(a, b)
+            | Self::Called(a, b)
+            | Self::Type(a, b)
+            | Self::Quality(a, b) => [Some(a), Some(b)],
+        }
+    }
+
+    /// The same claim by new names.
+    fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
+        match self {
+            Self::Node(a) => Self::Node(to(a)),
+            Self::NodeGone(a) => Self::NodeGone(to(a)),
+            Self::Topic(a) => Self::Topic(to(a)),
+            Self::Appears(a) => Self::Appears(to(a)),
+            Self::Publish(a, b) => Self::Publish(to(a), to(b)),
+            Self::Subscribe(a, b) => Self::Subscribe(to(a), to(b)),
+            Self::Joins(a, b) => Self::Joins(to(a), to(b)),
+            Self::Unsubscribe(a, b) => Self::Unsubscribe(to(a), to(b)),
+            Self::Lists(a, b) => Self::Lists(to(a), to(b)),
+            Self::Carries(a, b) => Self::Carries(to(a), to(b)),
+            Self::Reports(a, b) => Self::Reports(to(a), to(b)),
+            Self::Logger(a, b) => Self::Logger(to(a), to(b)),
+            Self::Lifecycle(a, b) => Self::Lifecycle(to(a), to(b)),
+            Self::Client(a, b) => Self::Client(to(a), to(b)),
+            Self::Called(a, b) => Self::Called(to(a), to(b)),
+            Self::Type(a, b) => Self::Type(to(a), to(b)),
+            Self::Quality(a, b) => Self::Quality(to(a), to(b)),
+            Self::Snapshot(a) => Self::Snapshot(to(a)),
+        }
+    }
+}
+
+/// The place of a row in the table of sources.
+pub(crate) type SourceId = usize;
+
+/// A claim by one source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClaimRecord {
+    pub(crate) claim: Claim,
+    pub(crate) source: SourceId,
+    pub(crate) degree: Degree,
+    /// The snapshots that this claim stands and falls with.
+    pub(crate) snapshot: Option<Name>,
+    /// When it was made.
+    pub(crate) times: SeriesId,
+}
+
+/// One piece of evidence, kept because somebody asked why.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct EvidenceLine {
+    /// When; `None` for what holds for the whole mission.
+    pub time: Option<Stamp>,
+    /// The word of its source.
+    pub source: &'static str,
+    /// How strong it is.
+    pub degree: Degree,
+    /// What it says, in one line; may hold anything, so escape it where it is written.
+    pub text: String,
+}
+
+/// The most texts and claims kept; a bag with more is hostile, and the rest is only counted.
+const MOST: usize = 1 << 20;
+
+/// All claims of a mission.
+#[derive(Debug, Default)]
+pub(crate) struct Claims {
+    /// The names somebody asks about ([`EvidenceLine`]); none: no pieces are kept.
+    pub(crate) watched: Vec<String>,
+    pub(crate) pieces: Vec<EvidenceLine>,
+    /// The sequence numbers of streams, by the streams' places; kept as if they were sizes.
+    pub(crate) sequences: BTreeMap<usize, SeriesId>,
+    /// The header stamps of streams, by the streams' places; log times are kept as if they were sizes.
+    pub(crate) headers: BTreeMap<usize, SeriesId>,
+    ids: HashMap<Arc<str>, Name>,
+    texts: Vec<Arc<str>>,
+    places: HashMap<(Claim, SourceId, Option<Name>), usize>,
+    pub(crate) list: Vec<ClaimRecord>,
+    pub(crate) times: Stamps,
+    /// Claims that found no room.
+    pub(crate) dropped: u64,
+}
+
+impl Claims {
+    /// The handle on a text; a text that finds no room is the empty one.
+    pub(crate) fn name(&mut self, text: &str) -> Name {
+        if let Some(name) = self.ids.get(text) {
+            return *name;
+        }
+        if self.texts.len() >= MOST {
+            self.dropped += 1;
+            return self.ids.get("").copied().unwrap_or(Name(0));
+        }
+        let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
+        let text: Arc<str> = text.into();
+        self.texts.push(Arc::clone(&text));
+        self.ids.insert(text, name);
+        name
+    }
+
+    /// The handle on a text that was seen already.
+    pub(crate) fn known(&self, text: &str) -> Option<Name> {
+        self.ids.get(text).copied()
+    }
+
+    /// The text of a handle.
+    pub(crate) fn text(&self, name: Name) -> Arc<str> {
+        self.texts
+            .get(name.0 as usize)
+            .map_or_else(|| "".into(), Arc::clone)
+    }
+
+    /// Keeps the words of a claim, if it is about what somebody asked for.
+    pub(crate) fn explain(
+        &mut self,
+        said: Statement,
+        source: &'static str,
+        time: Option<Stamp>,
+        words: impl FnOnce() -> String,
+    ) {
+        if self.is_watched(said.claim.names()) && self.pieces.len() < MOST {
+            let text = words();
+            if !text.is_empty() {
+                self.pieces.push(EvidenceLine {
+                    time,
+                    source,
+                    degree: said.degree,
+                    text,
+                });
+            }
+        }
+    }
+
+    /// Whether somebody asked about something with these names.
+    pub(crate) fn is_watched(&self, names: [Option<Name>; 2]) -> bool {
+        let about = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
+        !self.watched.is_empty() && self.watched.iter().all(about)
+    }
+
+    /// Takes in a sequence number of the stream at `place`.
+    pub(crate) fn sequence(&mut self, place: usize, time: Stamp, number: u32) {
+        let times = &mut self.times;
+        let id = *self
+            .sequences
+            .entry(place)
+            .or_insert_with(|| times.series());
+        self.times.add(id, &[time], Some(&[number]));
+    }
+
+    /// Takes in a header stamp of the stream at `place`.
+    pub(crate) fn header(&mut self, place: usize, stamp: Stamp, log_time: u32) {
+        let times = &mut self.times;
+        let id = *self.headers.entry(place).or_insert_with(|| times.series());
+        self.times.add(id, &[stamp], Some(&[log_time]));
+    }
+
+    /// Takes in that `source` claims something, at `time` if it is a matter of time.
+    pub(crate) fn add(&mut self, source: SourceId, said: Statement, time: Option<Stamp>) {
+        let key = (said.claim, source, said.snapshot);
+        let place = match self.places.get(&key) {
+            Some(place) => *place,
+            None if self.list.len() >= MOST => {
+                self.dropped += 1;
+                return;
+            }
+            None => {
+                let times = self.times.series();
+                self.list.push(ClaimRecord {
+                    claim: said.claim,
+                    source,
+                    degree: said.degree,
+                    snapshot: said.snapshot,
+                    times,
+                });
+                self.places.insert(key, self.list.len() - 1);
+                self.list.len() - 1
+            }
+        };
+        let fact = &mut self.list[place];
+        fact.degree = fact.degree.min(said.degree);
+        self.times.add(fact.times, time.as_slice(), None);
+    }
+
+    /// Numbers all names in the order of their texts; tells the new number of each old one.
+    pub(crate) fn renumber(&mut self) -> Vec<Name> {
+        let mut order: Vec<usize> = (0..self.texts.len()).collect();
+        order.sort_by(|a, b| self.texts[*a].cmp(&self.texts[*b]));
+        let mut new = vec![Name(0); order.len()];
+        for (rank, old) in (0..).zip(&order) {
+            new[*old] = Name(rank);
+        }
+        let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
+        self.texts = order
+            .iter()
+            .map(|old| Arc::clone(&self.texts[*old]))
+            .collect();
+        let names = (0..).map(Name);
+        self.ids = self.texts.iter().cloned().zip(names).collect();
+        for fact in &mut self.list {
+            fact.claim = fact.claim.renamed(&to);
+            fact.snapshot = fact.snapshot.map(to);
+        }
+        let keys = self.list.iter().map(|f| (f.claim, f.source, f.snapshot));
+        self.places = keys.zip(0..).collect();
+        new
+    }
+
+    /// When a fact was claimed, sorted.
+    pub(crate) fn times(&mut self, fact: &ClaimRecord) -> io::Result<Vec<Stamp>> {
+        self.times.times(fact.times)
+    }
+}
+
+/// A claim with all that belongs to it but its source and time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Statement {
+    pub(crate) claim: Claim,
+    pub(crate) degree: Degree,
+    pub(crate) snapshot: Option<Name>,
+}

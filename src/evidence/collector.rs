@@ -1,0 +1,311 @@
+//! Takes in any number of bags: where every message lies in time, and what their contents claim.
+
+mod services;
+
+use std::io;
+
+use super::clock::believed;
+pub use services::Service;
+
+use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::claim::{Claims, SourceId};
+use crate::evidence::message::cursor::Cursor;
+use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::publishers;
+use crate::evidence::source::{self, Read, SourceContext, equal_stamps};
+use crate::evidence::times::Stamps;
+use crate::evidence::{EvidenceLine, SOURCES};
+
+/// What to look at while reading.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Know every payload's size, even if that means reading more than the index.
+    pub sizes: bool,
+    /// Keep every piece of evidence on the elements with all of these names (one: a node or topic; two: an edge).
+    pub why: Vec<String>,
+    /// Infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
+    pub infer_stamps: bool,
+}
+
+/// Takes in bags, one after another.
+#[derive(Debug, Default)]
+pub struct Collector {
+    options: Options,
+    streams: Vec<Stream>,
+    /// Who reads the messages of each stream.
+    readers: Vec<Vec<(SourceId, Read)>>,
+    /// Whether the header stamps of each stream are wanted.
+    stamped: Vec<bool>,
+    messages: Stamps,
+    facts: Claims,
+    notices: Notices,
+    bags: usize,
+}
+
+impl Collector {
+    /// A collector of nothing yet.
+    pub fn new(options: Options) -> Self {
+        let mut all = Self::default();
+        all.facts.watched.clone_from(&options.why);
+        all.options = options;
+        all
+    }
+
+    /// The sink for the next bag; `progress` hears how far its reader is (bytes done, bytes in all).
+    pub fn bag<'a>(&'a mut self, progress: &'a mut dyn FnMut(u64, u64)) -> BagSink<'a> {
+        self.bags += 1;
+        BagSink {
+            streams: Vec::new(),
+            bag: self.bags - 1,
+            collector: self,
+            progress,
+        }
+    }
+
+    /// Lets every source look at the newest stream.
+    fn announced(&mut self) {
+        let Some((place, stream)) = self.streams.iter().enumerate().next_back() else {
+            return;
+        };
+        for (source, row) in SOURCES.iter().enumerate() {
+            if let Some(announced) = row.announced {
+                announced(&mut SourceContext {
+                    facts: &mut self.facts,
+                    stream,
+                    place,
+                    source,
+                    time: None,
+                });
+            }
+        }
+    }
+
+    /// Lets the sources that know its layout read a message.
+    fn read(&mut self, place: usize, message: &Message<'_>) {
+        let stream = &self.streams[place];
+        if self.stamped[place] {
+            let mut heard = SourceContext {
+                facts: &mut self.facts,
+                stream,
+                place,
+                source: 0,
+                time: Some(message.time),
+            };
+            equal_stamps::hear(&mut heard, message.data);
+        }
+        for (source, read) in &self.readers[place] {
+            let mut heard = SourceContext {
+                facts: &mut self.facts,
+                stream,
+                place,
+                source: *source,
+                time: Some(message.time),
+            };
+            let done = Cursor::new(&stream.connection.encoding, message.data)
+                .and_then(|mut payload| read(&mut heard, &mut payload));
+            if done.is_err() {
+                self.notices
+                    .add(undecodable(stream, "some messages do not have its layout"));
+            }
+        }
+    }
+
+    /// Ends the taking in.
+    ///
+    /// # Errors
+    /// If times had to be put into a temporary file and that failed.
+    pub fn finish(mut self) -> Result<Collected> {
+        self.messages.finish().map_err(spool_error)?;
+        self.facts.times.finish().map_err(spool_error)?;
+        let believed = believed(self.messages.days());
+        self.notices
+            .extend(publishers::judge(&mut self.streams, &self.facts));
+        let mut all = Collected {
+            streams: self.streams,
+            messages: self.messages,
+            facts: self.facts,
+            notices: self.notices,
+            believed,
+            span: None,
+        };
+        all.span = all.measure().map_err(spool_error)?;
+        Ok(all)
+    }
+}
+
+/// Whether the last message stands for its publisher after its moment. rospy latches its log and ROS 2 keeps its
+/// own, and yet the last record says nothing about its node's life.
+fn is_held(connection: &Connection) -> bool {
+    let qos = connection.qos.as_deref().unwrap_or_default();
+    let kept = connection.latching || source::qos::is_transient_local(qos);
+    kept && connection.topic.as_str() != "/rosout"
+}
+
+/// Says that a stream, or a message of it, has another layout than its type promises.
+fn undecodable(stream: &Stream, why: &str) -> Notice {
+    let (topic, kind) = (&stream.connection.topic, &stream.connection.type_name);
+    Notice::new(
+        NoticeKind::Undecodable,
+        format!("`{topic}` of type `{kind}` was not read for evidence: {why}"),
+    )
+}
+
+/// The temporary file of times could not be written or read.
+pub(crate) fn spool_error(source: io::Error) -> Error {
+    Error::Io {
+        path: "a temporary file".into(),
+        doing: "use",
+        source,
+    }
+}
+
+/// Feeds one bag into a [`Collector`].
+pub struct BagSink<'a> {
+    collector: &'a mut Collector,
+    progress: &'a mut dyn FnMut(u64, u64),
+    bag: usize,
+    /// The stream of each connection of this bag.
+    streams: Vec<usize>,
+}
+
+impl BagSink<'_> {
+    fn stream(&self, connection: ConnectionId) -> Option<usize> {
+        self.streams.get(connection.0 as usize).copied()
+    }
+}
+
+impl Sink for BagSink<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let all = &mut *self.collector;
+        let topic = all.facts.name(connection.topic.as_str());
+        let publisher = connection.publisher.as_ref();
+        let stream = Stream {
+            bag: self.bag,
+            connection: connection.clone(),
+            topic,
+            publisher: publisher.map(|p| all.facts.name(p.as_str())),
+            speaker: None,
+            latched: is_held(connection),
+            trust: Reliability::Whole,
+            times: all.messages.series(),
+        };
+        let (readers, foreign) = source::readers(&stream);
+        if foreign {
+            all.notices
+                .add(undecodable(&stream, "its definition is not the known one"));
+        }
+        let stamped = all.options.infer_stamps && equal_stamps::is_stamped(connection);
+        let want = match (readers.is_empty(), stamped, all.options.sizes) {
+            (false, ..) => Want::Payload,
+            (true, true, _) => Want::Head(equal_stamps::HEAD),
+            (true, false, true) => Want::Sizes,
+            (true, false, false) => Want::Stamps,
+        };
+        self.streams.push(all.streams.len());
+        all.streams.push(stream);
+        all.readers.push(readers);
+        all.stamped.push(stamped);
+        all.announced();
+        want
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        if let Some(stream) = self.stream(connection) {
+            let times = self.collector.streams[stream].times;
+            self.collector.messages.add(times, stamps, sizes);
+        }
+    }
+
+    fn message(&mut self, message: Message<'_>) {
+        if let Some(stream) = self.stream(message.connection) {
+            self.collector.read(stream, &message);
+        }
+    }
+
+    fn notice(&mut self, notice: Notice) {
+        self.collector.notices.add(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        (self.progress)(done, total);
+    }
+}
+
+/// Everything that the bags of a mission hold about its graph.
+#[derive(Debug)]
+pub struct Collected {
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) messages: Stamps,
+    pub(crate) facts: Claims,
+    /// What went wrong without stopping us.
+    pub notices: Notices,
+    /// The times that are no accident; `None` if all of them may be believed.
+    pub(crate) believed: Option<Span>,
+    /// From the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is no
+    /// message.
+    pub span: Option<Span>,
+}
+
+impl Collected {
+    /// Every piece of evidence on what [`Options::why`] asks for, in order of time, source and text.
+    pub fn why(&self) -> Vec<EvidenceLine> {
+        let mut pieces = self.facts.pieces.clone();
+        pieces.sort_unstable();
+        pieces.dedup();
+        pieces
+    }
+
+    /// Whether a time may be believed.
+    pub(crate) fn believes(&self, time: Stamp) -> bool {
+        self.believed.is_none_or(|span| span.contains(time))
+    }
+
+    /// Finds the span of all believable messages, and counts the others.
+    fn measure(&mut self) -> io::Result<Option<Span>> {
+        let mut span: Option<Span> = None;
+        let mut aside = 0;
+        for at in 0..self.streams.len() {
+            let id = self.streams[at].times;
+            let Some(bounds) = self.messages.bounds(id) else {
+                continue;
+            };
+            if self.believes(bounds.0) && self.believes(bounds.1) {
+                widen(&mut span, bounds);
+                continue;
+            }
+            let believed = self.believed;
+            self.messages.merge(&[id], |t| {
+                if believed.is_none_or(|span| span.contains(t.time)) {
+                    widen(&mut span, (t.time, t.time));
+                } else {
+                    aside += 1;
+                }
+            })?;
+        }
+        if aside > 0 {
+            self.notices.add(Notice {
+                kind: NoticeKind::ImpossibleTime,
+                count: aside,
+                text: "message at an impossible time, set aside".to_owned(),
+            });
+        }
+        Ok(span)
+    }
+}
+
+fn widen(span: &mut Option<Span>, (first, last): (Stamp, Stamp)) {
+    let all = span.get_or_insert(Span {
+        start: first,
+        end: last.plus(1),
+    });
+    all.start = all.start.min(first);
+    all.end = all.end.max(last.plus(1));
+}
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod tests_ros2;

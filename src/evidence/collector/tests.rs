@@ -1,0 +1,338 @@
+//! Every source, fed with single messages.
+
+use super::*;
+use crate::bag::Encoding;
+use crate::evidence::claim::Claim;
+
+/// A payload under construction.
+pub(super) struct Payload {
+    bytes: Vec<u8>,
+    cdr: bool,
+}
+
+impl Payload {
+    pub(super) fn ros1() -> Self {
+        Self {
+            bytes: Vec::new(),
+            cdr: false,
+        }
+    }
+
+    pub(super) fn cdr() -> Self {
+        Self {
+            bytes: vec![0, 1, 0, 0],
+            cdr: true,
+        }
+    }
+
+    pub(super) fn number<const N: usize>(mut self, bytes: [u8; N]) -> Self {
+        while self.cdr && !(self.bytes.len() - 4).is_multiple_of(N) {
+            self.bytes.push(0);
+        }
+        self.bytes.extend(bytes);
+        self
+    }
+
+    pub(super) fn byte(self, value: u8) -> Self {
+        self.number([value])
+    }
+
+    pub(super) fn u32(self, value: u32) -> Self {
+        self.number(value.to_le_bytes())
+    }
+
+    pub(super) fn u64(self, value: u64) -> Self {
+        self.number(value.to_le_bytes())
+    }
+
+    pub(super) fn time(self) -> Self {
+        self.u32(1).u32(2)
+    }
+
+    pub(super) fn raw(mut self, bytes: &[u8]) -> Self {
+        self.bytes.extend(bytes);
+        self
+    }
+
+    pub(super) fn text(self, text: &str) -> Self {
+        let zero = if self.cdr { "\0" } else { "" };
+        let text = format!("{text}{zero}");
+        self.u32(u32::try_from(text.len()).unwrap())
+            .raw(text.as_bytes())
+    }
+
+    pub(super) fn header(self, seq: u32) -> Self {
+        let start = if self.cdr { self } else { self.u32(seq) };
+        start.time().text("")
+    }
+
+    pub(super) fn log(name: &str, message: &str, file: &str, topics: &[&str]) -> Self {
+        let record = Self::ros1()
+            .header(7)
+            .byte(2)
+            .text(name)
+            .text(message)
+            .text(file)
+            .text("f")
+            .u32(3);
+        let record = record.u32(u32::try_from(topics.len()).unwrap());
+        topics
+            .iter()
+            .fold(record, |record, topic| record.text(topic))
+    }
+}
+
+/// A collector that has heard one message of a connection, with what it wanted of it.
+pub(super) fn hear(
+    topic: &str,
+    kind: &str,
+    publisher: Option<&str>,
+    payload: &Payload,
+) -> (Collector, Want) {
+    let mut collector = Collector::new(Options::default());
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    let want = bag.connection(&Connection {
+        id: ConnectionId(0),
+        topic: topic.into(),
+        type_name: kind.into(),
+        definition: None,
+        type_hash: None,
+        publisher: publisher.map(Into::into),
+        latching: false,
+        qos: None,
+        encoding: if payload.cdr {
+            Encoding::Cdr
+        } else {
+            Encoding::Ros1
+        },
+    });
+    bag.message(Message {
+        connection: ConnectionId(0),
+        time: Stamp(5),
+        data: &payload.bytes,
+        size: 0,
+    });
+    (collector, want)
+}
+
+/// What one message claims, a line each, sorted.
+pub(super) fn claims(
+    topic: &str,
+    kind: &str,
+    publisher: Option<&str>,
+    payload: &Payload,
+) -> Vec<String> {
+    let (collector, want) = hear(topic, kind, publisher, payload);
+    assert_eq!(want, Want::Payload);
+    assert!(collector.notices.is_empty(), "{:?}", collector.notices);
+    let facts = &collector.facts;
+    let line = |claim: Claim| {
+        let debug = format!("{claim:?}");
+        let kind = debug.split('(').next().unwrap().to_owned();
+        let names = claim.names().into_iter().flatten();
+        names.fold(kind, |line, name| format!("{line} {}", facts.text(name)))
+    };
+    let mut lines: Vec<_> = facts.list.iter().map(|fact| line(fact.claim)).collect();
+    lines.sort();
+    lines
+}
+
+#[test]
+fn roscpp_names_what_it_publishes() {
+    let record = Payload::log("/a", "hello", "src/a.cpp", &["/scan"]);
+    assert_eq!(
+        claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
+        [
+            "Node /a",
+            "Publish /a /rosout",
+            "Publish /a /scan",
+            "Snapshot topics of /a"
+        ]
+    );
+}
+
+#[test]
+fn rospy_names_what_it_publishes_and_subscribes() {
+    let record = Payload::log("/a", "hello", "a.py", &["/scan"]);
+    assert_eq!(
+        claims("/rosout_agg", "rosgraph_msgs/Log", Some("/rosout"), &record),
+        ["Lists /a /scan", "Node /a", "Snapshot topics of /a"]
+    );
+}
+
+#[test]
+fn a_log_connection_of_another_node_was_merged() {
+    let record = Payload::log("/b", "hello", "a.py", &[]);
+    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
+    assert!(all.contains(&"Carries /a /b".to_owned()), "{all:?}");
+}
+
+#[test]
+fn roscpp_tells_of_its_subscribers() {
+    let text = "Connection to subscriber [callerid=[/c] address=[x]] to topic [/scan] dropped";
+    let record = Payload::log("/a", text, "link.cpp", &[]);
+    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record);
+    assert!(all.contains(&"Unsubscribe /c /scan".to_owned()), "{all:?}");
+}
+
+#[test]
+fn the_recorder_dates_a_topic() {
+    let record = Payload::log("/record_1", "Subscribing to /map", "recorder.cpp", &[]);
+    let all = claims("/rosout", "rosgraph_msgs/Log", Some("/record_1"), &record);
+    assert!(all.contains(&"Appears /map".to_owned()), "{all:?}");
+}
+
+#[test]
+fn statistics_know_both_ends() {
+    let message = Payload::ros1()
+        .text("/scan")
+        .text("/lidar")
+        .text("/slam")
+        .time()
+        .time();
+    let message = message.u32(10).u32(0).u32(999).raw(&[0; 48]);
+    assert_eq!(
+        claims(
+            "/statistics",
+            "rosgraph_msgs/TopicStatistics",
+            Some("/slam"),
+            &message
+        ),
+        ["Publish /lidar /scan", "Subscribe /slam /scan"]
+    );
+}
+
+#[test]
+fn diagnostics_name_their_node() {
+    let message = Payload::ros1()
+        .header(1)
+        .u32(1)
+        .byte(0)
+        .text("r1/lidar: Rate")
+        .text("")
+        .text("")
+        .u32(1);
+    let message = message.text("k").text("v");
+    assert_eq!(
+        claims(
+            "/diagnostics",
+            "diagnostic_msgs/DiagnosticArray",
+            None,
+            &message
+        ),
+        ["Reports /r1/lidar /diagnostics"]
+    );
+}
+
+#[test]
+fn the_status_of_a_goal_names_its_client() {
+    let message = Payload::ros1()
+        .header(1)
+        .u32(1)
+        .time()
+        .text("/boss-1-1795170744.123")
+        .byte(1)
+        .text("");
+    assert_eq!(
+        claims(
+            "/move/status",
+            "actionlib_msgs/GoalStatusArray",
+            None,
+            &message
+        ),
+        ["Publish /boss /move/goal"]
+    );
+}
+
+#[test]
+fn a_payload_of_another_layout_is_a_notice_and_no_claim() {
+    let message = Payload::log("/a", "hello", "a.py", &[]).byte(1);
+    let (collector, _) = hear("/rosout", "rosgraph_msgs/Log", None, &message);
+    assert!(collector.facts.list.is_empty());
+    let kinds: Vec<_> = collector.notices.iter().map(|n| n.kind).collect();
+    assert_eq!(kinds, [NoticeKind::Undecodable]);
+}
+
+#[test]
+fn every_layout_survives_any_cut() {
+    let record = Payload::log("/a", "hello", "a.py", &["/b", "/c"]);
+    for len in 0..record.bytes.len() {
+        let cut = Payload {
+            bytes: record.bytes[..len].to_vec(),
+            cdr: false,
+        };
+        let (collector, _) = hear("/rosout", "rosgraph_msgs/Log", None, &cut);
+        assert!(collector.facts.list.is_empty(), "{len}");
+    }
+}
+
+/// A collector with a camera, a detector that passes its stamps on, and a lidar that does not.
+fn flow() -> Collector {
+    let mut collector = Collector::new(Options {
+        infer_stamps: true,
+        why: vec!["/detector".into(), "/image".into()],
+        ..Options::default()
+    });
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    let talks = [
+        ("/image", "/camera", 0),
+        ("/boxes", "/detector", 30),
+        ("/scan", "/lidar", 40),
+    ];
+    for (id, (topic, node, _)) in (0..).zip(talks) {
+        let want = bag.connection(&Connection {
+            id: ConnectionId(id),
+            topic: topic.into(),
+            type_name: "sensor_msgs/Image".into(),
+            definition: None,
+            type_hash: None,
+            publisher: Some(node.into()),
+            latching: false,
+            qos: None,
+            encoding: Encoding::Ros1,
+        });
+        assert_eq!(want, Want::Head(equal_stamps::HEAD));
+    }
+    for n in 0..20_u32 {
+        for (id, (_, node, delay_ms)) in (0..).zip(talks) {
+            let own = u32::from(node == "/lidar");
+            let head = Payload::ros1().u32(n).u32(100 + n).u32(own).u32(0);
+            let time = Stamp::from_ros(100 + n, delay_ms * 1_000_000);
+            bag.stamps(ConnectionId(id), &[time], None);
+            bag.message(Message {
+                connection: ConnectionId(id),
+                time,
+                data: &head.bytes,
+                size: 99,
+            });
+        }
+    }
+    collector
+}
+
+#[test]
+fn a_node_that_passes_stamps_on_subscribes_their_source() {
+    let mut collected = flow().finish().unwrap();
+    let span = collected.span.unwrap();
+    let options = crate::graph::Options::default();
+    let built = crate::graph::build(&mut collected, &[span], &options).unwrap();
+    let all = &built.elements;
+    let inferred = all
+        .subscribes
+        .iter()
+        .filter(|e| e.evidence.words().any(|w| w == "equal_stamps"));
+    let names = inferred.map(|e| {
+        let (topic, node) = (&all.topics[e.topic as usize], &all.nodes[e.node as usize]);
+        format!("{} {}", topic.name, node.name)
+    });
+    assert_eq!(names.collect::<Vec<_>>(), ["/image /detector"]);
+    let texts: Vec<_> = collected
+        .why()
+        .into_iter()
+        .map(|piece| piece.text)
+        .collect();
+    let text = "20 of 20 messages of /boxes carry the stamp of a message of /image just before";
+    assert!(texts.iter().any(|t| t == text), "{texts:?}");
+}

@@ -1,0 +1,52 @@
+//! A set of kinds of evidence, as small as a number.
+
+use super::SOURCES;
+use super::claim::SourceId;
+
+/// A set of kinds of evidence: the places of rows in [`SOURCES`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Evidence(u64);
+
+impl Evidence {
+    /// No evidence.
+    pub const NONE: Self = Self(0);
+
+    /// The set of this one word; empty for a word that is no source of ours.
+    pub fn of(word: &str) -> Self {
+        SOURCES
+            .iter()
+            .position(|s| s.word == word)
+            .map_or(Self::NONE, Self::row)
+    }
+
+    /// The set of this one row.
+    pub(crate) fn row(source: SourceId) -> Self {
+        let bit = u32::try_from(source).unwrap_or(u32::MAX);
+        Self(1_u64.checked_shl(bit).unwrap_or(0))
+    }
+
+    /// Both together.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether nothing is in it.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The words of all kinds, in the order of [`SOURCES`].
+    pub fn all_words() -> impl Iterator<Item = &'static str> {
+        SOURCES.iter().map(|source| source.word)
+    }
+
+    /// The words in it, in the order of [`SOURCES`].
+    pub fn words(self) -> impl Iterator<Item = &'static str> {
+        SOURCES
+            .iter()
+            .enumerate()
+            .filter(move |(at, _)| self.0 >> at & 1 == 1)
+            .map(|(_, source)| source.word)
+    }
+}

@@ -1,0 +1,275 @@
+//! A cursor over serialised payloads, ROS 1 and CDR: numbers, strings and sequences, never past the end.
+//!
+//! ROS 1 is little-endian and packed (<http://wiki.ros.org/msg>); CDR aligns each number to its own size, counted
+//! from behind the encapsulation header (OMG DDSI-RTPS 2.5, section 10).
+
+use std::fmt;
+
+use crate::bag::Encoding;
+use crate::base::time::Stamp;
+
+/// A payload that does not hold what was asked of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Malformed {
+    /// Where, in bytes from the payload's start.
+    pub at: usize,
+    /// What should stand there.
+    pub expected: &'static str,
+}
+
+impl fmt::Display for Malformed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "expected {} at byte {}", self.expected, self.at)
+    }
+}
+
+/// What every reading function returns.
+pub type Result<T> = std::result::Result<T, Malformed>;
+
+/// A place in a payload.
+#[derive(Clone, Debug)]
+pub struct Cursor<'a> {
+    data: &'a [u8],
+    at: usize,
+    /// Where alignment counts from; `None` where nothing is aligned (ROS 1).
+    origin: Option<usize>,
+    big_endian: bool,
+}
+
+impl<'a> Cursor<'a> {
+    /// A cursor at the start of a payload.
+    ///
+    /// # Errors
+    /// For an encoding that is neither ROS 1 nor plain CDR (XCDR1).
+    pub fn new(encoding: &Encoding, data: &'a [u8]) -> Result<Self> {
+        match encoding {
+            Encoding::Ros1 => Ok(Self::ros1(data)),
+            Encoding::Cdr => Self::cdr(data),
+            Encoding::Other(_) => Err(Malformed {
+                at: 0,
+                expected: "ROS 1 or CDR encoding",
+            }),
+        }
+    }
+
+    /// A cursor over a ROS 1 payload.
+    pub fn ros1(data: &'a [u8]) -> Self {
+        Self {
+            data,
+            at: 0,
+            origin: None,
+            big_endian: false,
+        }
+    }
+
+    /// A cursor over a CDR payload, behind its encapsulation header.
+    ///
+    /// # Errors
+    /// Unless the header says plain CDR of either byte order.
+    pub fn cdr(data: &'a [u8]) -> Result<Self> {
+        match data {
+            [0, kind @ (0 | 1), _, _, ..] => Ok(Self {
+                data,
+                at: 4,
+                origin: Some(4),
+                big_endian: *kind == 0,
+            }),
+            _ => Err(Malformed {
+                at: 0,
+                expected: "a plain CDR header",
+            }),
+        }
+    }
+
+    /// Whether this is CDR.
+    pub fn is_cdr(&self) -> bool {
+        self.origin.is_some()
+    }
+
+    /// Bytes left.
+    pub fn remaining(&self) -> usize {
+        self.data.len() - self.at
+    }
+
+    /// Checks that nothing is left; CDR may be padded by up to three bytes.
+    ///
+    /// # Errors
+    /// If more is left.
+    pub fn finish(&self) -> Result<()> {
+        let allowed = if self.is_cdr() { 3 } else { 0 };
+        if self.remaining() > allowed {
+            return Err(self.wrong("the end"));
+        }
+        Ok(())
+    }
+
+    /// The error for `expected` here.
+    pub fn wrong(&self, expected: &'static str) -> Malformed {
+        Malformed {
+            at: self.at,
+            expected,
+        }
+    }
+
+    /// The next `len` bytes.
+    pub fn bytes(&mut self, len: usize) -> Result<&'a [u8]> {
+        let end = self.at.checked_add(len);
+        let part = end.and_then(|end| self.data.get(self.at..end));
+        let part = part.ok_or(self.wrong("more bytes"))?;
+        self.at += len;
+        Ok(part)
+    }
+
+    /// The next `N` bytes, aligned to `N` in CDR, least significant first.
+    fn number<const N: usize>(&mut self) -> Result<[u8; N]> {
+        if let Some(origin) = self.origin {
+            let over = (self.at - origin) % N;
+            if over != 0 {
+                self.bytes(N - over)?;
+            }
+        }
+        let mut number = [0; N];
+        number.copy_from_slice(self.bytes(N)?);
+        if self.big_endian {
+            number.reverse();
+        }
+        Ok(number)
+    }
+
+    /// The next byte.
+    pub fn u8(&mut self) -> Result<u8> {
+        self.number().map(u8::from_le_bytes)
+    }
+
+    /// The next byte as a truth value.
+    pub fn bool(&mut self) -> Result<bool> {
+        Ok(self.u8()? != 0)
+    }
+
+    /// The next 16 bits.
+    pub fn u16(&mut self) -> Result<u16> {
+        self.number().map(u16::from_le_bytes)
+    }
+
+    /// The next 32 bits.
+    pub fn u32(&mut self) -> Result<u32> {
+        self.number().map(u32::from_le_bytes)
+    }
+
+    /// The next 32 bits, signed.
+    pub fn i32(&mut self) -> Result<i32> {
+        self.number().map(i32::from_le_bytes)
+    }
+
+    /// The next 64 bits.
+    pub fn u64(&mut self) -> Result<u64> {
+        self.number().map(u64::from_le_bytes)
+    }
+
+    /// The next 64 bits, signed.
+    pub fn i64(&mut self) -> Result<i64> {
+        self.number().map(i64::from_le_bytes)
+    }
+
+    /// The next 32 bits as a floating point number.
+    pub fn f32(&mut self) -> Result<f32> {
+        self.number().map(f32::from_le_bytes)
+    }
+
+    /// The next 64 bits as a floating point number.
+    pub fn f64(&mut self) -> Result<f64> {
+        self.number().map(f64::from_le_bytes)
+    }
+
+    /// The next time: seconds and nanoseconds of 32 bits each.
+    pub fn time(&mut self) -> Result<Stamp> {
+        Ok(Stamp::from_ros(self.u32()?, self.u32()?))
+    }
+
+    /// The next string; bytes that are no UTF-8 are an error.
+    pub fn string(&mut self) -> Result<&'a str> {
+        let len = self.u32()? as usize;
+        let mut text = self.bytes(len)?;
+        if self.is_cdr() {
+            match text {
+                [rest @ .., 0] => text = rest,
+                // Some writers leave an empty string without its closing zero.
+                [] => {}
+                _ => return Err(self.wrong("a string's closing zero")),
+            }
+        }
+        std::str::from_utf8(text).map_err(|_| self.wrong("text in UTF-8"))
+    }
+
+    /// Like [`Cursor::string`], stepping over it without a look at its bytes.
+    pub fn skip_string(&mut self) -> Result<()> {
+        let len = self.u32()? as usize;
+        self.bytes(len).map(drop)
+    }
+
+    /// The length of the next sequence, whose elements take `least` bytes or more each.
+    pub fn length(&mut self, least: usize) -> Result<usize> {
+        let count = self.u32()? as usize;
+        if count.saturating_mul(least.max(1)) > self.remaining() {
+            return Err(self.wrong("as many elements as the sequence announces"));
+        }
+        Ok(count)
+    }
+
+    /// Steps over a `std_msgs/Header`; the sequence number in ROS 1, 0 in ROS 2.
+    pub fn header(&mut self) -> Result<u32> {
+        let seq = if self.is_cdr() { 0 } else { self.u32()? };
+        self.time()?;
+        self.skip_string()?;
+        Ok(seq)
+    }
+}
+
+/// Bytes as hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    let digit = |n: u8| char::from_digit(u32::from(n), 16).unwrap_or('0');
+    bytes
+        .iter()
+        .flat_map(|b| [digit(b >> 4), digit(b & 15)])
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ros1_is_packed() {
+        let data = [7, 1, 0, 0, 0, 2, 0, 0, 0, b'h', b'i'];
+        let mut cursor = Cursor::ros1(&data);
+        assert_eq!((cursor.u8(), cursor.u32()), (Ok(7), Ok(1)));
+        assert_eq!(cursor.string(), Ok("hi"));
+        assert_eq!(cursor.finish(), Ok(()));
+    }
+
+    #[test]
+    fn cdr_is_aligned_in_either_byte_order() {
+        let little = [0, 1, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0];
+        let big = [0, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 1];
+        for data in [little, big] {
+            let mut cursor = Cursor::cdr(&data).unwrap();
+            assert_eq!((cursor.u8(), cursor.u32()), (Ok(7), Ok(1)));
+        }
+    }
+
+    #[test]
+    fn nothing_is_read_past_the_end() {
+        let mut cursor = Cursor::ros1(&[255, 255, 255, 255, 1]);
+        assert!(cursor.clone().string().is_err());
+        assert!(cursor.clone().length(1).is_err());
+        assert!(cursor.u64().is_err());
+        assert!(Cursor::cdr(&[0, 7, 0, 0]).is_err());
+    }
+
+    #[test]
+    fn a_cdr_string_ends_with_a_zero() {
+        let with = |last| [0, 1, 0, 0, 2, 0, 0, 0, b'a', last];
+        assert_eq!(Cursor::cdr(&with(0)).unwrap().string(), Ok("a"));
+        assert!(Cursor::cdr(&with(b'b')).unwrap().string().is_err());
+    }
+}

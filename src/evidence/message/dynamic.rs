@@ -1,0 +1,149 @@
+//! A message as data, taken apart by its own definition: for messages whose layout has changed over the years.
+
+use crate::evidence::message::cursor::{Cursor, Result};
+use crate::evidence::message::definition::outline;
+
+/// A part of a message. Numbers are not kept.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Value {
+    Text(String),
+    /// An unsigned number of one byte.
+    Byte(u8),
+    /// Any other number.
+    Number,
+    List(Vec<Self>),
+    /// Fields by name.
+    Fields(Vec<(String, Self)>),
+}
+
+impl Value {
+    /// A field by its name.
+    pub(crate) fn field(&self, name: &str) -> Option<&Self> {
+        match self {
+            Self::Fields(fields) => fields.iter().find(|(n, _)| n == name).map(|(_, v)| v),
+            _ => None,
+        }
+    }
+
+    /// A field that holds text; empty if there is none.
+    pub(crate) fn text(&self, name: &str) -> &str {
+        match self.field(name) {
+            Some(Self::Text(text)) => text,
+            _ => "",
+        }
+    }
+
+    /// A field that holds a list; empty if there is none.
+    pub(crate) fn list(&self, name: &str) -> &[Self] {
+        match self.field(name) {
+            Some(Self::List(list)) => list,
+            _ => &[],
+        }
+    }
+}
+
+/// Messages inside messages deeper than this are hostile.
+const DEEPEST: usize = 12;
+
+/// Types that definitions use without spelling them out.
+const BUILT_IN: [(&str, &str); 2] = [
+    ("Time", "int32 sec;uint32 nanosec"),
+    ("Duration", "int32 sec;uint32 nanosec"),
+];
+
+/// A definition, ready to take messages apart.
+#[derive(Clone, Debug)]
+pub(crate) struct Schema(Vec<(String, String)>);
+
+impl Schema {
+    /// The schema of a definition's text.
+    pub(crate) fn of_text(definition: &str) -> Self {
+        Self(outline(definition))
+    }
+
+    /// A schema of ours: the message's fields under the empty name, then those of the messages inside it.
+    pub(crate) fn of_fields(fields: &[(&str, &str)]) -> Self {
+        let own = |(name, fields): &(&str, &str)| ((*name).to_owned(), (*fields).to_owned());
+        Self(fields.iter().map(own).collect())
+    }
+
+    /// Takes a whole payload apart.
+    ///
+    /// # Errors
+    /// If it has another layout, or nothing is known about a type in it.
+    pub(crate) fn read(&self, payload: &mut Cursor<'_>) -> Result<Value> {
+        let fields = self.0.first().map_or("", |(_, fields)| fields);
+        let value = self.fields(payload, fields, 0)?;
+        payload.finish()?;
+        Ok(value)
+    }
+
+    fn fields(&self, payload: &mut Cursor<'_>, fields: &str, depth: usize) -> Result<Value> {
+        let mut values = Vec::new();
+        for field in fields.split(';').filter(|f| !f.is_empty()) {
+            let (kind, name) = field.split_once(' ').ok_or(payload.wrong("a field"))?;
+            values.push((name.to_owned(), self.field(payload, kind, depth)?));
+        }
+        Ok(Value::Fields(values))
+    }
+
+    fn field(&self, payload: &mut Cursor<'_>, kind: &str, depth: usize) -> Result<Value> {
+        let Some((kind, array)) = kind.split_once('[') else {
+            return self.one(payload, kind, depth);
+        };
+        let count = match array.trim_end_matches(']') {
+            "" => payload.length(1)?,
+            count => {
+                let count = count
+                    .parse()
+                    .map_err(|_| payload.wrong("an array's length"))?;
+                if count > payload.remaining() {
+                    return Err(payload.wrong("a whole array"));
+                }
+                count
+            }
+        };
+        let list = (0..count).map(|_| self.one(payload, kind, depth));
+        Ok(Value::List(list.collect::<Result<_>>()?))
+    }
+
+    fn one(&self, payload: &mut Cursor<'_>, kind: &str, depth: usize) -> Result<Value> {
+        match kind {
+            "string" => return payload.string().map(|text| Value::Text(text.to_owned())),
+            "byte" => return payload.u8().map(Value::Byte),
+            "int16" | "uint16" => payload.u16().map(drop)?,
+            "int32" | "uint32" | "float32" => payload.u32().map(drop)?,
+            "int64" | "uint64" | "float64" => payload.u64().map(drop)?,
+            _ => {
+                let known = self.0.iter().map(|(n, f)| (n.as_str(), f.as_str())).skip(1);
+                let fields = known.chain(BUILT_IN).find(|(name, _)| *name == kind);
+                return match fields {
+                    Some((_, fields)) if depth < DEEPEST => self.fields(payload, fields, depth + 1),
+                    _ => Err(payload.wrong("a known type")),
+                };
+            }
+        }
+        Ok(Value::Number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_taken_apart_by_its_definition() {
+        let schema =
+            Schema::of_text("Part[] parts\nuint8 last\n===\nMSG: a/Part\nuint16 n\nstring name\n");
+        let data = [0, 1, 0, 0, 1, 0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'x', 0, 9];
+        let value = schema.read(&mut Cursor::cdr(&data).unwrap()).unwrap();
+        assert_eq!(value.list("parts")[0].text("name"), "x");
+        assert_eq!(value.field("last"), Some(&Value::Byte(9)));
+    }
+
+    #[test]
+    fn a_definition_that_holds_itself_is_refused() {
+        let schema = Schema::of_text("A a\n===\nMSG: x/A\nA a\n");
+        assert!(schema.read(&mut Cursor::ros1(&[0; 64])).is_err());
+    }
+}

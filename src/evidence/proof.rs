@@ -1,0 +1,375 @@
+//! What the claims of a mission amount to: every reason to believe in a node, a topic or an edge.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::sync::Arc;
+
+use crate::bag::Connection;
+use crate::base::time::Stamp;
+use crate::evidence::claim::{Claim, ClaimRecord, Claims, Degree, Name, SourceId};
+use crate::evidence::rhythm::Rhythm;
+use crate::evidence::times::SeriesId;
+
+/// A connection of one of the bags.
+#[derive(Clone, Debug)]
+pub(crate) struct Stream {
+    /// The place of its bag among the inputs.
+    pub(crate) bag: usize,
+    /// As the reader announced it.
+    pub(crate) connection: Connection,
+    pub(crate) topic: Name,
+    pub(crate) publisher: Option<Name>,
+    /// The node that counts as its publisher when graphs are built: by its name or by its role.
+    pub(crate) speaker: Option<Name>,
+    /// Whether a message outlives its moment: latched (ROS 1) or transient local (ROS 2).
+    pub(crate) latched: bool,
+    /// How far its publisher's name is believed.
+    pub(crate) trust: Reliability,
+    /// The log times of its messages.
+    pub(crate) times: SeriesId,
+}
+
+/// How far the publisher that a header names is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reliability {
+    /// It publishes every message.
+    Whole,
+    /// It publishes the first message; the others are anybody's.
+    First,
+    /// It plays back what others published once.
+    Player,
+}
+
+/// A node, a topic or an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Key {
+    Node(Name),
+    Topic(Name),
+    /// Node, topic.
+    Publish(Name, Name),
+    /// Topic, node.
+    Subscribe(Name, Name),
+}
+
+impl Key {
+    /// The names in it.
+    pub(crate) fn names(self) -> [Option<Name>; 2] {
+        match self {
+            Self::Node(a) | Self::Topic(a) => [Some(a), None],
+            Self::Publish(a, b) | Self::Subscribe(a, b) => [Some(a), Some(b)],
+        }
+    }
+
+    /// The same element with its node under another name.
+    pub(crate) fn with_node(self, to: &mut impl FnMut(Name) -> Name) -> Self {
+        match self {
+            Self::Node(node) => Self::Node(to(node)),
+            Self::Topic(topic) => Self::Topic(topic),
+            Self::Publish(node, topic) => Self::Publish(to(node), topic),
+            Self::Subscribe(topic, node) => Self::Subscribe(topic, to(node)),
+        }
+    }
+
+    /// The same element by new names.
+    fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
+        match self {
+            Self::Node(a) => Self::Node(to(a)),
+            Self::Topic(a) => Self::Topic(to(a)),
+            Self::Publish(a, b) => Self::Publish(to(a), to(b)),
+            Self::Subscribe(a, b) => Self::Subscribe(to(a), to(b)),
+        }
+    }
+}
+
+/// When a reason holds.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Validity {
+    /// While the messages of this stream come.
+    Messages(usize),
+    /// At the first message of this stream.
+    First(usize),
+    /// From the first sign to the last; after an end only from the next sign on.
+    Signs {
+        signs: Vec<Stamp>,
+        ends: Vec<Stamp>,
+        held: bool,
+    },
+    /// From a beginning to the next end.
+    Begins { signs: Vec<Stamp>, ends: Vec<Stamp> },
+    /// As long as this other element lives.
+    Like(Key),
+    /// For the whole mission, unless signs tell when.
+    Whole,
+    /// For the whole mission, whatever signs there are.
+    Always,
+}
+
+/// One reason to believe in an element.
+#[derive(Clone, Debug)]
+pub(crate) struct Proof {
+    pub(crate) what: Key,
+    pub(crate) source: SourceId,
+    pub(crate) degree: Degree,
+    pub(crate) when: Validity,
+}
+
+impl Proof {
+    /// The same proof by new names.
+    pub(crate) fn rename(&mut self, to: &impl Fn(Name) -> Name) {
+        self.what = self.what.renamed(to);
+        if let Validity::Like(other) = &mut self.when {
+            *other = other.renamed(to);
+        }
+    }
+}
+
+/// Everything known about a mission once all bags are read, and what follows from it so far.
+#[derive(Debug)]
+pub(crate) struct Findings<'a> {
+    pub(crate) streams: &'a [Stream],
+    pub(crate) facts: &'a mut Claims,
+    pub(crate) proofs: Vec<Proof>,
+    /// The mission's last moment.
+    end: Stamp,
+    /// Why times could not be read, if so.
+    pub(crate) failed: Option<io::Error>,
+    publishers: BTreeMap<Name, BTreeSet<Name>>,
+    nodes: BTreeSet<Name>,
+}
+
+impl<'a> Findings<'a> {
+    pub(crate) fn new(streams: &'a [Stream], facts: &'a mut Claims, end: Stamp) -> Self {
+        Self {
+            end,
+            streams,
+            facts,
+            proofs: Vec::new(),
+            failed: None,
+            publishers: BTreeMap::new(),
+            nodes: BTreeSet::new(),
+        }
+    }
+
+    /// Adds a reason.
+    pub(crate) fn prove(&mut self, proof: Proof) {
+        match proof.what {
+            Key::Node(node) | Key::Subscribe(_, node) => {
+                self.nodes.insert(node);
+            }
+            Key::Publish(node, topic) => {
+                self.nodes.insert(node);
+                self.publishers.entry(topic).or_default().insert(node);
+            }
+            Key::Topic(_) => {}
+        }
+        self.proofs.push(proof);
+    }
+
+    /// Everybody who names this topic as its own, as publisher or subscriber.
+    pub(crate) fn named_by_others(&self, topic: Name, node: Name) -> bool {
+        self.facts.list.iter().any(|fact| {
+            matches!(fact.claim, Claim::Lists(n, t) | Claim::Publish(n, t) if t == topic && n != node)
+        })
+    }
+
+    /// Everybody who is known to publish `topic` so far.
+    pub(crate) fn publishers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
+        self.publishers.get(&topic).into_iter().flatten().copied()
+    }
+
+    /// Every node known so far.
+    pub(crate) fn nodes(&self) -> &BTreeSet<Name> {
+        &self.nodes
+    }
+
+    /// The recorded topics whose type fits, in the order of their names.
+    pub(crate) fn topics_of(&self, fits: impl Fn(&str) -> bool) -> Vec<Name> {
+        let fitting = self
+            .streams
+            .iter()
+            .filter(|s| fits(&s.connection.type_name));
+        let mut topics: Vec<_> = fitting
+            .map(|s| (s.connection.topic.clone(), s.topic))
+            .collect();
+        topics.sort();
+        topics.dedup();
+        topics.into_iter().map(|(_, topic)| topic).collect()
+    }
+
+    /// By a convention, `what` lives as long as `basis`.
+    pub(crate) fn like(&mut self, source: SourceId, what: Key, basis: Key) {
+        self.prove(Proof {
+            what,
+            source,
+            degree: Degree::Inferred,
+            when: Validity::Like(basis),
+        });
+    }
+
+    /// By a convention, whoever publishes `basis` subscribes `topic` as well.
+    pub(crate) fn subscribes_as_well(
+        &mut self,
+        source: SourceId,
+        node: Name,
+        basis: Name,
+        topic: Name,
+    ) {
+        self.like(
+            source,
+            Key::Subscribe(topic, node),
+            Key::Publish(node, basis),
+        );
+    }
+
+    /// The node that a name without its namespace means: the only known one that ends so, else one of this name.
+    pub(crate) fn meant(&self, node: Name) -> Name {
+        let text = self.text(node);
+        let mut ending = self
+            .nodes
+            .iter()
+            .filter(|n| self.text(**n).ends_with(&*text));
+        match (self.nodes.contains(&node), ending.next(), ending.next()) {
+            (false, Some(only), None) => *only,
+            _ => node,
+        }
+    }
+
+    /// The text of a name.
+    pub(crate) fn text(&self, name: Name) -> Arc<str> {
+        self.facts.text(name)
+    }
+
+    /// When a fact was claimed, sorted; empty if that cannot be read, which is kept.
+    pub(crate) fn times(&mut self, fact: &ClaimRecord) -> Vec<Stamp> {
+        self.facts.times(fact).unwrap_or_else(|error| {
+            self.failed = Some(error);
+            Vec::new()
+        })
+    }
+
+    /// All claims of one source with their signs and ends, sorted.
+    pub(crate) fn claims(
+        &mut self,
+        source: SourceId,
+    ) -> Vec<(ClaimRecord, Vec<Stamp>, Vec<Stamp>)> {
+        let endings = self.endings();
+        let facts = self.facts.list.iter().filter(|f| f.source == source);
+        let facts: Vec<ClaimRecord> = facts.copied().collect();
+        let times = |fact: ClaimRecord| {
+            let (signs, ends) = self.signs_and_ends(&fact, &endings);
+            (fact, signs, ends)
+        };
+        facts.into_iter().map(times).collect()
+    }
+
+    /// Whether something that is told now and then still holds after the last time: unless it was told in a rhythm
+    /// that broke off.
+    pub(crate) fn lasts(&self, signs: &[Stamp]) -> bool {
+        let mut rhythm = Rhythm::default();
+        for sign in signs {
+            rhythm.hear(*sign);
+        }
+        !rhythm.broke_off(self.end)
+    }
+
+    /// What the claims say without any rule: nodes, topics, publications and subscriptions. `lasting` tells whether
+    /// what a source claims holds until it is taken back.
+    pub(crate) fn take_at_their_word(&mut self, lasting: impl Fn(SourceId) -> bool) {
+        let endings = self.endings();
+        for fact in self.facts.list.clone() {
+            let what = match fact.claim {
+                Claim::Node(node) => Key::Node(node),
+                Claim::Topic(topic) => Key::Topic(topic),
+                Claim::Publish(node, topic) => Key::Publish(node, topic),
+                Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
+                    Key::Subscribe(topic, node)
+                }
+                _ => continue,
+            };
+            let (signs, ends) = self.signs_and_ends(&fact, &endings);
+            let held = lasting(fact.source) && (fact.snapshot.is_some() || self.lasts(&signs));
+            self.prove(Proof {
+                what,
+                source: fact.source,
+                degree: fact.degree,
+                when: match fact.claim {
+                    Claim::Joins(..) => Validity::Begins { signs, ends },
+                    _ => Validity::Signs { signs, ends, held },
+                },
+            });
+        }
+    }
+
+    /// When something was taken back, and when snapshots were taken.
+    fn endings(&mut self) -> BTreeMap<Claim, Vec<Stamp>> {
+        let mut endings: BTreeMap<Claim, Vec<Stamp>> = BTreeMap::new();
+        for fact in self.facts.list.clone() {
+            if let Claim::NodeGone(_) | Claim::Unsubscribe(..) | Claim::Snapshot(_) = fact.claim {
+                let times = self.times(&fact);
+                endings.entry(fact.claim).or_default().extend(times);
+            }
+        }
+        for times in endings.values_mut() {
+            times.sort_unstable();
+        }
+        endings
+    }
+
+    /// When a claim was made, and when it was taken back, sorted.
+    fn signs_and_ends(
+        &mut self,
+        fact: &ClaimRecord,
+        endings: &BTreeMap<Claim, Vec<Stamp>>,
+    ) -> (Vec<Stamp>, Vec<Stamp>) {
+        let signs = self.times(fact);
+        let ending = match fact.claim {
+            Claim::Node(node) => Some(Claim::NodeGone(node)),
+            Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
+                Some(Claim::Unsubscribe(node, topic))
+            }
+            _ => None,
+        };
+        let mut ends = ending
+            .and_then(|e| endings.get(&e))
+            .cloned()
+            .unwrap_or_default();
+        let snapshots = fact
+            .snapshot
+            .and_then(|name| endings.get(&Claim::Snapshot(name)));
+        ends.extend(
+            snapshots
+                .map(|taken| absences(&signs, taken))
+                .unwrap_or_default(),
+        );
+        ends.sort_unstable();
+        ends.dedup();
+        (signs, ends)
+    }
+}
+
+/// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.
+fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
+    let mut absent = Vec::new();
+    let mut from = 0;
+    for sign in signs {
+        let run = &snapshots[from..snapshots.partition_point(|t| t < sign).max(from)];
+        absent.extend(run.first());
+        absent.extend(run.last());
+        from = snapshots.partition_point(|t| t <= sign);
+    }
+    absent.extend(snapshots.get(from));
+    absent
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_snapshot_without_a_claim_tells_of_its_absence() {
+        let stamps = |times: &[i64]| times.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
+        let absent = absences(&stamps(&[4, 8]), &stamps(&[1, 2, 3, 4, 5, 6, 7, 8, 9]));
+        assert_eq!(absent, stamps(&[1, 3, 5, 7, 9]));
+        assert_eq!(absences(&stamps(&[1, 2]), &stamps(&[1, 2])), []);
+    }
+}

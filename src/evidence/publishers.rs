@@ -1,0 +1,99 @@
+//! Which connection headers name a publisher that is not the whole truth: bags rewritten by tools that merge
+//! connections, and bags recorded while another one was played back.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::name::is_player;
+use crate::base::notice::{Notice, NoticeKind};
+use crate::evidence::claim::{Claim, Claims, Name};
+use crate::evidence::proof::{Reliability, Stream};
+
+/// Lowers the trust in streams whose header cannot be believed; says so once per bag.
+pub(crate) fn judge(streams: &mut [Stream], facts: &Claims) -> Vec<Notice> {
+    let named = Named::new(facts);
+    let mut notices = Vec::new();
+    let mut bags: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (at, stream) in streams.iter().enumerate() {
+        bags.entry(stream.bag).or_default().push(at);
+    }
+    for of_bag in bags.values() {
+        if rewritten(streams, of_bag, &named, facts) {
+            notices.push(Notice::new(NoticeKind::Rewritten, REWRITTEN));
+            for at in of_bag {
+                let stream = &mut streams[*at];
+                if stream
+                    .publisher
+                    .is_some_and(|node| named.by_others(stream.topic, node))
+                {
+                    stream.trust = Reliability::First;
+                }
+            }
+        }
+        let mut played = false;
+        for at in of_bag {
+            let stream = &mut streams[*at];
+            let by_player = stream
+                .publisher
+                .is_some_and(|node| is_player(&facts.text(node)));
+            if by_player && &*facts.text(stream.topic) != "/rosout" {
+                played = true;
+                stream.trust = Reliability::Player;
+            }
+        }
+        if played {
+            notices.push(Notice::new(NoticeKind::Playback, PLAYBACK));
+        }
+    }
+    notices
+}
+
+const REWRITTEN: &str = "the bag was rewritten by a tool that merges connections, so a topic's publishers are known \
+                         from log records where these name several";
+const PLAYBACK: &str =
+    "the bag was recorded during a playback, so the player publishes what other nodes did once";
+
+/// Who names which topic as its own in log records and the like.
+struct Named {
+    topics: BTreeMap<Name, BTreeSet<Name>>,
+    /// Names that log over the connection of another.
+    guests: BTreeMap<Name, BTreeSet<Name>>,
+}
+
+impl Named {
+    fn new(facts: &Claims) -> Self {
+        let mut all = Self {
+            topics: BTreeMap::new(),
+            guests: BTreeMap::new(),
+        };
+        for fact in &facts.list {
+            match fact.claim {
+                Claim::Lists(node, topic) | Claim::Publish(node, topic) => {
+                    all.topics.entry(topic).or_default().insert(node);
+                }
+                Claim::Carries(host, guest) => {
+                    all.guests.entry(host).or_default().insert(guest);
+                }
+                _ => {}
+            }
+        }
+        all
+    }
+
+    fn by_others(&self, topic: Name, node: Name) -> bool {
+        let names = self.topics.get(&topic);
+        names.is_some_and(|names| names.iter().any(|name| *name != node))
+    }
+}
+
+/// Whether a bag has no topic with two publishers, and one log connection that several nodes log over.
+fn rewritten(streams: &[Stream], of_bag: &[usize], named: &Named, facts: &Claims) -> bool {
+    let mut topics = BTreeSet::new();
+    if !of_bag.iter().all(|at| topics.insert(streams[*at].topic)) {
+        return false;
+    }
+    let log = of_bag
+        .iter()
+        .find(|at| &*facts.text(streams[**at].topic) == "/rosout");
+    let host = log.and_then(|at| streams[*at].publisher);
+    host.is_some_and(|host| named.guests.contains_key(&host))
+}

@@ -1,0 +1,122 @@
+//! A kind of evidence: what it reads, and where its claims go. One file per kind.
+
+pub(crate) mod action;
+pub(crate) mod bond;
+pub(crate) mod connection;
+pub(crate) mod diagnostics;
+pub(crate) mod discovery;
+pub(crate) mod dynamic_reconfigure;
+pub(crate) mod equal_stamps;
+pub(crate) mod lifecycle;
+pub(crate) mod links;
+pub(crate) mod metrics;
+pub(crate) mod only_publisher;
+pub(crate) mod parameter_events;
+pub(crate) mod qos;
+pub(crate) mod recorder;
+pub(crate) mod rosgraph;
+pub(crate) mod rosout;
+pub(crate) mod rosout_ros2;
+pub(crate) mod rosout_rule;
+pub(crate) mod service_event;
+pub(crate) mod statistics;
+pub(crate) mod topic_statistics;
+
+use crate::base::time::Stamp;
+use crate::evidence::SOURCES;
+use crate::evidence::claim::{Claim, Claims, Degree, Name, SourceId, Statement};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::{Fit, Shape};
+use crate::evidence::proof::{Findings, Stream};
+
+/// A kind of evidence.
+pub struct Source {
+    /// Its word in JSON.
+    pub word: &'static str,
+    /// What it reads, in one line.
+    pub about: &'static str,
+    /// The layouts of the messages that it reads.
+    pub(crate) reads: &'static [(Shape, Read)],
+    /// Whether what it claims holds until it is taken back, though nobody repeats it.
+    pub(crate) lasting: bool,
+    /// What the announcement of a connection says.
+    pub(crate) announced: Option<fn(&mut SourceContext<'_>)>,
+    /// What follows from the whole mission; run in the order of the rows.
+    pub(crate) conclude: &'static [Conclude],
+}
+
+/// Draws a conclusion.
+pub(crate) type Conclude = fn(SourceId, &mut Findings<'_>);
+
+/// A source that does nothing yet, for rows to fill in.
+pub(crate) const NOTHING: Source = Source {
+    word: "",
+    about: "",
+    reads: &[],
+    lasting: false,
+    announced: None,
+    conclude: &[],
+};
+
+/// What a source hears, and where its claims go.
+pub(crate) struct SourceContext<'a> {
+    pub(crate) facts: &'a mut Claims,
+    pub(crate) stream: &'a Stream,
+    /// The stream's place among all streams.
+    pub(crate) place: usize,
+    pub(crate) source: SourceId,
+    /// When the message was recorded; `None` at an announcement.
+    pub(crate) time: Option<Stamp>,
+}
+
+impl SourceContext<'_> {
+    /// The handle on a text.
+    pub(crate) fn name(&mut self, text: &str) -> Name {
+        self.facts.name(text)
+    }
+
+    /// Takes down the sequence number of a message, which falls back when its publisher starts anew.
+    pub(crate) fn sequence(&mut self, number: u32) {
+        if let Some(time) = self.time {
+            self.facts.sequence(self.place, time, number);
+        }
+    }
+
+    /// Takes a claim down, made now, with the words it rests on.
+    pub(crate) fn claim(&mut self, claim: Claim, degree: Degree, words: impl FnOnce() -> String) {
+        let said = Statement {
+            claim,
+            degree,
+            snapshot: None,
+        };
+        self.say(said, words);
+    }
+
+    /// Takes a claim down that stands and falls with a snapshot.
+    pub(crate) fn say(&mut self, said: Statement, words: impl FnOnce() -> String) {
+        let word = SOURCES.get(self.source).map_or("", |s| s.word);
+        self.facts.explain(said, word, self.time, words);
+        self.facts.add(self.source, said, self.time);
+    }
+}
+
+/// A reader of one layout.
+pub(crate) type Read = fn(&mut SourceContext<'_>, &mut Cursor<'_>) -> cursor::Result<()>;
+
+/// The sources that read a connection's messages, with how; and whether some source knows its type by another layout.
+pub(crate) fn readers(stream: &Stream) -> (Vec<(SourceId, Read)>, bool) {
+    let mut readers = Vec::new();
+    let mut foreign = false;
+    for (id, source) in SOURCES.iter().enumerate() {
+        let fits = source
+            .reads
+            .iter()
+            .map(|(shape, read)| (read, shape.fit(&stream.connection)));
+        let known: Vec<_> = fits.filter(|(_, fit)| *fit != Fit::OtherType).collect();
+        match known.iter().find(|(_, fit)| *fit == Fit::Same) {
+            Some((read, _)) => readers.push((id, **read)),
+            None => foreign |= !known.is_empty(),
+        }
+    }
+    (readers, foreign)
+}

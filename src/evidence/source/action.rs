@@ -1,0 +1,165 @@
+//! Actions: whoever publishes status, feedback or result is the server and takes goals; whoever publishes goals is a
+//! client and takes the rest. The goals' ids name clients of ROS 1 (`/client-N-time`).
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree, Name, SourceId};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::{HEADER, Shape};
+use crate::evidence::proof::{Findings, Key};
+use std::collections::BTreeMap;
+
+/// `actionlib_msgs/GoalStatusArray`.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "actionlib_msgs/GoalStatusArray",
+    md5: "8b2b82f13216d0a8ea88bd3af735e619",
+    encoding: Encoding::Ros1,
+    fields: &[
+        ("", "Header header;GoalStatus[] status_list"),
+        HEADER,
+        ("GoalStatus", "GoalID goal_id;byte status;string text"),
+        ("GoalID", "time stamp;string id"),
+    ],
+};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let seq = payload.header()?;
+    let mut ids = Vec::new();
+    for _ in 0..payload.length(17)? {
+        payload.time()?;
+        ids.push(payload.string()?);
+        payload.u8()?;
+        payload.skip_string()?;
+    }
+    payload.finish()?;
+    heard.sequence(seq);
+    let topic = heard.stream.connection.topic.shared();
+    let Some(action) = topic.strip_suffix("/status") else {
+        return Ok(());
+    };
+    for id in ids {
+        if let Some(client) = client(id) {
+            let node = heard.name(client);
+            let goal = heard.name(&format!("{action}/goal"));
+            let words = || format!("goal `{id}` on {action}");
+            heard.claim(Claim::Publish(node, goal), Degree::Inferred, words);
+        }
+    }
+    Ok(())
+}
+
+/// The node in the id of a goal, `/client-N-time`.
+fn client(id: &str) -> Option<&str> {
+    let (rest, time) = id.rsplit_once('-')?;
+    let (node, number) = rest.rsplit_once('-')?;
+    let digits = |t: &str| !t.is_empty() && t.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+    (node.starts_with('/') && digits(number) && digits(time)).then_some(node)
+}
+
+/// What the server sends and takes, and what a client sends.
+const SENDS: [&str; 3] = ["status", "feedback", "result"];
+const TAKES: [&str; 2] = ["goal", "cancel"];
+
+/// The parts of an action that a bag holds or somebody names, by the action's name.
+type Actions = BTreeMap<String, BTreeMap<&'static str, Name>>;
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    for (action, parts) in ros1_actions(known) {
+        let mut all = BTreeMap::new();
+        for part in SENDS.iter().chain(&TAKES) {
+            all.insert(*part, known.facts.name(&format!("{action}/{part}")));
+        }
+        tie(source, known, &parts, &all);
+    }
+    for (_, parts) in ros2_actions(known) {
+        tie(source, known, &parts, &parts);
+    }
+}
+
+/// Draws all edges that follow from those known.
+fn tie(
+    source: SourceId,
+    known: &mut Findings<'_>,
+    parts: &BTreeMap<&'static str, Name>,
+    all: &BTreeMap<&'static str, Name>,
+) {
+    for (own, other) in [(&SENDS[..], &TAKES[..]), (&TAKES[..], &SENDS[..])] {
+        let mut basis: BTreeMap<Name, Key> = BTreeMap::new();
+        for topic in own.iter().filter_map(|part| parts.get(part)) {
+            for node in known.publishers(*topic).collect::<Vec<_>>() {
+                basis.entry(node).or_insert(Key::Publish(node, *topic));
+            }
+        }
+        for (node, basis) in basis {
+            for topic in own.iter().filter_map(|part| all.get(part)) {
+                if Key::Publish(node, *topic) != basis {
+                    known.like(source, Key::Publish(node, *topic), basis);
+                }
+            }
+            for topic in other.iter().filter_map(|part| all.get(part)) {
+                known.like(source, Key::Subscribe(*topic, node), basis);
+            }
+        }
+    }
+}
+
+/// Actions of ROS 1: a status topic, or a goal topic of a goal's type.
+fn ros1_actions(known: &mut Findings<'_>) -> Actions {
+    let status = known.topics_of(|kind| kind == "actionlib_msgs/GoalStatusArray");
+    let goals = known.topics_of(|kind| kind.ends_with("ActionGoal"));
+    let mut actions = Actions::new();
+    for (topic, part) in status
+        .iter()
+        .map(|t| (t, "/status"))
+        .chain(goals.iter().map(|t| (t, "/goal")))
+    {
+        if let Some(action) = known.text(*topic).strip_suffix(part) {
+            actions.insert(action.to_owned(), BTreeMap::new());
+        }
+    }
+    for (action, parts) in &mut actions {
+        for part in SENDS.iter().chain(&TAKES) {
+            parts.extend(
+                known
+                    .facts
+                    .known(&format!("{action}/{part}"))
+                    .map(|t| (*part, t)),
+            );
+        }
+    }
+    actions
+}
+
+/// Actions of ROS 2: a status or feedback topic below `_action`.
+fn ros2_actions(known: &mut Findings<'_>) -> Actions {
+    let mut actions = Actions::new();
+    for topic in known
+        .topics_of(|kind| kind.contains("/action/") || kind == "action_msgs/msg/GoalStatusArray")
+    {
+        if let Some((action, part)) = known.text(topic).rsplit_once("/_action/")
+            && let Some(part) = SENDS.iter().find(|p| **p == part)
+        {
+            actions
+                .entry(action.to_owned())
+                .or_default()
+                .insert(part, topic);
+        }
+    }
+    actions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_id_of_a_goal_names_its_client() {
+        assert_eq!(
+            client("/mission_executor-3-1795170744.123"),
+            Some("/mission_executor")
+        );
+        assert_eq!(client("/my-node-1-1.5"), Some("/my-node"));
+        assert_eq!(client("goal 7"), None);
+        assert_eq!(client("a-b-c"), None);
+    }
+}

@@ -1,0 +1,12 @@
+//! Bonds: whoever publishes a bond topic (`bond/Status`) also subscribes it.
+
+use crate::evidence::claim::SourceId;
+use crate::evidence::proof::Findings;
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    for topic in known.topics_of(|kind| matches!(kind, "bond/Status" | "bond/msg/Status")) {
+        for node in known.publishers(topic).collect::<Vec<_>>() {
+            known.subscribes_as_well(source, node, topic, topic);
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! ROS 1 connection headers and MCAP channel metadata: who publishes each message (`callerid`).
+
+use crate::evidence::claim::{Degree, SourceId};
+use crate::evidence::proof::{Findings, Key, Proof, Reliability, Validity};
+
+/// Every stream proves its topic, and its publisher as far as that is believed.
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let streams = known.streams;
+    for (at, stream) in streams.iter().enumerate() {
+        let proof = |what, when| Proof {
+            what,
+            source,
+            degree: Degree::Measured,
+            when,
+        };
+        known.prove(proof(Key::Topic(stream.topic), Validity::Messages(at)));
+        let Some(node) = stream.publisher else {
+            continue;
+        };
+        let edge = Key::Publish(node, stream.topic);
+        match stream.trust {
+            Reliability::Player if known.named_by_others(stream.topic, node) => {}
+            Reliability::Whole | Reliability::Player => {
+                known.prove(proof(edge, Validity::Messages(at)));
+            }
+            Reliability::First => known.prove(proof(edge, Validity::First(at))),
+        }
+    }
+}

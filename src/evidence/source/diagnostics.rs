@@ -1,0 +1,128 @@
+//! Diagnostics: the name of a status begins with its node (`ns/node: …`); whoever publishes `/diagnostics_agg`
+//! subscribes `/diagnostics`.
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::{HEADER, HEADER2, Shape};
+use crate::evidence::proof::{Findings, Key, Proof, Reliability, Validity};
+use std::collections::BTreeSet;
+
+/// `diagnostic_msgs/DiagnosticArray`, since `diagnostic_msgs` 1.2.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "diagnostic_msgs/DiagnosticArray",
+    md5: "60810da900de1dd6ddd437c3503511da",
+    encoding: Encoding::Ros1,
+    fields: &[
+        ("", "Header header;DiagnosticStatus[] status"),
+        HEADER,
+        STATUS,
+        VALUE,
+    ],
+};
+
+/// The same in ROS 2.
+pub(crate) const SHAPE2: Shape = Shape {
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[
+        ("", "Header header;DiagnosticStatus[] status"),
+        HEADER2,
+        STATUS,
+        VALUE,
+    ],
+    ..SHAPE
+};
+
+const STATUS: (&str, &str) = (
+    "DiagnosticStatus",
+    "byte level;string name;string message;string hardware_id;KeyValue[] values",
+);
+const VALUE: (&str, &str) = ("KeyValue", "string key;string value");
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let seq = payload.header()?;
+    let mut names = Vec::new();
+    for _ in 0..payload.length(4)? {
+        payload.u8()?;
+        names.push(payload.string()?);
+        payload.skip_string()?;
+        payload.skip_string()?;
+        for _ in 0..payload.length(8)? {
+            payload.skip_string()?;
+            payload.skip_string()?;
+        }
+    }
+    payload.finish()?;
+    heard.sequence(seq);
+    let topic = heard.stream.connection.topic.as_str();
+    if topic == "diagnostics" || topic.ends_with("/diagnostics") {
+        for name in names {
+            if let Some(node) = node(name) {
+                let node = heard.name(&format!("/{node}"));
+                let topic = heard.stream.topic;
+                let words = || format!("status `{name}`");
+                heard.claim(Claim::Reports(node, topic), Degree::Inferred, words);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The node in the name of a status, without its first slash; `None` if what stands before the colon is no name.
+fn node(name: &str) -> Option<&str> {
+    let (node, _) = name.split_once(": ")?;
+    let node = node.trim_start_matches('/');
+    let part = |p: &str| {
+        p.starts_with(|c: char| c.is_ascii_alphabetic())
+            && p.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    node.split('/').all(part).then_some(node)
+}
+
+/// Names in statuses count where the header does not tell who publishes them.
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let told = |topic| {
+        let mut of = known.streams.iter().filter(|s| s.topic == topic);
+        of.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
+    };
+    let claims = known.facts.list.iter().map(|fact| fact.claim);
+    let untold: BTreeSet<Claim> = claims
+        .filter(|claim| matches!(claim, Claim::Reports(_, topic) if !told(*topic)))
+        .collect();
+    for (fact, signs, ends) in known.claims(source) {
+        let Claim::Reports(node, topic) = fact.claim else {
+            continue;
+        };
+        if untold.contains(&fact.claim) {
+            let node = known.meant(node);
+            known.prove(Proof {
+                what: Key::Publish(node, topic),
+                source,
+                degree: Degree::Inferred,
+                when: Validity::Signs {
+                    signs,
+                    ends,
+                    held: false,
+                },
+            });
+        }
+    }
+    let [all, each] = ["/diagnostics_agg", "/diagnostics"].map(|name| known.facts.name(name));
+    for node in known.publishers(all).collect::<Vec<_>>() {
+        known.subscribes_as_well(source, node, all, each);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_names_its_node_before_the_colon() {
+        assert_eq!(node("robot1/lidar: Frequency"), Some("robot1/lidar"));
+        assert_eq!(node("CPU 0: load"), None);
+        assert_eq!(node("battery"), None);
+    }
+}

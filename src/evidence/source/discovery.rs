@@ -1,0 +1,53 @@
+//! `ros_discovery_info`: the nodes of each participant of DDS (`rmw_dds_common/msg/ParticipantEntitiesInfo`).
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree, Statement};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::Shape;
+
+/// `rmw_dds_common/msg/ParticipantEntitiesInfo`; its identifiers have 24 bytes up to Humble, 16 since.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "rmw_dds_common/ParticipantEntitiesInfo",
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[],
+};
+
+/// A node as its participant tells: namespace and name.
+type Nodes<'a> = Vec<(&'a str, &'a str)>;
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let mut long = payload.clone();
+    let (id, nodes) = nodes(payload, 16).or_else(|_| nodes(&mut long, 24))?;
+    let id = cursor::hex(id);
+    let group = heard.name(&format!("participant {id}"));
+    for (space, name) in nodes {
+        let full = format!("{}/{name}", space.trim_end_matches('/'));
+        let node = heard.name(&full);
+        let said = Statement {
+            claim: Claim::Node(node),
+            degree: Degree::Stated,
+            snapshot: Some(group),
+        };
+        heard.say(said, || format!("{full} is a node of participant {id}"));
+    }
+    heard.claim(Claim::Snapshot(group), Degree::Stated, String::new);
+    Ok(())
+}
+
+/// The participant and its nodes, if identifiers of `gid` bytes use the payload up exactly.
+fn nodes<'a>(payload: &mut Cursor<'a>, gid: usize) -> cursor::Result<(&'a [u8], Nodes<'a>)> {
+    let id = payload.bytes(gid)?;
+    let mut nodes = Vec::new();
+    for _ in 0..payload.length(16)? {
+        nodes.push((payload.string()?, payload.string()?));
+        for _ in 0..2 {
+            for _ in 0..payload.length(gid)? {
+                payload.bytes(gid)?;
+            }
+        }
+    }
+    payload.finish()?;
+    Ok((id, nodes))
+}

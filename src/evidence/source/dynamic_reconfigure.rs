@@ -1,0 +1,69 @@
+//! `dynamic_reconfigure` of ROS 1: `<node>/parameter_descriptions` and `<node>/parameter_updates` are a node's own. A
+//! caller of another name, unless the topic lies below it, runs that node as a nodelet.
+
+use crate::evidence::claim::{Degree, Name, SourceId};
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let is_config = |kind: &str| {
+        matches!(
+            kind,
+            "dynamic_reconfigure/ConfigDescription" | "dynamic_reconfigure/Config"
+        )
+    };
+    for topic in known.topics_of(is_config) {
+        let text = known.text(topic);
+        let Some(node) = TOPICS.iter().find_map(|end| text.strip_suffix(end)) else {
+            continue;
+        };
+        let pair = TOPICS.map(|end| known.facts.name(&format!("{node}{end}")));
+        let callers: Vec<_> = known.publishers(topic).collect();
+        for caller in &callers {
+            for other in pair.iter().filter(|t| **t != topic) {
+                let basis = Key::Publish(*caller, topic);
+                known.like(source, Key::Publish(*caller, *other), basis);
+            }
+            if is_nodelet(&known.text(*caller), node) {
+                let node = known.facts.name(node);
+                known.like(source, Key::Node(node), Key::Node(*caller));
+            }
+        }
+        if callers.is_empty() {
+            let node = known.facts.name(node);
+            own(source, known, node, topic);
+        }
+    }
+}
+
+/// Whether a topic of `node` that `caller` publishes tells of a nodelet, not of a part of the caller.
+fn is_nodelet(caller: &str, node: &str) -> bool {
+    caller != node && !node.starts_with(&format!("{caller}/"))
+}
+
+/// A node whose topic comes from nobody known publishes it itself.
+fn own(source: SourceId, known: &mut Findings<'_>, node: Name, topic: Name) {
+    for (at, stream) in known.streams.iter().enumerate() {
+        if stream.topic == topic {
+            known.prove(Proof {
+                what: Key::Publish(node, topic),
+                source,
+                degree: Degree::Inferred,
+                when: Validity::Messages(at),
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_nodelet_is_no_part_of_its_caller() {
+        assert!(is_nodelet("/mgr", "/decim"));
+        assert!(!is_nodelet("/move_base", "/move_base"));
+        assert!(!is_nodelet("/move_base", "/move_base/costmap"));
+    }
+}

@@ -1,0 +1,47 @@
+//! `<node>/transition_event` of ROS 2: a node is alive, and in which lifecycle state.
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::Shape;
+
+/// `lifecycle_msgs/msg/TransitionEvent`.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "lifecycle_msgs/TransitionEvent",
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[
+        (
+            "",
+            "uint64 timestamp;Transition transition;State start_state;State goal_state",
+        ),
+        ("Transition", "byte id;string label"),
+        ("State", "byte id;string label"),
+    ],
+};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    payload.u64()?;
+    payload.u8()?;
+    let transition = payload.string()?;
+    payload.u8()?;
+    let from = payload.string()?;
+    payload.u8()?;
+    let to = payload.string()?;
+    payload.finish()?;
+    let topic = heard.stream.connection.topic.shared();
+    let Some(name) = topic.strip_suffix("/transition_event") else {
+        return Ok(());
+    };
+    let node = heard.name(name);
+    let state = heard.name(to);
+    let words = || format!("{name} goes from {from} to {to} ({transition})");
+    heard.claim(
+        Claim::Publish(node, heard.stream.topic),
+        Degree::Stated,
+        words,
+    );
+    heard.claim(Claim::Lifecycle(node, state), Degree::Stated, words);
+    Ok(())
+}

@@ -1,0 +1,131 @@
+//! What roscpp logs about its connections: begin and end of subscribers (DEBUG), clients of another type, its own
+//! subscriptions; and the recorder's `Subscribing to`, which dates the moment a topic appeared.
+
+use super::SourceContext;
+use crate::evidence::claim::{Claim, Degree};
+use crate::evidence::message::cursor::{self, Cursor};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    payload.header()?;
+    payload.u8()?;
+    let name = payload.string()?;
+    let text = payload.string()?;
+    let file = payload.string()?;
+    if file.ends_with("recorder.cpp")
+        && let Some(topic) = text.strip_prefix("Subscribing to ")
+    {
+        let topic = heard.name(topic.trim());
+        heard.claim(Claim::Appears(topic), Degree::Stated, || {
+            format!("{name}: {text}")
+        });
+    }
+    let roscpp = file.rsplit('.').next() == Some("cpp");
+    if let Some(link) = link(text).filter(|_| roscpp) {
+        let node = heard.name(link.node.unwrap_or(name));
+        let topic = heard.name(link.topic);
+        let words = || format!("{name} logs: {text}");
+        if link.ends {
+            // It was there until now.
+            heard.claim(Claim::Node(node), Degree::Stated, words);
+            heard.claim(Claim::Unsubscribe(node, topic), Degree::Stated, words);
+        } else if link.node.is_some() {
+            heard.claim(Claim::Joins(node, topic), Degree::Stated, words);
+        } else {
+            heard.claim(Claim::Subscribe(node, topic), Degree::Stated, words);
+        }
+    }
+    Ok(())
+}
+
+/// A subscription that a text tells of.
+#[derive(Debug, PartialEq, Eq)]
+struct Link<'a> {
+    /// Whose; `None`: the one who logs.
+    node: Option<&'a str>,
+    topic: &'a str,
+    ends: bool,
+}
+
+/// The subscription that a text of roscpp tells of.
+fn link(text: &str) -> Option<Link<'_>> {
+    let between = |from: &str, to: &str| Some(text.split_once(from)?.1.split_once(to)?.0);
+    let caller = || between("callerid=[", "]");
+    let begins = |node, topic| Link {
+        node,
+        topic,
+        ends: false,
+    };
+    if text.starts_with("Connection: Creating TransportSubscriberLink for topic [") {
+        let topic = between("for topic [", "]")?;
+        return Some(begins(Some(caller()?), topic));
+    }
+    if text.starts_with("Connection to subscriber [callerid=[") && text.contains("dropped") {
+        let topic = between("to topic [", "]")?;
+        return Some(Link {
+            node: Some(caller()?),
+            topic,
+            ends: true,
+        });
+    }
+    if text.starts_with("Client [") && text.contains("to have datatype/md5sum") {
+        let topic = between("] wants topic ", " to have datatype")?;
+        return Some(begins(Some(between("Client [", "]")?), topic));
+    }
+    if text.starts_with("Connection to publisher [") && text.contains("dropped") {
+        return Some(begins(None, between("to topic [", "]")?));
+    }
+    if text.starts_with("Retrying connection to [") {
+        return Some(begins(None, between("for topic [", "]")?));
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_subscriber_comes_and_goes() {
+        let text = "Connection: Creating TransportSubscriberLink for topic [/scan] connected to \
+                    [callerid=[/slam] address=[TCPROS connection on port 1 to [127.0.0.1:2 on socket 3]]]";
+        let slam = |ends| {
+            Some(Link {
+                node: Some("/slam"),
+                topic: "/scan",
+                ends,
+            })
+        };
+        assert_eq!(link(text), slam(false));
+        let text =
+            "Connection to subscriber [callerid=[/slam] address=[…]] to topic [/scan] dropped";
+        assert_eq!(link(text), slam(true));
+    }
+
+    #[test]
+    fn a_client_of_another_type_wants_to_subscribe() {
+        let text = "Client [/bad] wants topic /scan to have datatype/md5sum [a/b], but our version has [c/d].";
+        assert_eq!(
+            link(text),
+            Some(Link {
+                node: Some("/bad"),
+                topic: "/scan",
+                ends: false
+            })
+        );
+    }
+
+    #[test]
+    fn a_lost_publisher_tells_of_the_loggers_own_subscription() {
+        let text = "Retrying connection to [127.0.0.1:4] for topic [/scan]";
+        assert_eq!(
+            link(text),
+            Some(Link {
+                node: None,
+                topic: "/scan",
+                ends: false
+            })
+        );
+        assert_eq!(link("Retrying connection to [127.0.0.1:4]"), None);
+        assert_eq!(link("hello"), None);
+    }
+}

@@ -1,0 +1,34 @@
+//! A topic whose messages name no publisher, and which only one node is known to publish: its messages are that node's.
+
+use crate::evidence::claim::{Degree, SourceId};
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+/// Topics that any node may publish, so that one known publisher says nothing about the others.
+const SHARED: [&str; 8] = [
+    "/tf",
+    "/tf_static",
+    "/rosout",
+    "/rosout_agg",
+    "/diagnostics",
+    "/parameter_events",
+    "/statistics",
+    "/clock",
+];
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    for (at, stream) in known.streams.iter().enumerate() {
+        if stream.publisher.is_some() || SHARED.contains(&stream.connection.topic.as_str()) {
+            continue;
+        }
+        let mut publishers = known.publishers(stream.topic);
+        if let (Some(only), None) = (publishers.next(), publishers.next()) {
+            drop(publishers);
+            known.prove(Proof {
+                what: Key::Publish(only, stream.topic),
+                source,
+                degree: Degree::Inferred,
+                when: Validity::Messages(at),
+            });
+        }
+    }
+}

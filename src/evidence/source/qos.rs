@@ -1,0 +1,134 @@
+//! Quality of service that ROS 2 recordings keep per topic (`offered_qos_profiles`): publishers at record time, and
+//! whether messages outlive their moment (`transient_local`).
+
+use serde_json::Value;
+
+use super::SourceContext;
+use crate::base::yaml;
+use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+/// What one publisher offers.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Offer {
+    reliability: &'static str,
+    durability: &'static str,
+    history: String,
+}
+
+/// Whether a topic's messages are kept for those who come late.
+pub(crate) fn is_transient_local(text: &str) -> bool {
+    let offers = offers(text);
+    !offers.is_empty() && offers.iter().all(|o| o.durability == "transient_local")
+}
+
+/// Keeps the topic's quality of service in short words: `reliable transient_local depth 1`.
+pub(crate) fn announced(heard: &mut SourceContext<'_>) {
+    let Some(text) = heard.stream.connection.qos.clone() else {
+        return;
+    };
+    let mut offers = offers(&text);
+    offers.sort();
+    let same = offers.chunk_by(|a, b| a == b).map(|same| {
+        let times = if same.len() > 1 {
+            format!("{} × ", same.len())
+        } else {
+            String::new()
+        };
+        let Offer {
+            reliability,
+            durability,
+            history,
+        } = &same[0];
+        format!("{times}{reliability} {durability} {history}")
+    });
+    let words = same.collect::<Vec<_>>().join(", ");
+    if !words.is_empty() {
+        let (topic, quality) = (heard.stream.topic, heard.name(&words));
+        heard.claim(Claim::Quality(topic, quality), Degree::Declared, || {
+            format!("offered as {words}")
+        });
+    }
+}
+
+/// A topic with an offer is declared, even if it never carries a message.
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    for fact in known.facts.list.clone() {
+        if let Claim::Quality(topic, _) = fact.claim
+            && fact.source == source
+        {
+            known.prove(Proof {
+                what: Key::Topic(topic),
+                source,
+                degree: Degree::Declared,
+                when: Validity::Whole,
+            });
+        }
+    }
+}
+
+/// The offers in a text of YAML; none if it is no list of them.
+fn offers(text: &str) -> Vec<Offer> {
+    match yaml::parse(text) {
+        Ok(Value::Array(list)) => list.iter().filter_map(offer).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// One offer; values are words since rosbag2 version 9, numbers of rmw before.
+fn offer(value: &Value) -> Option<Offer> {
+    let value = value.as_object()?;
+    let word = |key, words: [&'static str; 5]| match value.get(key) {
+        Some(Value::Number(n)) => n
+            .as_u64()
+            .and_then(|n| words.get(usize::try_from(n).ok()?))
+            .copied(),
+        Some(Value::String(text)) => words.into_iter().find(|w| w == text),
+        _ => None,
+    };
+    let unknown = "unknown";
+    let reliability = [
+        "system_default",
+        "reliable",
+        "best_effort",
+        unknown,
+        "best_available",
+    ];
+    let durability = [
+        "system_default",
+        "transient_local",
+        "volatile",
+        unknown,
+        "best_available",
+    ];
+    let history = ["system_default", "keep_last", "keep_all", unknown, unknown];
+    let depth = value.get("depth").and_then(Value::as_u64).unwrap_or(0);
+    Some(Offer {
+        reliability: word("reliability", reliability)?,
+        durability: word("durability", durability)?,
+        history: match word("history", history)? {
+            "keep_last" => format!("depth {depth}"),
+            other => other.to_owned(),
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_words_mean_the_same() {
+        let numbers = "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 1\n  deadline:\n    sec: 9223372036\n    nsec: 854775807\n";
+        let words = "- history: keep_last\n  depth: 10\n  reliability: reliable\n  durability: transient_local\n";
+        assert_eq!(offers(numbers), offers(words));
+        assert!(is_transient_local(numbers));
+        assert_eq!(offers(numbers)[0].history, "depth 10");
+    }
+
+    #[test]
+    fn what_is_no_list_of_offers_offers_nothing() {
+        assert!(offers("").is_empty() && offers("a: b").is_empty() && offers("- 5").is_empty());
+        assert!(!is_transient_local(""));
+    }
+}

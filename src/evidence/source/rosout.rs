@@ -1,0 +1,116 @@
+//! Log records of ROS 1: a node is alive, and the topics it names as its own.
+//!
+//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy tells itself by the `.py` of
+//! the file that logged.
+
+use std::collections::BTreeSet;
+
+use super::SourceContext;
+use crate::base::time::Stamp;
+use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let seq = payload.header()?;
+    payload.u8()?;
+    let name = payload.string()?;
+    let message = payload.string()?;
+    let file = payload.string()?;
+    payload.skip_string()?;
+    payload.u32()?;
+    let count = payload.length(4)?;
+    let topics = (0..count)
+        .map(|_| payload.string())
+        .collect::<cursor::Result<Vec<_>>>()?;
+    payload.finish()?;
+    heard.sequence(seq);
+    if name.is_empty() {
+        return Ok(());
+    }
+    let node = heard.name(name);
+    heard.claim(Claim::Node(node), Degree::Stated, || {
+        format!("{name} logs: {message}")
+    });
+    let log = heard.stream.topic;
+    if heard.stream.connection.topic.as_str() == "/rosout" {
+        heard.claim(Claim::Publish(node, log), Degree::Stated, || {
+            format!("{name} logs: {message}")
+        });
+        if let Some(publisher) = heard.stream.publisher.filter(|p| *p != node) {
+            heard.claim(Claim::Carries(publisher, node), Degree::Stated, String::new);
+        }
+    }
+    // The list is whole: what is in an earlier one and not in this one is no longer the node's.
+    let list = heard.name(&format!("topics of {name}"));
+    let rospy = file.rsplit('.').next() == Some("py");
+    for topic in topics {
+        let words = || format!("{name} logs with {topic} in its list of topics: {message}");
+        let topic = heard.name(topic);
+        let claim = if rospy {
+            Claim::Lists(node, topic)
+        } else {
+            Claim::Publish(node, topic)
+        };
+        heard.say(
+            Statement {
+                claim,
+                degree: Degree::Stated,
+                snapshot: Some(list),
+            },
+            words,
+        );
+    }
+    heard.claim(Claim::Snapshot(list), Degree::Stated, String::new);
+    Ok(())
+}
+
+/// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
+/// subscription. If nobody is known to publish it, a recorder of all topics knows whether somebody advertises it.
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let advertised = advertised(known);
+    for (fact, signs, ends) in known.claims(source) {
+        let Claim::Lists(node, topic) = fact.claim else {
+            continue;
+        };
+        let own = known.publishers(topic).any(|p| p == node);
+        let others = known.publishers(topic).any(|p| p != node);
+        let silent = advertised.as_ref().is_some_and(|all| !all.contains(&topic));
+        let what = match (own, others || silent) {
+            (true, _) => Key::Publish(node, topic),
+            (false, true) => Key::Subscribe(topic, node),
+            (false, false) => continue,
+        };
+        known.prove(Proof {
+            what,
+            source,
+            degree: Degree::Stated,
+            when: Validity::Signs {
+                signs,
+                ends,
+                held: false,
+            },
+        });
+    }
+}
+
+/// Every topic that a recorder of all topics has seen advertised; `None` if none tells. Such a recorder goes on to
+/// subscribe long after its start; one that was given names does not.
+fn advertised(known: &mut Findings<'_>) -> Option<BTreeSet<Name>> {
+    let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
+    let mut seen: Option<(Stamp, Stamp)> = None;
+    for fact in known.facts.list.clone() {
+        if let Claim::Appears(topic) = fact.claim {
+            topics.insert(topic);
+            for time in known.times(&fact) {
+                let (first, last) = seen.unwrap_or((time, time));
+                seen = Some((first.min(time), last.max(time)));
+            }
+        }
+    }
+    let all = seen.is_some_and(|(first, last)| last.since(first) > LATE_NS);
+    all.then_some(topics)
+}
+
+/// A recorder subscribes the topics that it was told by name sooner than this.
+const LATE_NS: i64 = 5_000_000_000;

@@ -1,0 +1,100 @@
+//! Log records of ROS 2: a node is alive. Dots stand for slashes; the loggers of a node's parts are folded into it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::{Shape, TIME2};
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+/// `rcl_interfaces/msg/Log`.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "rcl_interfaces/Log",
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[
+        (
+            "",
+            "Time stamp;byte level;string name;string msg;string file;string function;uint32 line",
+        ),
+        TIME2,
+    ],
+};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    payload.time()?;
+    payload.u8()?;
+    let name = payload.string()?;
+    let message = payload.string()?;
+    payload.skip_string()?;
+    payload.skip_string()?;
+    payload.u32()?;
+    payload.finish()?;
+    if name.is_empty() {
+        return Ok(());
+    }
+    let text = format!("/{}", name.trim_start_matches('/').replace('.', "/"));
+    let node = heard.name(&text);
+    let topic = heard.stream.topic;
+    heard.claim(Claim::Logger(node, topic), Degree::Stated, || {
+        format!("logger {name}: {message}")
+    });
+    Ok(())
+}
+
+/// Parts of ROS 2 itself that log below the name of the node they work for.
+const PARTS: [&str; 5] = [
+    "rclcpp",
+    "rcl",
+    "rclcpp_action",
+    "rclcpp_lifecycle",
+    "tf2_ros",
+];
+
+/// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let claims = known.claims(source);
+    let loggers = claims
+        .iter()
+        .filter_map(|(fact, signs, _)| match fact.claim {
+            Claim::Logger(name, topic) => Some((known.text(name), topic, signs.clone())),
+            _ => None,
+        });
+    let mut loggers: Vec<_> = loggers.collect();
+    loggers.sort_by(|a, b| a.0.cmp(&b.0));
+    let mut nodes: BTreeSet<Arc<str>> = known.nodes().iter().map(|n| known.text(*n)).collect();
+    for (logger, topic, signs) in loggers {
+        let node = owner(&logger, &nodes);
+        nodes.insert(node.into());
+        let what = Key::Publish(known.facts.name(node), topic);
+        let held = known.lasts(&signs);
+        known.prove(Proof {
+            what,
+            source,
+            degree: Degree::Stated,
+            when: Validity::Signs {
+                signs,
+                ends: Vec::new(),
+                held,
+            },
+        });
+    }
+}
+
+/// The node that a logger belongs to. Shorter names come first, so that a part finds its node.
+fn owner<'a>(logger: &'a str, nodes: &BTreeSet<Arc<str>>) -> &'a str {
+    let mut above = logger;
+    while !above.is_empty() {
+        if nodes.contains(above) {
+            return above;
+        }
+        above = &above[..above.rfind('/').unwrap_or(0)];
+    }
+    match logger.rsplit_once('/') {
+        Some((node, part)) if !node.is_empty() && PARTS.contains(&part) => node,
+        _ => logger,
+    }
+}

@@ -1,0 +1,45 @@
+//! Service introspection (`<service>/_service_event`): requests and replies of a service, and how many clients it has.
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::Shape;
+
+/// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, whatever follows.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "*_Event",
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[],
+};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let kind = payload.u8()?;
+    payload.time()?;
+    let client = payload.bytes(16)?;
+    payload.i64()?;
+    let topic = heard.stream.connection.topic.shared();
+    let Some(service) = topic.strip_suffix("/_service_event") else {
+        return Ok(());
+    };
+    let word = match kind {
+        0 => "request sent",
+        1 => "request received",
+        2 => "reply sent",
+        3 => "reply received",
+        _ => return Err(payload.wrong("a kind of event")),
+    };
+    let client = cursor::hex(client);
+    let of = heard.stream.topic;
+    let (client_name, kind) = (heard.name(&client), heard.name(word));
+    let words = || format!("{service}: {word}, client {client}");
+    heard.claim(Claim::Topic(of), Degree::Measured, words);
+    heard.claim(
+        Claim::Client(of, client_name),
+        Degree::Measured,
+        String::new,
+    );
+    heard.claim(Claim::Called(of, kind), Degree::Measured, String::new);
+    Ok(())
+}

@@ -1,0 +1,42 @@
+//! `/statistics` of ROS 1: who publishes a topic to whom, counted by the middleware itself.
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::Shape;
+
+/// `rosgraph_msgs/TopicStatistics`.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "rosgraph_msgs/TopicStatistics",
+    md5: "10152ed868c5097a5e2e4a89d7daa710",
+    encoding: Encoding::Ros1,
+    fields: &[(
+        "",
+        "string topic;string node_pub;string node_sub;time window_start;time window_stop;int32 delivered_msgs;\
+         int32 dropped_msgs;int32 traffic;duration period_mean;duration period_stddev;duration period_max;\
+         duration stamp_age_mean;duration stamp_age_stddev;duration stamp_age_max",
+    )],
+};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let topic = payload.string()?;
+    let publisher = payload.string()?;
+    let subscriber = payload.string()?;
+    payload.time()?;
+    payload.time()?;
+    let delivered = payload.i32()?;
+    payload.bytes(2 * 4 + 6 * 8)?;
+    payload.finish()?;
+    let words = || format!("{publisher} → {topic} → {subscriber}: {delivered} messages delivered");
+    let of = heard.name(topic);
+    if !publisher.is_empty() {
+        let node = heard.name(publisher);
+        heard.claim(Claim::Publish(node, of), Degree::Measured, words);
+    }
+    if !subscriber.is_empty() {
+        let node = heard.name(subscriber);
+        heard.claim(Claim::Subscribe(node, of), Degree::Measured, words);
+    }
+    Ok(())
+}

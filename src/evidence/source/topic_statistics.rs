@@ -1,0 +1,58 @@
+//! `/topic_statistics` of graph-monitor: which node publishes or receives a topic of ROS 2, measured in its middleware.
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::evidence::claim::{Claim, Degree};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::definition::{Shape, TIME2};
+
+/// `rosgraph_monitor_msgs/msg/TopicStatistics`.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "rosgraph_monitor_msgs/TopicStatistics",
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[
+        ("", "Time timestamp;TopicStatistic[] statistics"),
+        (
+            "TopicStatistic",
+            "byte statistic_type;string node_name;string topic_name;int32 window_count;Duration mean;Duration min;\
+             Duration max",
+        ),
+        ("Duration", "int32 sec;uint32 nanosec"),
+        TIME2,
+    ],
+};
+
+/// The kind of statistic that a publisher takes; all others are a subscriber's.
+const PUBLISHED_PERIOD: u8 = 0;
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    payload.time()?;
+    let mut all = Vec::new();
+    for _ in 0..payload.length(37)? {
+        let kind = payload.u8()?;
+        let (node, topic, count) = (payload.string()?, payload.string()?, payload.i32()?);
+        for _ in 0..3 {
+            payload.time()?;
+        }
+        all.push((kind, node, topic, count));
+    }
+    payload.finish()?;
+    for (kind, node, topic, count) in all {
+        let (name, of) = (heard.name(node), heard.name(topic));
+        let (verb, claim) = match kind {
+            PUBLISHED_PERIOD => ("publishes", Claim::Publish(name, of)),
+            _ => ("receives", Claim::Subscribe(name, of)),
+        };
+        // A statistic over no message says no more than that the endpoint is there.
+        let degree = if count > 0 {
+            Degree::Measured
+        } else {
+            Degree::Stated
+        };
+        heard.claim(claim, degree, || {
+            format!("{node} {verb} {topic}: {count} messages counted")
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,258 @@
+//! All log times of a mission in little memory: sorted blocks, written to an unnamed file once they grow large.
+//!
+//! Times arrive in any order and are given back sorted, so that the order of messages in a file never matters.
+
+mod block;
+mod merge;
+
+use std::collections::BTreeMap;
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+
+use tempfile::SpooledTempFile;
+
+use crate::base::time::Stamp;
+
+pub use merge::Timed;
+
+/// Stamps per block: enough to make a block's head (32 bytes) not matter, few enough to sort in the cache.
+const BLOCK: usize = 1024;
+/// Bytes of encoded blocks kept in memory (8 to 20 million stamps) before they go to a file.
+const IN_MEMORY: usize = 16 << 20;
+/// Stamps not yet in a block, of all series together (8 MB), before all of them are put into blocks.
+const MOST_OPEN: usize = 1 << 19;
+const DAY: i64 = 86_400_000_000_000;
+
+/// One sequence of times: 0...
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SeriesId(pub u32);
+
+/// An encoded run of stamps and where it lies.
+#[derive(Clone, Debug)]
+struct Block {
+    first: Stamp,
+    last: Stamp,
+    at: u64,
+    bytes: u32,
+    count: u32,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Series {
+    open: Vec<(Stamp, u32)>,
+    blocks: Vec<Block>,
+    count: u64,
+    /// Whether some message came without its size.
+    size_unknown: bool,
+    bounds: Option<(Stamp, Stamp)>,
+}
+
+/// Any number of sequences of times, each message with its size where that is known.
+#[derive(Debug)]
+pub struct Stamps {
+    series: Vec<Series>,
+    spool: SpooledTempFile,
+    written: u64,
+    open: usize,
+    /// Messages per day since 1970.
+    days: BTreeMap<i64, u64>,
+    failed: Option<io::Error>,
+}
+
+impl Default for Stamps {
+    fn default() -> Self {
+        Self {
+            series: Vec::new(),
+            spool: SpooledTempFile::new(IN_MEMORY),
+            written: 0,
+            open: 0,
+            days: BTreeMap::new(),
+            failed: None,
+        }
+    }
+}
+
+impl Stamps {
+    /// A new, empty sequence.
+    pub fn series(&mut self) -> SeriesId {
+        self.series.push(Series::default());
+        SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
+    }
+
+    /// Adds times; `sizes`, if given, is as long as `stamps`. A sequence that was never made takes nothing.
+    pub fn add(&mut self, id: SeriesId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let Some(series) = self.series.get_mut(id.0 as usize) else {
+            return;
+        };
+        let sizes = sizes.filter(|s| s.len() == stamps.len());
+        series.size_unknown |= sizes.is_none() && !stamps.is_empty();
+        for (at, stamp) in stamps.iter().enumerate() {
+            let size = sizes.map_or(0, |s| s[at]);
+            series.open.push((*stamp, size));
+            if series.open.len() == BLOCK {
+                self.open = self.open.saturating_sub(BLOCK - 1);
+                close(series, &mut self.spool, &mut self.written, &mut self.days)
+                    .unwrap_or_else(|e| self.failed = Some(e));
+            } else {
+                self.open += 1;
+            }
+        }
+        series.count += stamps.len() as u64;
+        if self.open > MOST_OPEN {
+            self.close_all();
+        }
+    }
+
+    /// Puts all that came so far into blocks.
+    fn close_all(&mut self) {
+        for series in &mut self.series {
+            close(series, &mut self.spool, &mut self.written, &mut self.days)
+                .unwrap_or_else(|e| self.failed = Some(e));
+        }
+        self.open = 0;
+    }
+
+    /// Ends the taking in.
+    ///
+    /// # Errors
+    /// If times could not be written to the unnamed file.
+    pub fn finish(&mut self) -> io::Result<()> {
+        self.close_all();
+        for series in &mut self.series {
+            series.blocks.sort_by_key(|b| (b.first, b.last, b.at));
+        }
+        self.failed.take().map_or(Ok(()), Err)
+    }
+
+    /// How many times a sequence holds.
+    pub fn count(&self, id: SeriesId) -> u64 {
+        self.get(id).map_or(0, |s| s.count)
+    }
+
+    /// The first and last time of a sequence, as far as they are in blocks.
+    pub fn bounds(&self, id: SeriesId) -> Option<(Stamp, Stamp)> {
+        self.get(id).and_then(|s| s.bounds)
+    }
+
+    /// Whether every message of a sequence came with its size.
+    pub fn sized(&self, id: SeriesId) -> bool {
+        self.get(id).is_some_and(|s| !s.size_unknown)
+    }
+
+    /// Messages per day since 1970, as far as they are in blocks.
+    pub fn days(&self) -> &BTreeMap<i64, u64> {
+        &self.days
+    }
+
+    /// All times of one sequence, sorted.
+    ///
+    /// # Errors
+    /// If the unnamed file cannot be read.
+    pub fn times(&mut self, id: SeriesId) -> io::Result<Vec<Stamp>> {
+        let mut times = Vec::new();
+        self.merge(&[id], |timed| times.push(timed.time))?;
+        Ok(times)
+    }
+
+    fn get(&self, id: SeriesId) -> Option<&Series> {
+        self.series.get(id.0 as usize)
+    }
+
+    fn load(&mut self, block: &Block) -> io::Result<Vec<(Stamp, u32)>> {
+        let mut bytes = vec![0; block.bytes as usize];
+        self.spool.seek(SeekFrom::Start(block.at))?;
+        self.spool.read_exact(&mut bytes)?;
+        Ok(block::decode(&bytes, block.count as usize))
+    }
+}
+
+/// Sorts and writes the open stamps of a series.
+fn close(
+    series: &mut Series,
+    spool: &mut SpooledTempFile,
+    written: &mut u64,
+    days: &mut BTreeMap<i64, u64>,
+) -> io::Result<()> {
+    let mut open = std::mem::take(&mut series.open);
+    if !open.is_sorted() {
+        open.sort_unstable();
+    }
+    let (Some(first), Some(last)) = (open.first(), open.last()) else {
+        return Ok(());
+    };
+    let (first, last) = (first.0, last.0);
+    for run in open.chunk_by(|a, b| a.0.0.div_euclid(DAY) == b.0.0.div_euclid(DAY)) {
+        *days.entry(run[0].0.0.div_euclid(DAY)).or_default() += run.len() as u64;
+    }
+    let bytes = block::encode(&open);
+    series.blocks.push(Block {
+        first,
+        last,
+        at: *written,
+        bytes: u32::try_from(bytes.len()).unwrap_or(u32::MAX),
+        count: u32::try_from(open.len()).unwrap_or(u32::MAX),
+    });
+    let (from, to) = series.bounds.unwrap_or((first, last));
+    series.bounds = Some((from.min(first), to.max(last)));
+    spool.seek(SeekFrom::Start(*written))?;
+    spool.write_all(&bytes)?;
+    *written += bytes.len() as u64;
+    open.clear();
+    series.open = open;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stamps(times: impl IntoIterator<Item = i64>) -> Vec<Stamp> {
+        times.into_iter().map(Stamp).collect()
+    }
+
+    #[test]
+    fn any_order_comes_back_sorted() {
+        let mut all = Stamps::default();
+        let id = all.series();
+        for part in [5000..9000, 0..3000, 2500..5000] {
+            all.add(id, &stamps(part), None);
+        }
+        all.finish().unwrap();
+        let mut expected: Vec<i64> = (0..9000).chain(2500..3000).collect();
+        expected.sort_unstable();
+        assert_eq!(all.times(id).unwrap(), stamps(expected));
+        assert_eq!(all.count(id), 9500);
+        assert_eq!(all.bounds(id), Some((Stamp(0), Stamp(8999))));
+    }
+
+    #[test]
+    fn the_whole_range_of_time_is_kept() {
+        let mut all = Stamps::default();
+        let id = all.series();
+        let odd = [i64::MAX, 0, i64::MIN, -1];
+        all.add(id, &stamps(odd), Some(&[1, u32::MAX, 3, 4]));
+        all.finish().unwrap();
+        let mut seen = Vec::new();
+        all.merge(&[id], |t| seen.push((t.time.0, t.size))).unwrap();
+        assert_eq!(seen, [(i64::MIN, 3), (-1, 4), (0, u32::MAX), (i64::MAX, 1)]);
+        assert!(all.sized(id));
+    }
+
+    #[test]
+    fn many_stamps_leave_memory_and_come_back() {
+        let mut all = Stamps::default();
+        let ids: Vec<_> = (0..3).map(|_| all.series()).collect();
+        // Far apart, so that each takes many bytes.
+        for (n, id) in (0..1_500_000).zip(ids.iter().cycle()) {
+            all.add(*id, &[Stamp(n << 42)], None);
+        }
+        all.finish().unwrap();
+        assert!(all.spool.is_rolled() || all.written <= IN_MEMORY as u64);
+        let mut next = 0;
+        all.merge(&ids, |t| {
+            assert_eq!(t.time, Stamp(next << 42));
+            next += 1;
+        })
+        .unwrap();
+        assert_eq!(next, 1_500_000);
+    }
+}

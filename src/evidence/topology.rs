@@ -1,0 +1,174 @@
+//! What the user knows and the bag hides: nodes and edges from a file. It adds, and never overwrites what was measured.
+//!
+//! Read are the research prototype's CSV, a YAML form of ours, DOT saved by `rqt_graph`, and launch files: XML of ROS 1
+//! and ROS 2, YAML of ROS 2.
+
+mod csv;
+mod dot;
+mod launch;
+mod tree;
+mod yaml;
+
+use std::fs;
+use std::path::Path;
+
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind};
+
+/// An element by its names.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Element {
+    /// A node.
+    Node(String),
+    /// A topic.
+    Topic(String),
+    /// A node and a topic that it publishes.
+    Publish(String, String),
+    /// A node and a topic that it subscribes.
+    Subscribe(String, String),
+}
+
+/// One thing that a file says.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Entry {
+    /// What there is.
+    pub element: Element,
+    /// From when, in nanoseconds after the mission's start; `None`: from the start.
+    pub from_ns: Option<i64>,
+    /// Until when; `None`: to the end.
+    pub to_ns: Option<i64>,
+    /// Whether it only declares what should run (a launch file) and does not state what did.
+    pub declared: bool,
+    /// The file's own name and the line, for those who ask why: `robot.csv line 3`.
+    pub place: String,
+}
+
+/// All that a file says, sorted, and what in it could not be used.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Topology {
+    /// Nodes and edges.
+    pub entries: Vec<Entry>,
+    /// What could not be used: includes that were not found, nodes without a name.
+    pub notices: Vec<Notice>,
+}
+
+/// The longest file that is read, in bytes.
+const LONGEST: u64 = 16 << 20;
+
+/// Reads a file of any of the forms, told apart by its name's ending and its content.
+///
+/// # Errors
+/// [`Error::BadFile`] with the line that is wrong, and for launch files in Python, which would have to be run.
+pub fn read(path: &Path) -> Result<Topology> {
+    let text = text(path)?;
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let mut topology = match ending.as_deref().unwrap_or_default() {
+        "csv" => csv::read(path, &text)?,
+        "dot" | "gv" => dot::read(path, &text)?,
+        "launch" | "xml" => launch::read(path, &tree::of_xml(path, &text)?)?,
+        "yaml" | "yml" => match tree::of_yaml(path, &text)? {
+            Some(tree) => launch::read(path, &tree)?,
+            None => yaml::read(path, &text)?,
+        },
+        "py" => return Err(python(path)),
+        _ => {
+            let reason = "unknown form of topology".to_owned();
+            return Err(bad(
+                path,
+                0,
+                reason,
+                "name it .csv, .yaml, .dot, .launch or .xml",
+            ));
+        }
+    };
+    topology.entries.sort();
+    topology.entries.dedup();
+    Ok(topology)
+}
+
+/// Reads several files into one topology.
+///
+/// # Errors
+/// As [`read`], for the first file that is wrong.
+pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
+    let mut all = Topology::default();
+    for path in paths {
+        let one = read(path.as_ref())?;
+        all.entries.extend(one.entries);
+        all.notices.extend(one.notices);
+    }
+    Ok(all)
+}
+
+/// The text of a file that is not too long.
+fn text(path: &Path) -> Result<String> {
+    let length = fs::metadata(path).map_err(Error::io("read", path))?.len();
+    if length > LONGEST {
+        return Err(bad(
+            path,
+            0,
+            format!("{length} bytes are too many"),
+            "give a smaller file",
+        ));
+    }
+    let bytes = fs::read(path).map_err(Error::io("read", path))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+fn python(path: &Path) -> Error {
+    bad(
+        path,
+        0,
+        "a launch file in Python is a program, and programs are not run".to_owned(),
+        "give the launch file in XML or YAML, or list nodes and topics in a .yaml or .csv",
+    )
+}
+
+/// A file of the user's that says something wrong.
+fn bad(path: &Path, line: usize, reason: String, hint: &str) -> Error {
+    Error::BadFile {
+        path: path.to_owned(),
+        line,
+        reason,
+        hint: hint.to_owned(),
+    }
+}
+
+/// Where an entry stands; without a line where there is none.
+fn place(path: &Path, line: usize) -> String {
+    let name = crate::bag::file_name(path);
+    match line {
+        0 => name,
+        _ => format!("{name} line {line}"),
+    }
+}
+
+/// A name with the slash that resolved names begin with.
+fn resolved(name: &str) -> String {
+    format!("/{}", name.trim().trim_start_matches('/'))
+}
+
+/// Something in a file that is not used.
+fn unused(path: &Path, line: usize, what: &str) -> Notice {
+    Notice::new(NoticeKind::Note, format!("{}: {what}", place(path, line)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn launch_files_in_python_are_refused_with_a_way_out() {
+        let error = python(Path::new("robot.launch.py"));
+        assert!(error.to_string().contains("not run"), "{error}");
+        assert!(error.hint().contains("XML or YAML"));
+    }
+
+    #[test]
+    fn an_unknown_ending_names_the_known_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("robot.txt");
+        fs::write(&path, "hello").unwrap();
+        assert!(read(&path).unwrap_err().hint().contains(".yaml"));
+    }
+}

@@ -1,0 +1,146 @@
+//! The research prototype's table: `Name,Publish,Subscribe,Node-start,Node-end`, lists as Python writes them, times in
+//! seconds after the bag's start.
+
+use std::path::Path;
+
+use super::{Element, Entry, Topology, bad, place, resolved};
+use crate::base::csv;
+use crate::base::error::Result;
+
+const COLUMNS: [&str; 5] = ["Name", "Publish", "Subscribe", "Node-start", "Node-end"];
+const HINT: &str =
+    "columns are Name,Publish,Subscribe,Node-start,Node-end; lists look like \"['/a', '/b']\"";
+
+pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
+    let wrong = |line, reason| bad(path, line, reason, HINT);
+    let rows = csv::records(text).map_err(|(line, reason)| wrong(line, reason))?;
+    let mut rows = rows.into_iter();
+    let (_, head) = rows.next().unwrap_or_default();
+    let column = |name: &str| {
+        head.iter()
+            .position(|h| h.trim().eq_ignore_ascii_case(name))
+    };
+    let columns = COLUMNS.map(column);
+    if columns[0].is_none() {
+        return Err(wrong(1, "there is no column `Name`".to_owned()));
+    }
+    let mut topology = Topology::default();
+    for (line, row) in rows {
+        let [name, publish, subscribe, start, end] =
+            columns.map(|at| at.and_then(|at| row.get(at)).map_or("", |cell| cell.trim()));
+        if name.is_empty() {
+            return Err(wrong(line, "the name is empty".to_owned()));
+        }
+        let list =
+            |cell| python_list(cell).ok_or_else(|| wrong(line, format!("`{cell}` is no list")));
+        let time = |cell| {
+            seconds(cell).ok_or_else(|| wrong(line, format!("`{cell}` is no number of seconds")))
+        };
+        let (from_ns, to_ns) = (time(start)?, time(end)?);
+        if let (Some(from), Some(to)) = (from_ns, to_ns)
+            && to < from
+        {
+            return Err(wrong(
+                line,
+                format!("the end {end} lies before the start {start}"),
+            ));
+        }
+        let mut add = |element| {
+            topology.entries.push(Entry {
+                element,
+                from_ns,
+                to_ns,
+                declared: false,
+                place: place(path, line),
+            });
+        };
+        let node = resolved(name);
+        add(Element::Node(node.clone()));
+        for topic in list(publish)? {
+            add(Element::Publish(node.clone(), resolved(&topic)));
+        }
+        for topic in list(subscribe)? {
+            add(Element::Subscribe(node.clone(), resolved(&topic)));
+        }
+    }
+    Ok(topology)
+}
+
+/// Seconds as nanoseconds; nothing where the cell is empty.
+#[expect(clippy::option_option, reason = "an empty cell is no error")]
+fn seconds(cell: &str) -> Option<Option<i64>> {
+    if ["", "nan", "None"].contains(&cell) {
+        return Some(None);
+    }
+    let seconds: f64 = cell.parse().ok()?;
+    let sound = seconds.is_finite() && seconds.abs() < 9e9;
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "less than 2^63 by the check above"
+    )]
+    sound.then_some(Some((seconds * 1e9) as i64))
+}
+
+/// The strings in `['a', "b"]`; an empty cell is an empty list, one bare name a list of one.
+fn python_list(cell: &str) -> Option<Vec<String>> {
+    if ["", "nan", "None"].contains(&cell) {
+        return Some(Vec::new());
+    }
+    let opened = cell.strip_prefix(['[', '(', '{']);
+    let Some(inside) = opened.and_then(|rest| rest.strip_suffix([']', ')', '}'])) else {
+        return (!cell.contains(['[', ']', '\'', '"', ','])).then(|| vec![cell.to_owned()]);
+    };
+    let mut list = Vec::new();
+    let mut rest = inside.trim();
+    while !rest.is_empty() {
+        let quote = rest.chars().next().filter(|c| ['\'', '"'].contains(c))?;
+        let (text, after) = rest[1..].split_once(quote)?;
+        list.push(text.to_owned());
+        rest = after.trim_start();
+        rest = match rest.strip_prefix(',') {
+            Some(next) => next.trim_start(),
+            None if rest.is_empty() => rest,
+            None => return None,
+        };
+    }
+    Some(list)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Topology> {
+        read(Path::new("robot.csv"), text)
+    }
+
+    #[test]
+    fn a_row_is_a_node_with_its_topics_and_its_life() {
+        let text = "Name,Publish,Subscribe,Node-start,Node-end\nplanner,\"['/plan', '/path']\",['/map'],10,20.5\n";
+        let entries = parse(text).unwrap().entries;
+        assert_eq!(entries.len(), 4);
+        assert_eq!(
+            entries[2].element,
+            Element::Publish("/planner".into(), "/path".into())
+        );
+        assert_eq!(
+            (entries[0].from_ns, entries[0].to_ns),
+            (Some(10_000_000_000), Some(20_500_000_000))
+        );
+        assert_eq!(entries[3].place, "robot.csv line 2");
+    }
+
+    #[test]
+    fn a_bad_line_is_named() {
+        for (row, told) in [
+            ("a,[/x],,,", "is no list"),
+            ("a,,,soon,", "no number"),
+            (",,,,", "empty"),
+            ("a,,,5,4", "before"),
+        ] {
+            let text = format!("Name,Publish,Subscribe,Node-start,Node-end\nok,,,,\n{row}\n");
+            let error = parse(&text).unwrap_err().to_string();
+            assert!(error.contains("line 3") && error.contains(told), "{error}");
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Every output format behind one trait. Adding a format is one file below `export/` and one row in [`FORMATS`].
+
+mod animated_svg;
+mod apng;
+pub mod check;
+mod csv;
+pub mod dot;
+pub(crate) mod encoder;
+mod gif;
+pub mod html;
+mod json;
+pub mod mermaid;
+pub mod options;
+pub mod palette;
+mod pdf;
+mod png;
+pub mod report;
+pub mod run;
+pub mod sequence;
+pub mod sink;
+mod svg;
+pub mod target;
+mod video;
+
+use std::path::{Path, PathBuf};
+
+use crate::base::error::{Error, Result};
+
+pub(crate) use encoder::{AtOnce, Single, single};
+pub use encoder::{Encoder, Format, Frame, Needs, Start, Written};
+use sequence::Sequence;
+use target::Target;
+
+/// All formats.
+pub const FORMATS: &[Format] = &[
+    Format {
+        word: "gif",
+        what: "the animation",
+        is_limited: true,
+        is_strip: false,
+        check: None,
+        start: gif::start,
+    },
+    Format {
+        word: "apng",
+        what: "the animation, lossless for all but antialiasing",
+        is_limited: true,
+        is_strip: false,
+        check: None,
+        start: apng::start,
+    },
+    Format {
+        word: "svg",
+        what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: start_svg,
+    },
+    Format {
+        word: "png",
+        what: "an image per window with `{n}`, the only window, or a film strip",
+        is_limited: false,
+        is_strip: true,
+        check: None,
+        start: png::start_png,
+    },
+    Format {
+        word: "webp",
+        what: "an image per window with `{n}`, the only window, or a film strip",
+        is_limited: false,
+        is_strip: true,
+        check: None,
+        start: png::start_webp,
+    },
+    Format {
+        word: "dot",
+        what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: dot::encoder::start,
+    },
+    Format {
+        word: "mmd",
+        what: "a Mermaid flow chart, per window with `{n}`, else the union",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: mermaid::encoder::start,
+    },
+    Format {
+        word: "pdf",
+        what: "a page per window as vectors, or the `--strip`",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: pdf::start,
+    },
+    Format {
+        word: "mp4",
+        what: "a video, through `ffmpeg`",
+        is_limited: false,
+        is_strip: false,
+        check: Some(video::check),
+        start: video::start_mp4,
+    },
+    Format {
+        word: "webm",
+        what: "a video, through `ffmpeg`",
+        is_limited: false,
+        is_strip: false,
+        check: Some(video::check),
+        start: video::start_webm,
+    },
+    Format {
+        word: "html",
+        what: "one page that plays the mission, with everything in it",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: html::encoder::start,
+    },
+    Format {
+        word: "md",
+        what: "a report for a pull request or a job summary",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: report::encoder::start,
+    },
+    Format {
+        word: "json",
+        what: "the evolution as data, which can be read again",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: json::start,
+    },
+    Format {
+        word: "csv",
+        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: csv::start,
+    },
+];
+
+/// A single image of the first window, beside an animation.
+const POSTER: &Format = &Format {
+    word: "png",
+    what: "the first window as an image",
+    is_limited: false,
+    is_strip: false,
+    check: None,
+    start: png::start_poster,
+};
+
+/// Drawings where that is what is asked for, else one that moves.
+fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
+    let is_sequence = sequence.view.frames.len() > 1 && sequence.options.strip.is_none();
+    if is_sequence && !target.is_numbered() {
+        animated_svg::start(sequence, target)
+    } else {
+        svg::start(sequence, target)
+    }
+}
+
+/// One output: what and where.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// What.
+    pub format: &'static Format,
+    /// Where.
+    pub target: Target,
+}
+
+impl Output {
+    /// The poster: the first window as a PNG image.
+    pub fn poster(path: &Path) -> Self {
+        Self {
+            format: POSTER,
+            target: Target::Path(path.to_owned()),
+        }
+    }
+
+    /// Reads an output as the user writes it: `a.gif`, `f/{n}.svg`, `-`. The format is `word` if given, else the
+    /// name's extension.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a format that does not exist, and for standard output without a format.
+    pub fn parse(text: &str, word: Option<&str>) -> Result<Self> {
+        let target = Target::parse(text);
+        let word = word.map(str::to_lowercase).or_else(|| target.extension());
+        let all: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
+        let all = all.join(", ");
+        let Some(word) = word else {
+            let what = format!("`{text}` does not say its format");
+            return Err(Error::usage(what, format!("say it with `--format`: {all}")));
+        };
+        match FORMATS.iter().find(|f| f.word == word) {
+            Some(format) => Ok(Self { format, target }),
+            None => Err(Error::usage(
+                format!("unknown format `{word}`"),
+                format!("formats: {all}"),
+            )),
+        }
+    }
+}
+
+/// Checks all outputs before the inputs are read: their names, their folders, and what their formats need.
+///
+/// # Errors
+/// As [`check::check`], and [`Error::Output`] where a format lacks something.
+pub fn check(outputs: &[Output], inputs: &[PathBuf]) -> Result<()> {
+    let targets: Vec<Target> = outputs.iter().map(|o| o.target.clone()).collect();
+    check::check(&targets, inputs)?;
+    outputs
+        .iter()
+        .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
+}
+
+/// Whether a sequence of this many windows needs a strip for these outputs even if none was asked for.
+pub fn needs_strip(outputs: &[Output], windows: usize) -> bool {
+    let strip = |o: &Output| o.format.is_strip && !o.target.is_numbered();
+    windows > 1 && outputs.iter().any(strip)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn word_of(text: &str, word: Option<&str>) -> Option<&'static str> {
+        Output::parse(text, word).ok().map(|o| o.format.word)
+    }
+
+    #[test]
+    fn the_name_or_the_user_says_the_format() {
+        assert_eq!(word_of("out/a.gif", None), Some("gif"));
+        assert_eq!(word_of("A.GIF", None), Some("gif"));
+        assert_eq!(word_of("-", Some("json")), Some("json"));
+        assert_eq!(word_of("a.dat", Some("svg")), Some("svg"));
+        assert_eq!(word_of("-", None), None);
+    }
+
+    #[test]
+    fn an_unknown_format_is_told_with_the_known_ones() {
+        let error = Output::parse("a.gfi", None).unwrap_err();
+        assert_eq!(error.to_string(), "unknown format `gfi`");
+        assert!(error.hint().contains("gif, apng, svg, png"));
+    }
+}

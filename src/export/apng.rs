@@ -1,0 +1,247 @@
+//! The animation as APNG: indexed colours, and only the pixels that change.
+
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::{Encoder, Frame, Needs, Written};
+use crate::base::error::{Error, Result};
+use crate::export::palette::{self, Area, Palette};
+use crate::export::sequence::Sequence;
+use crate::export::sink::Sink;
+use crate::export::target::Target;
+
+struct Apng {
+    target: Target,
+    frames: usize,
+    out: Shared,
+    animation: Option<Animation<Shared>>,
+}
+
+/// The file, shared with the writer, which does not give it back.
+#[derive(Clone)]
+struct Shared(Arc<Mutex<Sink>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut sink = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        sink.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Begins the animation.
+///
+/// # Errors
+/// [`Error::Usage`] for a name with `{n}`.
+pub(crate) fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    target.must_be_one("an animation holds all windows")?;
+    Ok(Box::new(Apng {
+        target: target.clone(),
+        frames: sequence.frame_times().len(),
+        out: Shared(Arc::new(Mutex::new(Sink::create(
+            target,
+            sequence.options.max_bytes,
+        )?))),
+        animation: None,
+    }))
+}
+
+impl Apng {
+    fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
+        Error::io("write", self.target.path())
+    }
+
+    fn begin(&self, frame: &Frame<'_>) -> Result<Animation<Shared>> {
+        let size = (frame.pixels.width, frame.pixels.height);
+        let frames = u32::try_from(self.frames).unwrap_or(u32::MAX);
+        let animation = Animation::new(self.out.clone(), size, frame.palette, frames);
+        animation.map_err(self.error())
+    }
+}
+
+impl Encoder for Apng {
+    fn needs(&self) -> Needs {
+        Needs::Indices
+    }
+
+    fn plays(&self) -> bool {
+        true
+    }
+
+    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
+        let mut animation = match self.animation.take() {
+            Some(animation) => animation,
+            None => self.begin(frame)?,
+        };
+        animation
+            .add(frame.indices, frame.frame_time.ms)
+            .map_err(self.error())?;
+        self.animation = Some(animation);
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<Written> {
+        let failed = self.error();
+        let mut written = Written::to(&self.target);
+        if let Some(animation) = self.animation.take() {
+            animation.finish().map_err(failed)?;
+            if let Some(sink) = Arc::into_inner(self.out.0) {
+                let sink = sink.into_inner().unwrap_or_else(PoisonError::into_inner);
+                written.add(sink.commit()?);
+            }
+        }
+        Ok(written)
+    }
+}
+
+/// An APNG being written. It states the number of frames in front, so equal frames are not joined.
+struct Animation<W: Write> {
+    writer: png::Writer<W>,
+    clear: u8,
+    width: usize,
+    before: Vec<u8>,
+}
+
+impl<W: Write> Animation<W> {
+    /// Begins an endless loop of `frames` frames; the palette has at most 255 colours.
+    fn new(out: W, size: (u32, u32), palette: &Palette, frames: u32) -> io::Result<Self> {
+        let mut colours = palette.bytes();
+        let clear = u8::try_from(palette.colours().len()).map_err(io::Error::other)?;
+        colours.extend([0; 3]);
+        let mut opacity = vec![255; palette.colours().len()];
+        opacity.push(0);
+        let mut encoder = png::Encoder::new(out, size.0, size.1);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_palette(colours);
+        encoder.set_trns(opacity);
+        // Indexed pixels gain nothing from filters, and `Fast` writes 27 times the bytes. The last level is slow, but
+        // few pixels change, and only it comes close to GIF.
+        encoder.set_filter(png::Filter::NoFilter);
+        encoder.set_deflate_compression(png::DeflateCompression::Level(9));
+        encoder.set_animated(frames, 0).map_err(to_io)?;
+        encoder.set_blend_op(png::BlendOp::Over).map_err(to_io)?;
+        Ok(Self {
+            writer: encoder.write_header().map_err(to_io)?,
+            clear,
+            width: usize::try_from(size.0).map_err(io::Error::other)?,
+            before: Vec::new(),
+        })
+    }
+
+    /// Shows a frame for `ms` milliseconds.
+    fn add(&mut self, indices: &[u8], ms: u32) -> io::Result<()> {
+        let (delay, parts) = delay(ms);
+        self.writer.set_frame_delay(delay, parts).map_err(to_io)?;
+        if self.before.is_empty() {
+            self.before = indices.to_vec();
+            return self.writer.write_image_data(indices).map_err(to_io);
+        }
+        let pixel = Area {
+            x: 0,
+            y: 0,
+            width: 1,
+            height: 1,
+        };
+        let area = palette::difference(&self.before, indices, self.width).unwrap_or(pixel);
+        let pixels = palette::patch(&self.before, indices, self.width, area, self.clear);
+        self.before.copy_from_slice(indices);
+        self.place(area).map_err(to_io)?;
+        self.writer.write_image_data(&pixels).map_err(to_io)
+    }
+
+    /// Says where the next pixels go.
+    fn place(&mut self, area: Area) -> Result<(), png::EncodingError> {
+        // Places inside an image whose sides are u32.
+        let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        self.writer.set_frame_position(0, 0)?;
+        self.writer
+            .set_frame_dimension(number(area.width), number(area.height))?;
+        self.writer
+            .set_frame_position(number(area.x), number(area.y))
+    }
+
+    /// Ends the file.
+    fn finish(self) -> io::Result<()> {
+        self.writer.finish().map_err(to_io)
+    }
+}
+
+/// A delay as a fraction of a second: in milliseconds, or in seconds where those are too many.
+fn delay(ms: u32) -> (u16, u16) {
+    match u16::try_from(ms) {
+        Ok(ms) => (ms, 1000),
+        Err(_) => (u16::try_from(ms / 1000).unwrap_or(u16::MAX), 1),
+    }
+}
+
+fn to_io(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        other => io::Error::other(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (u32, u32) = (40, 30);
+
+    /// A white frame with one dot of colour 1 at `x`.
+    fn dot(x: usize) -> Vec<u8> {
+        let mut frame = vec![0; 1200];
+        frame[x] = 1;
+        frame
+    }
+
+    fn written(frames: &[(Vec<u8>, u32)]) -> Vec<u8> {
+        let palette = Palette::new(vec![[255; 3], [200, 30, 30]]);
+        let mut bytes = Vec::new();
+        let count = u32::try_from(frames.len()).unwrap();
+        let mut animation = Animation::new(&mut bytes, SIZE, &palette, count).unwrap();
+        for (frame, ms) in frames {
+            animation.add(frame, *ms).unwrap();
+        }
+        animation.finish().unwrap();
+        bytes
+    }
+
+    /// What a decoder makes of it: delays in milliseconds and the place of the dot.
+    fn played(bytes: &[u8]) -> Vec<(u16, usize)> {
+        let mut reader = png::Decoder::new(io::Cursor::new(bytes))
+            .read_info()
+            .unwrap();
+        let frames = reader.info().animation_control().unwrap().num_frames;
+        let mut canvas = vec![9; 1200];
+        let mut shown = Vec::new();
+        for _ in 0..frames {
+            let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut pixels).unwrap();
+            let control = *reader.info().frame_control().unwrap();
+            let columns = control.width as usize;
+            for i in 0..columns * control.height as usize {
+                let row = control.y_offset as usize + i / columns;
+                if pixels[i] != 2 {
+                    canvas[row * 40 + control.x_offset as usize + i % columns] = pixels[i];
+                }
+            }
+            let dot = canvas.iter().position(|p| *p == 1).unwrap();
+            assert_eq!(canvas.iter().filter(|p| **p != 0).count(), 1);
+            shown.push((control.delay_num, dot));
+        }
+        shown
+    }
+
+    #[test]
+    fn every_frame_comes_back_as_it_was() {
+        let bytes = written(&[(dot(3), 500), (dot(700), 250), (dot(700), 40), (dot(9), 7)]);
+        assert_eq!(played(&bytes), [(500, 3), (250, 700), (40, 700), (7, 9)]);
+    }
+}

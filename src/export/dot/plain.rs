@@ -1,0 +1,157 @@
+//! The profile `plain`: no places, but a title and colours, so that `dot -Tpdf` makes a figure of it.
+
+use std::fmt::Write as _;
+
+use super::names::quoted;
+use super::{Drawing, line, pen_width, rate};
+use crate::draw::style::Body;
+use crate::graph::State;
+use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, Shown};
+
+const FONTS: &str = "Helvetica,Arial,sans-serif";
+
+pub(super) fn write(drawing: &Drawing<'_>, frame: &Frame, title: &str) -> String {
+    let style = &drawing.style;
+    let mut out = format!(
+        "digraph graphname {{\n graph [rankdir=LR, compound=true, label={}, labelloc=t, fontsize=16, fontcolor=\"{}\", fontname=\"{FONTS}\"];\n",
+        quoted(title),
+        style.page.text,
+    );
+    let _ = writeln!(
+        out,
+        " node [fontsize=12, fontname=\"{FONTS}\", style=filled, height=0.4];"
+    );
+    let _ = writeln!(
+        out,
+        " edge [fontsize=10, fontname=\"{FONTS}\", color=\"{}\", fontcolor=\"{}\", arrowsize=0.7];",
+        style.edge.stroke, style.edge.text,
+    );
+    members(drawing, frame, &mut out, None, &drawing.inhabited(frame), 1);
+    for shown in &frame.arrows {
+        if let Some(arrow) = drawing.view.arrows.get(shown.id as usize) {
+            edge(drawing, &mut out, arrow, shown);
+        }
+    }
+    out.push_str("}\n");
+    out
+}
+
+/// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
+fn members(
+    drawing: &Drawing<'_>,
+    frame: &Frame,
+    out: &mut String,
+    home: Option<usize>,
+    inhabited: &[bool],
+    depth: usize,
+) {
+    let indent = " ".repeat(depth);
+    let cluster = &drawing.style.cluster;
+    for (at, space) in drawing.view.namespaces.iter().enumerate() {
+        if space.parent != home || inhabited.get(at) != Some(&true) {
+            continue;
+        }
+        let _ = writeln!(
+            out,
+            "{indent}subgraph {} {{\n{indent} graph [label={}, labeljust=l, style=\"rounded,filled\", fillcolor=\"{}\", color=\"{}\", fontcolor=\"{}\", fontsize=12];",
+            drawing.ids.namespaces[at],
+            quoted(&space.name),
+            cluster.fill,
+            cluster.stroke,
+            cluster.text,
+        );
+        members(drawing, frame, out, Some(at), inhabited, depth + 1);
+        let _ = writeln!(out, "{indent}}}");
+    }
+    for shown in &frame.items {
+        let at = shown.id as usize;
+        if let Some(item) = drawing
+            .view
+            .items
+            .get(at)
+            .filter(|item| item.cluster == home)
+        {
+            let id = &drawing.ids.items[at];
+            let _ = writeln!(out, "{indent}{id} [{}];", node(drawing, item, shown));
+        }
+    }
+}
+
+fn node(drawing: &Drawing<'_>, item: &Item, shown: &Shown) -> String {
+    let (shape, body) = look(drawing, item.kind);
+    let change = drawing.colour(shown);
+    let dead = matches!(shown.state, State::Silent | State::Declared);
+    let line = match change {
+        Some(_) if line(shown) == "dashed" => "dashed",
+        _ if dead => "dotted",
+        _ => "solid",
+    };
+    let mut out = format!(
+        "label={}, shape={shape}, style=\"filled,{line}\", fillcolor=\"{}\", fontcolor=\"{}\", color=\"{}\"",
+        quoted(&item.name),
+        body.fill,
+        body.text,
+        change.clone().unwrap_or_else(|| body.stroke.to_string()),
+    );
+    if change.is_some() {
+        out.push_str(", penwidth=3");
+    }
+    out
+}
+
+fn look<'a>(drawing: &'a Drawing<'_>, kind: ItemKind) -> (&'static str, &'a Body) {
+    match kind {
+        ItemKind::Node => ("ellipse", &drawing.style.node),
+        ItemKind::Namespace => ("box3d", &drawing.style.node),
+        ItemKind::Topic => ("box", &drawing.style.topic),
+        ItemKind::Group => ("box3d", &drawing.style.topic),
+    }
+}
+
+fn edge(drawing: &Drawing<'_>, out: &mut String, arrow: &Arrow, shown: &Shown) {
+    let ids = &drawing.ids.items;
+    let (Some(from), Some(to)) = (ids.get(arrow.from as usize), ids.get(arrow.to as usize)) else {
+        return;
+    };
+    let _ = write!(
+        out,
+        " {from} -> {to} [style={}, penwidth={}",
+        line(shown),
+        pen_width(shown)
+    );
+    let label = match (&arrow.kind, rate(shown)) {
+        (ArrowKind::Direct(topic), None) => topic.to_string(),
+        (ArrowKind::Direct(topic), Some(rate)) => format!("{topic}\n{rate}"),
+        (_, rate) => rate.unwrap_or_default(),
+    };
+    if !label.is_empty() {
+        let _ = write!(out, ", label={}", quoted(&label));
+    }
+    if let Some(colour) = drawing.colour(shown) {
+        let _ = write!(out, ", color=\"{colour}\", fontcolor=\"{colour}\"");
+    }
+    out.push_str("];\n");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::style::Style;
+    use crate::view::testing::mission;
+    use crate::view::{ViewOptions, view};
+
+    #[test]
+    fn it_has_a_title_and_colours_and_no_places() {
+        let mission = mission(&["/ns/a>/t@3", "/ns/a>/t@3 /b</t"]);
+        let (view, _) = view(&mission, &ViewOptions::default());
+        let drawing = Drawing::new(&mission, &view, Style::builtin("light").unwrap());
+        let file = drawing.write(&view.frames[1], "a \"bag\", window 2 of 2");
+        assert!(file.contains(r#"label="a \"bag\", window 2 of 2""#) && !file.contains("pos="));
+        let added = format!(
+            "color=\"{}\", penwidth=3",
+            drawing.style.added.color.to_string().to_lowercase()
+        );
+        assert_eq!(file.matches(&added).count(), 1);
+        assert!(file.contains(r#"n___ns__a -> t___t [style=solid, penwidth=2, label="3.0 Hz"];"#));
+    }
+}

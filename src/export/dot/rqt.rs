@@ -1,0 +1,386 @@
+//! The profile `rqt`: as `rqt_graph` saves a graph, with every place in the file, so that it loads there.
+//!
+//! Its loader reads points with y up from `pos`, `bb` and `lp`, inches from `width` and `height`, and draws nothing
+//! that has no place. It breaks on edge labels without `lp`, widths that are no whole numbers, edges at both ends,
+//! clusters without a `graph` statement and colours in parts; all edges stand at the top level, or they come twice.
+
+use std::fmt::Write as _;
+
+use super::names::{escape_name, quoted};
+use super::{Drawing, line, pen_width, rate};
+use crate::base::geometry::{Point, Rect};
+use crate::graph::Element;
+use crate::layout::{Layout, Route};
+use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, Mark, Shown};
+
+/// The length of an arrow's head in points, as Graphviz draws it.
+const HEAD: f64 = 10.0;
+/// From a cluster's corner to its title.
+const MARGIN: f64 = 8.0;
+const POINTS_PER_INCH: f64 = 72.0;
+
+/// The label of an arrow in a window, lines parted by a newline: the topic between two nodes, and the rate.
+pub(super) fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
+    let rate = rate(shown);
+    match (&arrow.kind, rate) {
+        (ArrowKind::Direct(topic), Some(rate)) => Some(format!("{topic}\n{rate}")),
+        (ArrowKind::Direct(topic), None) => Some(topic.to_string()),
+        (ArrowKind::Publish | ArrowKind::Subscribe, rate) => rate,
+    }
+}
+
+pub(super) fn write(drawing: &Drawing<'_>, layout: &Layout, frame: &Frame) -> String {
+    let writer = Writer {
+        drawing,
+        layout,
+        frame,
+    };
+    let size = layout.size;
+    let bb = format!("0,0,{},{}", number(size.w), number(size.h));
+    let mut out = format!(
+        "digraph graphname {{\n graph [bb=\"{bb}\", compound=true, rank=same, rankdir=LR, ranksep=0.2];\n"
+    );
+    writer.members(&mut out, None, &drawing.inhabited(frame), 1);
+    for shown in &frame.arrows {
+        writer.arrow(&mut out, shown);
+    }
+    out.push_str("}\n");
+    out
+}
+
+struct Writer<'a> {
+    drawing: &'a Drawing<'a>,
+    layout: &'a Layout,
+    frame: &'a Frame,
+}
+
+impl Writer<'_> {
+    /// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
+    fn members(&self, out: &mut String, home: Option<usize>, inhabited: &[bool], depth: usize) {
+        let indent = " ".repeat(depth);
+        for (at, space) in self.drawing.view.namespaces.iter().enumerate() {
+            if space.parent != home || inhabited.get(at) != Some(&true) {
+                continue;
+            }
+            let id = &self.drawing.ids.namespaces[at];
+            let _ = writeln!(
+                out,
+                "{indent}subgraph {id} {{ graph [{}];",
+                self.cluster(at, &space.name)
+            );
+            self.members(out, Some(at), inhabited, depth + 1);
+            let _ = writeln!(out, "{indent}}}");
+        }
+        for shown in &self.frame.items {
+            let at = shown.id as usize;
+            let (Some(item), Some(place)) =
+                (self.drawing.view.items.get(at), self.layout.boxes.get(at))
+            else {
+                continue;
+            };
+            if item.cluster == home {
+                let id = &self.drawing.ids.items[at];
+                let _ = writeln!(out, "{indent}{id} [{}];", self.item(item, *place, shown));
+            }
+        }
+    }
+
+    fn cluster(&self, at: usize, name: &str) -> String {
+        let place = self.layout.clusters.get(at).copied().unwrap_or_default();
+        let title = self
+            .drawing
+            .plan
+            .clusters
+            .get(at)
+            .map(|c| c.title)
+            .unwrap_or_default();
+        let (top, bottom) = (self.up(place.y), self.up(place.bottom()));
+        let bb = [place.x, bottom, place.right(), top].map(number).join(",");
+        let lp = Point::new(
+            place.x + MARGIN + title.w / 2.0,
+            place.y + MARGIN / 2.0 + title.h / 2.0,
+        );
+        format!(
+            "bb=\"{bb}\", label={}, lp=\"{}\"",
+            quoted(name),
+            self.point(lp)
+        )
+    }
+
+    fn item(&self, item: &Item, place: Rect, shown: &Shown) -> String {
+        let (shape, url) = match item.kind {
+            ItemKind::Node | ItemKind::Namespace => ("ellipse", item.name.to_string()),
+            ItemKind::Topic => ("box", format!("topic:{}", item.name)),
+            ItemKind::Group => ("box3d", format!("topic:{}", item.name)),
+        };
+        let mut out = format!(
+            "label={}, shape={shape}, pos=\"{}\", width={}, height={}, tooltip={}, URL=\"{}\"",
+            quoted(&item.name),
+            self.point(place.centre()),
+            inches(place.w),
+            inches(place.h),
+            quoted(&url),
+            escape_name(&url),
+        );
+        if let Some(colour) = self.drawing.colour(shown) {
+            let _ = write!(out, ", color=\"{colour}\"");
+        }
+        self.extras(&mut out, shown, &item.members);
+        out
+    }
+
+    fn arrow(&self, out: &mut String, shown: &Shown) {
+        let at = shown.id as usize;
+        let (Some(arrow), Some(route)) =
+            (self.drawing.view.arrows.get(at), self.layout.routes.get(at))
+        else {
+            return;
+        };
+        let ids = &self.drawing.ids.items;
+        let (Some(from), Some(to)) = (ids.get(arrow.from as usize), ids.get(arrow.to as usize))
+        else {
+            return;
+        };
+        let _ = write!(
+            out,
+            " {from} -> {to} [pos=\"{}\", penwidth={}, style={}",
+            self.spline(arrow, route),
+            pen_width(shown),
+            line(shown),
+        );
+        if let Some(label) = label(arrow, shown) {
+            let lp = route.label.unwrap_or_else(|| middle(route));
+            let _ = write!(out, ", label={}, lp=\"{}\"", quoted(&label), self.point(lp));
+        }
+        if let ArrowKind::Direct(topic) = &arrow.kind {
+            let _ = write!(out, ", URL=\"{}\"", escape_name(&format!("topic:{topic}")));
+        }
+        if let Some(colour) = self.drawing.colour(shown) {
+            let _ = write!(out, ", color=\"{colour}\"");
+        }
+        let _ = write!(out, ", edgetooltip={}", quoted(&self.tooltip(arrow, shown)));
+        self.extras(out, shown, &arrow.members);
+        out.push_str("];\n");
+    }
+
+    /// Our own attributes, which loaders pass over.
+    fn extras(&self, out: &mut String, shown: &Shown, members: &[Element]) {
+        let (state, degree) = (shown.state.word(), shown.degree.word());
+        let _ = write!(out, ", state={state}, degree={degree}");
+        let evidence = self.drawing.evidence(members);
+        if !evidence.is_empty() {
+            let _ = write!(out, ", evidence={}", quoted(&evidence));
+        }
+        if let Some(hz) = shown.hz.filter(|hz| hz.is_finite()) {
+            let _ = write!(out, ", rate=\"{}\"", number(hz));
+        }
+        if let Some(count) = shown.count {
+            let _ = write!(out, ", count={count}");
+        }
+        if let Some(mark) = shown.mark {
+            let _ = write!(out, ", change={}", mark.class());
+        }
+    }
+
+    /// In the manner of `rqt_graph`'s own: a line per value. Qt takes it for rich text.
+    fn tooltip(&self, arrow: &Arrow, shown: &Shown) -> String {
+        let name = |at: u32| {
+            let item = self.drawing.view.items.get(at as usize);
+            rich(item.map_or("", |item| item.name.as_ref()))
+        };
+        let (from, to) = (name(arrow.from), name(arrow.to));
+        let mut out = match &arrow.kind {
+            ArrowKind::Publish => format!("Publisher\nnode_name: {from}\ntopic_name: {to}"),
+            ArrowKind::Subscribe => format!("Subscription\nnode_name: {to}\ntopic_name: {from}"),
+            ArrowKind::Direct(topic) => {
+                format!(
+                    "Publisher\nnode_name: {from}\ntopic_name: {}\nsubscriber: {to}",
+                    rich(topic)
+                )
+            }
+        };
+        if let Some(qos) = self.qos(&arrow.members) {
+            let _ = write!(out, "\nQoS settings\n- {}", rich(&qos));
+        }
+        if let Some(rate) = rate(shown) {
+            let _ = write!(out, "\nrate: {rate}");
+        }
+        if let (Some(count), true) = (shown.count, shown.mark != Some(Mark::Removed)) {
+            let _ = write!(out, "\nmessages: {count}");
+        }
+        let evidence = self.drawing.evidence(&arrow.members);
+        if !evidence.is_empty() {
+            let _ = write!(out, "\nevidence: {evidence}");
+        }
+        out
+    }
+
+    /// The quality of service of a single topic.
+    fn qos(&self, members: &[Element]) -> Option<String> {
+        let all = self.drawing.elements;
+        let edge = match members.first()? {
+            Element::Publish(id) => all.publishes.get(*id as usize)?,
+            Element::Subscribe(id) => all.subscribes.get(*id as usize)?,
+            _ => return None,
+        };
+        let qos = all.topics.get(edge.topic as usize)?.qos.as_ref()?;
+        (!qos.is_empty()).then(|| qos.to_string())
+    }
+
+    /// The way of an edge: its tip, then its curve up to the arrow's head.
+    fn spline(&self, arrow: &Arrow, route: &Route) -> String {
+        let place = |at: u32| {
+            self.layout
+                .boxes
+                .get(at as usize)
+                .map(Rect::centre)
+                .unwrap_or_default()
+        };
+        let mut points = vec![route.start];
+        points.extend(route.curves.iter().flatten());
+        if points.len() < 4 {
+            let (from, to) = (place(arrow.from), place(arrow.to));
+            points = vec![from, from, to, to];
+        }
+        let last = points.len() - 1;
+        let tip = points[last];
+        let before = points[..last]
+            .iter()
+            .rev()
+            .find(|p| distance(**p, tip) > 0.5);
+        if let Some(length) = before.map(|p| distance(*p, tip)) {
+            let before = before.copied().unwrap_or(tip);
+            let part = (HEAD / length).min(0.5);
+            let (dx, dy) = ((before.x - tip.x) * part, (before.y - tip.y) * part);
+            points[last] = Point::new(tip.x + dx, tip.y + dy);
+        }
+        let points: Vec<String> = points.iter().map(|p| self.point(*p)).collect();
+        format!("e,{} {}", self.point(tip), points.join(" "))
+    }
+
+    fn point(&self, p: Point) -> String {
+        format!("{},{}", number(p.x), number(self.up(p.y)))
+    }
+
+    fn up(&self, y: f64) -> f64 {
+        self.layout.size.h - y
+    }
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    libm::hypot(a.x - b.x, a.y - b.y)
+}
+
+/// About the middle of a route, for a label that the layout left without a place.
+fn middle(route: &Route) -> Point {
+    let mid = route.curves.get(route.curves.len() / 2);
+    mid.map_or(route.start, |[a, b, _]| {
+        Point::new(f64::midpoint(a.x, b.x), f64::midpoint(a.y, b.y))
+    })
+}
+
+/// At most two decimals; what is no number becomes 0.
+fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return "0".to_owned();
+    }
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" {
+        "0".to_owned()
+    } else {
+        text.to_owned()
+    }
+}
+
+fn inches(points: f64) -> String {
+    format!("{:.4}", points / POINTS_PER_INCH)
+}
+
+/// Text inside a tool tip that is read as HTML.
+fn rich(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::style::Style;
+    use crate::draw::text::Fonts;
+    use crate::view::testing::mission;
+    use crate::view::{Mode, ViewOptions, view};
+
+    /// The file of the last window.
+    fn file(windows: &[&str], options: &ViewOptions) -> String {
+        let mission = mission(windows);
+        let (view, _) = view(&mission, options);
+        let style = Style::builtin("light").unwrap();
+        let drawing = Drawing::new(&mission, &view, style).laid_out(&Fonts::bundled());
+        drawing.write(view.frames.last().unwrap(), "")
+    }
+
+    /// The line that begins with this, without indent.
+    fn line<'a>(file: &'a str, begin: &str) -> &'a str {
+        let mut lines = file.lines().map(str::trim_start);
+        lines
+            .find(|l| l.starts_with(begin))
+            .unwrap_or_else(|| panic!("{begin} in {file}"))
+    }
+
+    #[test]
+    fn nodes_and_topics_are_written_as_rqt_graph_does() {
+        let file = file(
+            &["/ns/a>/t@12.5 /b</t /a>/tf /ns/c"],
+            &ViewOptions::default(),
+        );
+        assert!(line(&file, "n___b [").contains(r#"label="/b", shape=ellipse, pos=""#));
+        assert!(line(&file, "n___b [").contains(r#"tooltip="/b", URL="__b""#));
+        assert!(line(&file, "t___t [").contains(r#"label="/t", shape=box, pos=""#));
+        assert!(line(&file, "t___t [").contains(r#"tooltip="topic:/t", URL="topic_3A__t""#));
+        assert!(line(&file, "n_n__tf [").contains(r#"label="/tf", shape=box3d"#));
+        assert!(line(&file, "subgraph cluster___ns {").contains(r#"graph [bb=""#));
+        let edge = line(&file, "n___ns__a -> t___t [");
+        assert!(
+            edge.contains(r#"penwidth=3, style=solid, label="12.5 Hz", lp=""#),
+            "{edge}"
+        );
+        assert!(!file.contains("colorR") && !file.contains("edge ["));
+    }
+
+    #[test]
+    fn a_window_shows_its_changes_and_empty_namespaces_are_left_out() {
+        let file = file(
+            &["/a>/t@1 /old/b /old/c", "/a", "/a /d"],
+            &ViewOptions::default(),
+        );
+        assert!(line(&file, "n___d [").contains("change=added") && !file.contains("cluster_"));
+        assert!(!line(&file, "n___a [").contains("color="));
+    }
+
+    #[test]
+    fn ghosts_are_dashed_and_carry_no_rate() {
+        let file = file(&["/a>/t@1", "/a"], &ViewOptions::default());
+        let edge = line(&file, "n___a -> t___t [");
+        assert!(edge.contains("style=dashed") && edge.contains("change=removed"));
+        assert!(!edge.contains("label="));
+    }
+
+    #[test]
+    fn nodes_only_names_topics_on_edges() {
+        let options = ViewOptions {
+            mode: Mode::Nodes,
+            ..ViewOptions::default()
+        };
+        let file = file(&["/a>/t@2 /b</t"], &options);
+        let edge = line(&file, "n___a -> n___b [");
+        assert!(
+            edge.contains(r#"label="/t\n2.0 Hz", lp=""#) && edge.contains(r#"URL="topic_3A__t""#)
+        );
+    }
+
+    #[test]
+    fn numbers_have_two_decimals_at_most() {
+        let all = [1.0, -0.001, 12.345, f64::NAN].map(number);
+        assert_eq!(all, ["1", "0", "12.35", "0"].map(str::to_owned));
+    }
+}

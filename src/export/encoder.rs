@@ -1,0 +1,195 @@
+//! What an output format is: an encoder that takes frames and writes bytes, and the row that names it.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use super::palette::Palette;
+use super::sequence::{FrameTime, Sequence};
+use super::sink::Sink;
+use super::target::Target;
+use crate::base::error::{Error, Result};
+use crate::draw::paint::raster::Pixels;
+use crate::draw::scene::Scene;
+
+/// What an encoder wants of every frame; each includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Needs {
+    /// No frames at all: it writes from the sequence when that is over.
+    Nothing,
+    /// The drawing.
+    Scene,
+    /// The drawing as pixels.
+    Pixels,
+    /// The pixels as places in the sequence's one palette.
+    Indices,
+}
+
+/// One frame as all encoders of its size share it.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    /// The index of its window.
+    pub index: usize,
+    /// What it shows and for how long.
+    pub frame_time: FrameTime,
+    /// The drawing.
+    pub scene: &'a Scene,
+    /// The drawing as pixels; empty unless somebody needs them.
+    pub pixels: &'a Pixels,
+    /// The palette of the whole sequence, 255 colours at most; one black unless somebody needs indices.
+    pub palette: &'a Palette,
+    /// The place in the palette of every pixel; empty unless somebody needs them.
+    pub indices: &'a [u8],
+}
+
+/// What was written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// The file as it was asked for; `-` for standard output, `{n}` for a file per window.
+    pub path: PathBuf,
+    /// How many files.
+    pub files: usize,
+    /// Their bytes in all.
+    pub bytes: u64,
+    /// What the user should know, such as what was given up to stay small; lower case, no period.
+    pub remarks: Vec<String>,
+}
+
+impl Written {
+    /// Nothing yet.
+    pub(crate) fn to(target: &Target) -> Self {
+        Self {
+            path: target.path().to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// One more file.
+    pub(crate) fn add(&mut self, bytes: u64) {
+        self.files += 1;
+        self.bytes += bytes;
+    }
+}
+
+/// What a format of single drawings does with a target.
+#[derive(Clone, Copy)]
+pub(crate) enum Single<'a> {
+    /// A file per window, or the only window.
+    Windows,
+    /// The strip in one file.
+    Strip(&'a Scene),
+}
+
+/// How a drawing format uses a target: with `{n}`, or for one window, a file per window; else the strip, if there
+/// is one and it may stand here.
+pub(crate) fn single<'a>(
+    sequence: &Sequence<'a>,
+    target: &Target,
+    strip: bool,
+) -> Result<Single<'a>> {
+    let windows = sequence.view.frames.len();
+    if target.is_numbered() {
+        return Ok(Single::Windows);
+    }
+    match sequence.strip.filter(|_| strip) {
+        Some(scene) => Ok(Single::Strip(scene)),
+        None if windows <= 1 => Ok(Single::Windows),
+        None => Err(Error::usage(
+            format!(
+                "`{}` is one file for {windows} windows",
+                target.path().display()
+            ),
+            "put `{n}` into the name for a file per window, or ask for a `--strip`",
+        )),
+    }
+}
+
+/// A format at work on one output. What it has not finished leaves no trace when it is dropped.
+pub trait Encoder: Send {
+    /// What it wants of every frame; nothing where it writes from the sequence when that is over.
+    fn needs(&self) -> Needs {
+        Needs::Nothing
+    }
+
+    /// Whether it plays: then it is given the staged frames too, not only the windows.
+    fn plays(&self) -> bool {
+        false
+    }
+
+    /// Takes the next frame. All frames have one size.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the output's path where it cannot be written.
+    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    /// Ends the output and gives it its final name.
+    ///
+    /// # Errors
+    /// As [`Encoder::frame`].
+    fn finish(self: Box<Self>) -> Result<Written>;
+}
+
+/// An output of one file that is written when the sequence is over.
+pub(crate) struct AtOnce<W> {
+    target: Target,
+    /// The text, and what the user should know of it.
+    write: W,
+}
+
+impl<'a, W: FnOnce() -> (String, Vec<String>) + Send + 'a> AtOnce<W> {
+    /// # Errors
+    /// [`Error::Usage`] for a name with `{n}`.
+    pub(crate) fn start(target: &Target, write: W) -> Result<Box<dyn Encoder + 'a>> {
+        if target.is_numbered() {
+            return Err(Error::usage(
+                format!("`{}` asks for a file per window", target.path().display()),
+                "all windows are in one file: leave `{n}` out",
+            ));
+        }
+        Ok(Box::new(Self {
+            target: target.clone(),
+            write,
+        }))
+    }
+}
+
+impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
+    fn finish(self: Box<Self>) -> Result<Written> {
+        let mut written = Written::to(&self.target);
+        let mut sink = Sink::create(&self.target, None)?;
+        let (text, remarks) = (self.write)();
+        sink.write_all(text.as_bytes()).map_err(sink.error())?;
+        written.remarks = remarks;
+        written.add(sink.commit()?);
+        Ok(written)
+    }
+}
+
+/// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
+pub type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
+
+/// An output format.
+#[derive(Debug)]
+pub struct Format {
+    /// Its extension and its word for `--format`.
+    pub word: &'static str,
+    /// What it is, for `--help` and the README.
+    pub what: &'static str,
+    /// Whether `--max-bytes` binds it.
+    pub is_limited: bool,
+    /// Whether, without `{n}`, several windows become a film strip unless one asks for another.
+    pub is_strip: bool,
+    /// What else it needs, checked before anything is read.
+    pub check: Option<fn(&Target) -> Result<()>>,
+    /// How an output begins.
+    pub start: Start,
+}
+
+impl Format {
+    /// Whether it shows the picture; the others write the graph itself, whose size no page limits.
+    pub fn is_drawn(&self) -> bool {
+        let data = ["dot", "mmd", "json", "csv", "parquet", "gexf", "graphml"];
+        !data.contains(&self.word)
+    }
+}

@@ -1,0 +1,46 @@
+//! What changed as a table of HTML, for readers without scripts, for paper, and for links into the mission.
+
+use std::fmt::Write as _;
+
+use crate::base::time::offset;
+use crate::draw::paint::svg::escape;
+use crate::draw::text::visible;
+use crate::view::{Frame, View};
+
+/// More windows with changes than this are counted.
+const MOST_ROWS: usize = 200;
+
+fn is_told(frame: &Frame) -> bool {
+    !frame.caption.is_empty()
+}
+
+/// How many windows there are, and how many of them have changes.
+pub(super) fn summary(view: &View) -> String {
+    let all = view.frames.len();
+    match view.frames.iter().filter(|f| is_told(f)).count() {
+        0 => format!("None in {all} windows."),
+        n if n > MOST_ROWS => format!("In {n} of {all} windows; the first {MOST_ROWS}:"),
+        n => format!("In {n} of {all} windows:"),
+    }
+}
+
+/// A row per window with changes: its time as a link, and what changed in words.
+pub(super) fn rows(view: &View) -> String {
+    let mut out = String::new();
+    let Some(start) = view.frames.first().map(|f| f.span.start) else {
+        return out;
+    };
+    for frame in view.frames.iter().filter(|f| is_told(f)).take(MOST_ROWS) {
+        let at = frame.span.start.since(start);
+        let millis = at / 1_000_000;
+        let secs = millis as f64 / 1e3;
+        let _ = write!(
+            out,
+            "<tr><th><a href=\"#t={secs}\">{}</a><td>",
+            offset(millis * 1_000_000)
+        );
+        escape(&mut out, &visible(&frame.caption.join("; ")));
+        out.push('\n');
+    }
+    out
+}

@@ -1,0 +1,38 @@
+//! The evolution as JSON, as it is read back by every command.
+
+use super::{Encoder, Written};
+use crate::base::error::Result;
+use crate::export::sequence::Sequence;
+use crate::export::sink::Sink;
+use crate::export::target::Target;
+use crate::mission::{self, Mission};
+
+struct Data<'a> {
+    mission: &'a Mission,
+    target: Target,
+}
+
+/// Begins the data file.
+///
+/// # Errors
+/// [`Error::Usage`] for a name with `{n}`.
+pub(crate) fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    target.must_be_one("the data of all windows is one file")?;
+    Ok(Box::new(Data {
+        mission: sequence.data,
+        target: target.clone(),
+    }))
+}
+
+impl Encoder for Data<'_> {
+    fn finish(self: Box<Self>) -> Result<Written> {
+        let mut sink = Sink::create(&self.target, None)?;
+        mission::write_json(self.mission, &mut sink).map_err(sink.error())?;
+        let mut written = Written::to(&self.target);
+        written.add(sink.commit()?);
+        Ok(written)
+    }
+}

@@ -1,0 +1,159 @@
+//! Graphs as Mermaid flow charts, which GitHub and GitLab draw inside Markdown.
+
+pub(crate) mod encoder;
+
+use std::fmt::Write as _;
+
+use crate::draw::style::Style;
+use crate::view::{ArrowKind, Frame, ItemKind, Mark, Shown, View, hertz};
+
+/// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
+pub fn chart(view: &View, style: &Style, frame: &Frame) -> String {
+    let mut out = String::from("flowchart LR\n");
+    members(view, frame, &mut out, None, 1);
+    let mut marked = String::new();
+    for (at, shown) in frame.arrows.iter().enumerate() {
+        let Some(arrow) = view.arrows.get(shown.id as usize) else {
+            continue;
+        };
+        let line = match (&arrow.kind, shown.mark) {
+            (_, Some(Mark::Removed)) => "-.->",
+            _ => "-->",
+        };
+        let topic = match &arrow.kind {
+            ArrowKind::Direct(topic) => escaped(topic),
+            _ => String::new(),
+        };
+        let label = match (topic, shown.hz.filter(|hz| *hz > 0.0)) {
+            (topic, None) => topic,
+            (topic, Some(hz)) => format!("{topic} {} Hz", hertz(hz)).trim_start().to_owned(),
+        };
+        let label = if label.is_empty() {
+            label
+        } else {
+            format!("|\"{label}\"|")
+        };
+        let _ = writeln!(out, "  i{} {line}{label} i{}", arrow.from, arrow.to);
+        if let Some(class) = shown.mark.map(Mark::class) {
+            let _ = writeln!(marked, "  linkStyle {at} stroke:{}", colour(style, class));
+        }
+    }
+    for (class, body) in [("node", &style.node), ("topic", &style.topic)] {
+        let _ = writeln!(
+            out,
+            "  classDef {class} fill:{},stroke:{},color:{}",
+            body.fill, body.stroke, body.text
+        );
+    }
+    for class in ["added", "removed", "changed"] {
+        let dash = if class == "removed" {
+            ",stroke-dasharray:6 4"
+        } else {
+            ""
+        };
+        let _ = writeln!(
+            out,
+            "  classDef {class} stroke:{},stroke-width:3px{dash}",
+            colour(style, class)
+        );
+    }
+    out + &marked
+}
+
+fn colour(style: &Style, class: &str) -> String {
+    match class {
+        "added" => style.added.color.to_string(),
+        "removed" => style.removed.color.to_string(),
+        _ => style.changed.color.to_string(),
+    }
+}
+
+/// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
+fn members(view: &View, frame: &Frame, out: &mut String, home: Option<usize>, depth: usize) {
+    let indent = "  ".repeat(depth);
+    for (at, space) in view
+        .namespaces
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| s.parent == home)
+    {
+        let mut inside = String::new();
+        members(view, frame, &mut inside, Some(at), depth + 1);
+        if !inside.is_empty() {
+            let name = escaped(&space.name);
+            let _ = write!(
+                out,
+                "{indent}subgraph s{at}[\"{name}\"]\n{inside}{indent}end\n"
+            );
+        }
+    }
+    for shown in &frame.items {
+        let Some(item) = view
+            .items
+            .get(shown.id as usize)
+            .filter(|i| i.cluster == home)
+        else {
+            continue;
+        };
+        let (open, close) = match item.kind {
+            ItemKind::Node => ("([", "])"),
+            ItemKind::Namespace | ItemKind::Group => ("[[", "]]"),
+            ItemKind::Topic => ("[", "]"),
+        };
+        let name = escaped(&item.name);
+        let _ = writeln!(
+            out,
+            "{indent}i{}{open}\"{name}\"{close}:::{}",
+            shown.id,
+            item.kind.word()
+        );
+        if let Some(class) = mark(shown) {
+            let _ = writeln!(out, "{indent}class i{} {class}", shown.id);
+        }
+    }
+}
+
+fn mark(shown: &Shown) -> Option<&'static str> {
+    shown.mark.map(Mark::class)
+}
+
+/// A name inside quotes: Mermaid's own entities for all that could end the text or begin markup.
+fn escaped(name: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars() {
+        if c.is_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | ' ' | ':') {
+            out.push(c);
+        } else {
+            let _ = write!(out, "#{};", u32::from(c));
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::testing::mission;
+    use crate::view::{ViewOptions, view};
+
+    #[test]
+    fn a_window_is_a_flow_chart() {
+        let (view, _) = view(
+            &mission(&["/n/a>/n/t@2", "/n/a>/n/t@2 /b\"</n/t"]),
+            &ViewOptions::default(),
+        );
+        let text = chart(&view, &Style::builtin("light").unwrap(), &view.frames[1]);
+        let want = [
+            "flowchart LR",
+            "  subgraph s0[\"/n\"]",
+            "    i1([\"/n/a\"]):::node",
+            "    i2[\"/n/t\"]:::topic",
+            "  end",
+            "  i0([\"/b#34;\"]):::node",
+            "  class i0 added",
+            "  i1 -->|\"2 Hz\"| i2",
+            "  i2 --> i0",
+        ];
+        assert_eq!(text.lines().take(want.len()).collect::<Vec<_>>(), want);
+    }
+}

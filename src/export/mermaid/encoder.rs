@@ -1,0 +1,72 @@
+//! Graphs as Mermaid flow charts: one per window, or their union.
+
+use std::io::Write as _;
+
+use crate::base::error::Result;
+use crate::draw::style::Style;
+use crate::export::mermaid::chart;
+use crate::export::sequence::Sequence;
+use crate::export::sink::Sink;
+use crate::export::target::Target;
+use crate::export::{Encoder, Written};
+use crate::view::union::union;
+use crate::view::{self, View};
+
+struct Charts<'a> {
+    view: &'a View,
+    style: Style,
+    target: Target,
+}
+
+/// Begins a file per window; without `{n}` one file with the single window or the union of all.
+pub(crate) fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    Ok(Box::new(Charts {
+        view: sequence.view,
+        style: Style::builtin("light")?,
+        target: target.clone(),
+    }))
+}
+
+impl Encoder for Charts<'_> {
+    fn finish(self: Box<Self>) -> Result<Written> {
+        let mut written = Written::to(&self.target);
+        let frames = &self.view.frames;
+        let mut write = |target: &Target, frame: &view::Frame| -> Result<()> {
+            let mut sink = Sink::create(target, None)?;
+            let text = chart(self.view, &self.style, frame);
+            sink.write_all(text.as_bytes()).map_err(sink.error())?;
+            written.add(sink.commit()?);
+            written
+                .remarks
+                .extend(too_large(target, frame.arrows.len(), text.len()));
+            Ok(())
+        };
+        if self.target.is_numbered() {
+            for frame in frames {
+                write(&self.target.numbered(frame.index, frames.len()), frame)?;
+            }
+        } else if let [frame] = &frames[..] {
+            write(&self.target, frame)?;
+        } else if let Some(frame) = union(self.view) {
+            write(&self.target, &frame)?;
+        }
+        Ok(written)
+    }
+}
+
+/// What Mermaid refuses to draw unless it is configured otherwise (its `maxEdges` and `maxTextSize`).
+const MOST: (usize, usize) = (500, 50_000);
+
+fn too_large(target: &Target, edges: usize, bytes: usize) -> Option<String> {
+    (edges > MOST.0 || bytes > MOST.1).then(|| {
+        format!(
+            "`{}` has {edges} edges in {bytes} characters: Mermaid draws at most {} in {}; hide or collapse something",
+            target.path().display(),
+            MOST.0,
+            MOST.1
+        )
+    })
+}

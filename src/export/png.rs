@@ -1,0 +1,192 @@
+//! Images as PNG and WebP: one per window, or the strip.
+
+use std::io::Write;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::codecs::webp::WebPEncoder;
+use image::{ExtendedColorType, ImageEncoder as _, ImageError};
+
+use super::{Encoder, Frame, Needs, Single, Written, single};
+use crate::base::error::{Error, Result};
+use crate::draw::paint::raster::Pixels;
+use crate::draw::scene::Scene;
+use crate::export::sequence::Sequence;
+use crate::export::sink::Sink;
+use crate::export::target::Target;
+
+/// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
+const PAPER: f64 = 300.0 / 96.0;
+
+/// The two formats of still images.
+#[derive(Clone, Copy)]
+enum Kind {
+    Png,
+    WebP,
+}
+
+struct Images<'a> {
+    kind: Kind,
+    sequence: &'a Sequence<'a>,
+    /// The one drawing to write, if it is no sequence.
+    strip: Option<&'a Scene>,
+    /// Whether the first window is enough.
+    is_poster: bool,
+    target: Target,
+    windows: usize,
+    written: Written,
+}
+
+/// Begins PNG images.
+///
+/// # Errors
+/// [`Error::Usage`] for several windows without `{n}`.
+pub(crate) fn start_png<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    start(sequence, target, Kind::Png)
+}
+
+/// Begins WebP images.
+///
+/// # Errors
+/// [`Error::Usage`] for several windows without `{n}`.
+pub(crate) fn start_webp<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    start(sequence, target, Kind::WebP)
+}
+
+/// Begins the PNG image of the first window.
+///
+/// # Errors
+/// [`Error::Usage`] for a name with `{n}`.
+pub(crate) fn start_poster<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    target.must_be_one("a poster is one image")?;
+    Ok(Box::new(Images {
+        kind: Kind::Png,
+        sequence,
+        strip: None,
+        is_poster: true,
+        target: target.clone(),
+        windows: 1,
+        written: Written::to(target),
+    }))
+}
+
+fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+    kind: Kind,
+) -> Result<Box<dyn Encoder + 'a>> {
+    let strip = match single(sequence, target, true)? {
+        Single::Windows => None,
+        Single::Strip(scene) => Some(scene),
+    };
+    Ok(Box::new(Images {
+        kind,
+        sequence,
+        strip,
+        is_poster: false,
+        target: target.clone(),
+        windows: sequence.view.frames.len(),
+        written: Written::to(target),
+    }))
+}
+
+impl Images<'_> {
+    fn write(&mut self, pixels: &Pixels, target: &Target) -> Result<()> {
+        let mut sink = Sink::create(target, None)?;
+        write(self.kind, pixels, &mut sink).map_err(|e| failed(e, &sink))?;
+        self.written.add(sink.commit()?);
+        Ok(())
+    }
+}
+
+impl Encoder for Images<'_> {
+    fn needs(&self) -> Needs {
+        match self.strip {
+            Some(_) => Needs::Nothing,
+            None => Needs::Pixels,
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
+        if self.is_poster && self.written.files > 0 {
+            return Ok(());
+        }
+        let target = self.target.numbered(frame.index, self.windows);
+        self.write(frame.pixels, &target)
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<Written> {
+        if let Some(scene) = self.strip {
+            let paper = if scene.width_mm.is_some() { PAPER } else { 1.0 };
+            let scale = self.sequence.options.scale * paper;
+            let pixels = self.sequence.painter.paint(scene, scale)?;
+            let target = self.target.clone();
+            self.write(&pixels, &target)?;
+        }
+        Ok(self.written)
+    }
+}
+
+/// Writes an image; without its transparency, as pictures have a background.
+fn write(kind: Kind, pixels: &Pixels, out: &mut impl Write) -> Result<(), ImageError> {
+    let rgb: Vec<u8> = pixels
+        .rgba
+        .chunks_exact(4)
+        .flat_map(|p| [p[0], p[1], p[2]])
+        .collect();
+    let (width, height) = (pixels.width, pixels.height);
+    match kind {
+        // Ten times as fast as the default for a quarter more bytes.
+        Kind::Png => PngEncoder::new_with_quality(out, CompressionType::Fast, FilterType::Adaptive)
+            .write_image(&rgb, width, height, ExtendedColorType::Rgb8),
+        Kind::WebP => {
+            WebPEncoder::new_lossless(out).write_image(&rgb, width, height, ExtendedColorType::Rgb8)
+        }
+    }
+}
+
+fn failed(error: ImageError, sink: &Sink) -> Error {
+    match error {
+        ImageError::IoError(error) => sink.error()(error),
+        other => Error::Output {
+            path: sink.path().to_owned(),
+            reason: other.to_string(),
+            hint: "try a smaller `--size`".to_owned(),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_formats_keep_every_pixel() {
+        let rgba: Vec<u8> = (0..70 * 50_u32)
+            .flat_map(|i| {
+                let [_, a, b, c] = (i * 2311).to_be_bytes();
+                [a, b, c, 255]
+            })
+            .collect();
+        let pixels = Pixels {
+            width: 70,
+            height: 50,
+            rgba,
+        };
+        for kind in [Kind::Png, Kind::WebP] {
+            let mut bytes = Vec::new();
+            write(kind, &pixels, &mut bytes).unwrap();
+            let read = image::load_from_memory(&bytes).unwrap().to_rgba8();
+            assert_eq!(read.dimensions(), (70, 50));
+            assert_eq!(read.into_raw(), pixels.rgba);
+        }
+    }
+}

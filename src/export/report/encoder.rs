@@ -1,0 +1,34 @@
+//! The report in Markdown: a file of its own, or at the end of one that a job collects.
+
+use std::fs;
+
+use crate::base::error::{Error, Result};
+use crate::export::report::report;
+use crate::export::sequence::Sequence;
+use crate::export::target::Target;
+use crate::export::{AtOnce, Encoder};
+
+/// Begins the report; it follows what is in the file already if that is the file to append to.
+///
+/// # Errors
+/// As [`AtOnce::start`]; [`Error::Io`] where the file to append to cannot be read.
+pub(crate) fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    let path = target.path();
+    let is_appended = sequence.options.append_to.as_deref() == Some(path) && path.exists();
+    let before = if is_appended {
+        fs::read_to_string(path).map_err(Error::io("read", path))?
+    } else {
+        String::new()
+    };
+    AtOnce::start(target, move || {
+        let report = report(sequence);
+        let text = match before.trim_end() {
+            "" => report,
+            before => format!("{before}\n\n{report}"),
+        };
+        (text, Vec::new())
+    })
+}

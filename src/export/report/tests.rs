@@ -1,0 +1,46 @@
+use super::*;
+use crate::view::testing::mission;
+use crate::view::{ViewOptions, view};
+
+#[test]
+fn the_first_line_says_it_all() {
+    let (view, _) = view(
+        &mission(&["/a>/t@2", "/a>/t@2 /b</t", "/a>/t@2"]),
+        &ViewOptions::default(),
+    );
+    let told = told(&total(&view.frames));
+    assert!(
+        told.contains(&"1 node appeared".to_owned())
+            && told.contains(&"1 node vanished".to_owned()),
+        "{told:?}"
+    );
+}
+
+#[test]
+fn only_what_changed_and_its_neighbours_are_drawn() {
+    let (view, _) = view(
+        &mission(&["/a>/t@2 /x>/y@1", "/a>/t@2 /b</t /x>/y@1"]),
+        &ViewOptions::default(),
+    );
+    let (frame, left_out) = graph::changed(&view).unwrap();
+    let mut names: Vec<&str> = frame
+        .items
+        .iter()
+        .map(|s| &*view.items[s.id as usize].name)
+        .collect();
+    names.sort_unstable();
+    assert_eq!(
+        (names, frame.arrows.len(), left_out),
+        (vec!["/b", "/t"], 1, 0)
+    );
+}
+
+#[test]
+fn long_tables_say_what_they_leave_out() {
+    let rows = (0..100).map(|n| format!("| {n} |\n"));
+    let text = tables::table(&["N"], rows, 60).unwrap();
+    assert!(
+        text.len() < 120 && text.ends_with("rows more left out.\n"),
+        "{text}"
+    );
+}

@@ -1,0 +1,132 @@
+//! `--max-bytes`: gives up staged frames, then size, then windows, until an animation is small enough.
+
+use super::{Progress, pass};
+use crate::base::error::{Error, Result};
+use crate::export::sequence::{Options, Sequence};
+use crate::export::{Output, Written};
+
+/// Sizes that are tried while all windows are shown.
+const SCALES: [f64; 4] = [0.85, 0.7, 0.6, 0.5];
+/// Every how many windows one is shown, at the last of these sizes.
+const EVERY: [usize; 4] = [2, 3, 5, 10];
+/// Sizes that are tried when only changes are shown.
+const LAST_SCALES: [f64; 4] = [0.5, 0.35, 0.25, 0.15];
+
+/// Writes `output` within `max_bytes` and says what was given up.
+///
+/// # Errors
+/// [`Error::Output`] where nothing is small enough; otherwise as [`super::run`].
+pub(crate) fn fit(
+    sequence: &Sequence<'_>,
+    output: &Output,
+    progress: &mut Progress<'_>,
+) -> Result<Written> {
+    for options in steps(&sequence.options) {
+        let mut smaller = sequence.clone();
+        smaller.options = options;
+        let outcome = pass(&smaller, std::slice::from_ref(output), progress)?;
+        if let Some(Some(mut written)) = outcome.into_iter().next() {
+            written
+                .remarks
+                .push(given_up(&sequence.options, &smaller.options));
+            return Ok(written);
+        }
+    }
+    let most = sequence.options.max_bytes.unwrap_or(0);
+    Err(Error::Output {
+        path: output.target.path().to_owned(),
+        reason: format!("it does not fit into {most} bytes, even small and with changes only"),
+        hint: "allow more with `--max-bytes`, or show less: a longer `--period`, `--ns-filter`"
+            .to_owned(),
+    })
+}
+
+/// What is tried, in order.
+fn steps(asked: &Options) -> Vec<Options> {
+    let plain = Options {
+        tween: 0,
+        ..asked.clone()
+    };
+    let scaled = |by: f64| Options {
+        scale: asked.scale * by,
+        ..plain.clone()
+    };
+    let mut steps = Vec::new();
+    if asked.tween > 0 {
+        steps.push(plain.clone());
+    }
+    steps.extend(SCALES.map(scaled));
+    let smallest = scaled(SCALES[SCALES.len() - 1]);
+    steps.extend(EVERY.map(|every| Options {
+        every,
+        ..smallest.clone()
+    }));
+    steps.extend(LAST_SCALES.map(|by| Options {
+        changes_only: true,
+        ..scaled(by)
+    }));
+    steps
+}
+
+/// What `now` lacks of `asked`, in words.
+fn given_up(asked: &Options, now: &Options) -> String {
+    let mut words = Vec::new();
+    if now.tween < asked.tween {
+        words.push("left out the staged frames".to_owned());
+    }
+    if now.scale < asked.scale {
+        words.push(format!(
+            "scaled to {:.0} %",
+            now.scale / asked.scale * 100.0
+        ));
+    }
+    if now.changes_only {
+        words.push("showed only the windows with a change".to_owned());
+    } else if now.every > asked.every {
+        words.push(format!(
+            "showed every {} windows one, and all with a change",
+            now.every
+        ));
+    }
+    let most = now.max_bytes.unwrap_or(0);
+    format!("{} to stay within {most} bytes", words.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn motion_goes_first_then_size_then_windows() {
+        let asked = Options {
+            tween: 4,
+            max_bytes: Some(5000),
+            ..Options::default()
+        };
+        let steps = steps(&asked);
+        assert_eq!(
+            (steps[0].tween, steps[0].scale, steps[0].every),
+            (0, 1.0, 1)
+        );
+        assert!(steps.iter().skip(1).all(|s| s.tween == 0 && s.scale < 1.0));
+        let first_left_out = steps.iter().position(|s| s.every > 1).unwrap();
+        assert!(steps[..first_left_out].iter().any(|s| s.scale <= 0.5));
+        assert!(steps[steps.len() - 1].changes_only);
+    }
+
+    #[test]
+    fn what_was_given_up_is_said() {
+        let asked = Options {
+            tween: 4,
+            max_bytes: Some(5000),
+            ..Options::default()
+        };
+        let now = Options {
+            tween: 0,
+            scale: 0.7,
+            ..asked.clone()
+        };
+        let expected = "left out the staged frames, scaled to 70 % to stay within 5000 bytes";
+        assert_eq!(given_up(&asked, &now), expected);
+    }
+}

@@ -1,0 +1,219 @@
+//! The sequence as it is shown: which window when and for how long, and what draws it.
+
+pub use super::options::Options;
+
+use crate::draw::paint::raster::Painter;
+use crate::draw::picture::{Picture, Union};
+use crate::draw::scene::Scene;
+use crate::draw::style::Style;
+use crate::draw::text::Fonts;
+use crate::mission::Mission;
+use crate::view::View;
+
+/// What draws windows.
+pub trait Drawings: Sync {
+    /// The drawing of a window, a place in [`View::frames`]; all drawings have one size. `phase` is how far the change
+    /// into it has come: 1 is the window itself.
+    fn scene(&self, window: usize, phase: f64) -> Scene;
+
+    /// What all windows have in common, for outputs that draw the graph once; `None` where there is no such thing.
+    fn graph(&self) -> Option<Whole<'_>> {
+        None
+    }
+}
+
+/// The graph of all windows, drawn once.
+#[derive(Clone, Debug)]
+pub struct Whole<'a> {
+    /// Every element.
+    pub union: Union,
+    /// How it looks.
+    pub style: &'a Style,
+    /// The title of the picture.
+    pub title: &'a str,
+}
+
+impl Drawings for Picture<'_> {
+    fn scene(&self, window: usize, phase: f64) -> Scene {
+        self.between(window, phase)
+    }
+
+    fn graph(&self) -> Option<Whole<'_>> {
+        Some(Whole {
+            union: self.union(),
+            style: self.style(),
+            title: self.title_text(),
+        })
+    }
+}
+
+/// A mission ready to be shown.
+#[derive(Clone)]
+pub struct Sequence<'a> {
+    /// The whole sequence.
+    pub mission: &'a Mission,
+    /// What data files hold: the whole sequence too, or the part that is viewed.
+    pub data: &'a Mission,
+    /// What the picture shows of it.
+    pub view: &'a View,
+    /// What draws a window.
+    pub picture: &'a dyn Drawings,
+    /// What turns a drawing into pixels.
+    pub painter: &'a Painter,
+    /// What is written with.
+    pub fonts: &'a Fonts,
+    /// The film strip, for outputs that hold all windows in one drawing.
+    pub strip: Option<&'a Scene>,
+    /// How it runs.
+    pub options: Options,
+}
+
+/// One frame of the sequence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameTime {
+    /// The window: a place in [`View::frames`].
+    pub window: usize,
+    /// How far the change into this window has come, above 0 up to 1; 1 is the window itself.
+    pub phase: f64,
+    /// How long it is shown, in milliseconds.
+    pub ms: u32,
+}
+
+impl FrameTime {
+    /// Whether it shows the window itself and not the way there.
+    pub fn is_settled(&self) -> bool {
+        self.phase >= 1.0
+    }
+}
+
+/// The longest and shortest time of a staged frame in milliseconds.
+const STAGED_MS: (u32, u32) = (20, 100);
+
+impl Sequence<'_> {
+    /// The frames in order. Time is kept: staged frames take theirs from their window, and a window that is left
+    /// out gives its time to the one before.
+    pub fn frame_times(&self) -> Vec<FrameTime> {
+        let changed: Vec<bool> = (0..self.view.frames.len())
+            .map(|k| self.view.is_changed(k))
+            .collect();
+        frame_times(&changed, &self.options)
+    }
+}
+
+fn frame_times(changed: &[bool], options: &Options) -> Vec<FrameTime> {
+    let (shortest, longest) = STAGED_MS;
+    let mut frame_times: Vec<FrameTime> = Vec::with_capacity(changed.len());
+    for (window, &changed) in changed.iter().enumerate() {
+        let hold = if changed { options.hold_changes } else { 1 };
+        let mut ms = options.frame_ms.saturating_mul(hold.max(1));
+        let stays = if options.changes_only {
+            window == 0
+        } else {
+            window % options.every.max(1) == 0
+        };
+        if let (false, false, Some(before)) = (stays, changed, frame_times.last_mut()) {
+            before.ms = before.ms.saturating_add(ms);
+            continue;
+        }
+        if changed && options.tween > 0 {
+            let each = (ms / 2 / options.tween).clamp(shortest, longest);
+            for step in 1..=options.tween {
+                let phase = f64::from(step) / f64::from(options.tween + 1);
+                frame_times.push(FrameTime {
+                    window,
+                    phase,
+                    ms: each,
+                });
+            }
+            ms = ms.saturating_sub(each * options.tween).max(shortest);
+        }
+        frame_times.push(FrameTime {
+            window,
+            phase: 1.0,
+            ms,
+        });
+    }
+    frame_times
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const QUIET_LOUD_QUIET: [bool; 3] = [false, true, false];
+
+    /// Window, phase and milliseconds of every frame.
+    fn plan(changed: &[bool], options: &Options) -> Vec<(usize, f64, u32)> {
+        let told = |s: FrameTime| (s.window, s.phase, s.ms);
+        frame_times(changed, options)
+            .into_iter()
+            .map(told)
+            .collect()
+    }
+
+    #[test]
+    fn every_window_is_shown_once() {
+        let expected = [(0, 1.0, 1000), (1, 1.0, 1000), (2, 1.0, 1000)];
+        assert_eq!(plan(&QUIET_LOUD_QUIET, &Options::default()), expected);
+    }
+
+    #[test]
+    fn staged_frames_stand_only_before_changes_and_take_no_extra_time() {
+        let options = Options {
+            tween: 3,
+            ..Options::default()
+        };
+        let expected = [
+            (0, 1.0, 1000),
+            (1, 0.25, 100),
+            (1, 0.5, 100),
+            (1, 0.75, 100),
+            (1, 1.0, 700),
+            (2, 1.0, 1000),
+        ];
+        assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
+    }
+
+    #[test]
+    fn a_change_may_be_held_longer() {
+        let options = Options {
+            hold_changes: 2,
+            ..Options::default()
+        };
+        let expected = [(0, 1.0, 1000), (1, 1.0, 2000), (2, 1.0, 1000)];
+        assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
+    }
+
+    #[test]
+    fn windows_that_are_left_out_give_their_time_away_but_changes_stay() {
+        let options = Options {
+            every: 3,
+            ..Options::default()
+        };
+        let changed = [false, false, true, false, false, false, false];
+        let expected = [
+            (0, 1.0, 2000),
+            (2, 1.0, 1000),
+            (3, 1.0, 3000),
+            (6, 1.0, 1000),
+        ];
+        assert_eq!(plan(&changed, &options), expected);
+        let options = Options {
+            changes_only: true,
+            ..Options::default()
+        };
+        assert_eq!(plan(&changed, &options), [(0, 1.0, 2000), (2, 1.0, 5000)]);
+    }
+
+    #[test]
+    fn a_hurried_film_still_shows_every_frame() {
+        let options = Options {
+            frame_ms: 20,
+            tween: 8,
+            ..Options::default()
+        };
+        let plan = plan(&[false, true], &options);
+        assert!(plan.iter().all(|frame_time| frame_time.2 >= 20));
+        assert_eq!(plan.len(), 10);
+    }
+}

@@ -1,0 +1,316 @@
+//! One file while it is written: out of sight until it is whole, gone if it never gets there.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use super::target::{Target, folder_of, is_special};
+use crate::base::error::{Error, Result};
+
+/// A file (or standard output) being written. Dropped without [`Sink::commit`], a file leaves no trace.
+#[derive(Debug)]
+pub struct Sink {
+    /// As it was asked for.
+    path: PathBuf,
+    /// What is replaced: for a symbolic link, what it points to.
+    place: PathBuf,
+    to: BufWriter<Way>,
+    written: u64,
+    limit: u64,
+}
+
+#[derive(Debug)]
+enum Way {
+    Stdout(io::Stdout),
+    /// A device or pipe that is there already: nothing to rename.
+    Special(File),
+    /// A file without a name, which even a killed process leaves no trace of.
+    #[cfg(target_os = "linux")]
+    Nameless(File),
+    /// A file with a temporary name beside the final one.
+    Named(NamedTempFile),
+    /// Held back until it is known to be within the limit.
+    Memory(Vec<u8>),
+}
+
+impl Sink {
+    /// Opens what will become `target`, whose folder is there. With `limit`, writing more bytes than that fails as
+    /// [`io::ErrorKind::FileTooLarge`].
+    ///
+    /// # Errors
+    /// Where the system refuses; the error names the final file.
+    pub fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
+        let way = match target {
+            Target::Stdout if limit.is_some() => Ok(Way::Memory(Vec::new())),
+            // An output that the user asked for on standard output is no message of the library's.
+            Target::Stdout => Ok(Way::Stdout(io::stdout())),
+            Target::Path(path) if is_special(path) => {
+                File::options().write(true).open(path).map(Way::Special)
+            }
+            Target::Path(path) => hidden(folder_of(path)),
+        };
+        let place = match target {
+            Target::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
+            Target::Stdout => "-".into(),
+        };
+        Ok(Self {
+            to: BufWriter::with_capacity(1 << 16, way.map_err(Error::io("write", target.path()))?),
+            path: target.path().to_owned(),
+            place,
+            written: 0,
+            limit: limit.unwrap_or(u64::MAX),
+        })
+    }
+
+    /// The path as it was asked for, for messages; `-` for standard output.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What turns an I/O error of this file into ours.
+    pub fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
+        Error::io("write", &self.path)
+    }
+
+    /// A handle that a child process can write to as its standard output; `None` where the bytes stay with us.
+    ///
+    /// # Errors
+    /// Where the system refuses.
+    pub fn handle(&mut self) -> Result<Option<File>> {
+        let handle = match self.to.get_ref() {
+            #[cfg(target_os = "linux")]
+            Way::Nameless(file) => Some(file.try_clone()),
+            Way::Special(file) => Some(file.try_clone()),
+            Way::Named(file) => Some(file.as_file().try_clone()),
+            Way::Stdout(_) | Way::Memory(_) => None,
+        };
+        handle.transpose().map_err(self.error())
+    }
+
+    /// Finishes the file: it appears under its final name, replacing what was there. Returns its size in bytes.
+    ///
+    /// # Errors
+    /// Where the last bytes do not fit or the name cannot be taken; then nothing is left behind.
+    pub fn commit(mut self) -> Result<u64> {
+        self.to.flush().map_err(self.error())?;
+        let Self {
+            path,
+            place,
+            to,
+            written,
+            ..
+        } = self;
+        let (way, _) = to.into_parts();
+        // A child process may have written more than went through our hands.
+        let size = way.size().unwrap_or(written);
+        publish(way, &place).map_err(Error::io("write", &path))?;
+        Ok(size)
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.written + bytes.len() as u64 > self.limit {
+            return Err(io::ErrorKind::FileTooLarge.into());
+        }
+        let count = self.to.write(bytes)?;
+        self.written += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+impl Way {
+    /// The size of what will be renamed; `None` for everything else.
+    fn size(&self) -> Option<u64> {
+        let file = match self {
+            #[cfg(target_os = "linux")]
+            Self::Nameless(file) => file,
+            Self::Named(file) => file.as_file(),
+            _ => return None,
+        };
+        file.metadata().ok().map(|m| m.len())
+    }
+}
+
+impl Write for Way {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Stdout(out) => out.write(bytes),
+            Self::Special(file) => file.write(bytes),
+            #[cfg(target_os = "linux")]
+            Self::Nameless(file) => file.write(bytes),
+            Self::Named(file) => file.write(bytes),
+            Self::Memory(held) => held.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Stdout(out) => out.flush(),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Gives what was written its final name.
+fn publish(way: Way, path: &Path) -> io::Result<()> {
+    match way {
+        Way::Stdout(_) | Way::Special(_) => Ok(()),
+        Way::Memory(held) => {
+            let mut out = io::stdout().lock();
+            out.write_all(&held)?;
+            out.flush()
+        }
+        #[cfg(target_os = "linux")]
+        Way::Nameless(file) => {
+            let named = temporary().make_in(folder_of(path), |name| link(&file, name))?;
+            named.persist(path).map(drop).map_err(|e| e.error)
+        }
+        Way::Named(file) => file.persist(path).map(drop).map_err(|e| e.error),
+    }
+}
+
+/// A file in `folder` that nobody sees: without a name where the system can do that.
+fn hidden(folder: &Path) -> io::Result<Way> {
+    #[cfg(target_os = "linux")]
+    if let Ok(file) = nameless(folder) {
+        return Ok(Way::Nameless(file));
+    }
+    temporary().tempfile_in(folder).map(Way::Named)
+}
+
+/// How temporary files are called, so that a left one tells whose it is.
+fn temporary() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".bagreel-").suffix(".part");
+    // As wide as the user's mask allows, like any new file; the default is for secrets.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder
+}
+
+#[cfg(target_os = "linux")]
+fn nameless(folder: &Path) -> io::Result<File> {
+    use rustix::fs::{Mode, OFlags, open};
+    let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
+    let file = File::from(open(folder, flags, Mode::from_raw_mode(0o666))?);
+    // Linking needs /proc; better to learn here that it is not there.
+    fs::metadata(proc_path(&file)).map(|_| file)
+}
+
+#[cfg(target_os = "linux")]
+fn proc_path(file: &File) -> String {
+    use std::os::fd::AsRawFd as _;
+    format!("/proc/self/fd/{}", file.as_raw_fd())
+}
+
+#[cfg(target_os = "linux")]
+fn link(file: &File, name: &Path) -> io::Result<()> {
+    use rustix::fs::{AtFlags, CWD, linkat};
+    Ok(linkat(
+        CWD,
+        proc_path(file),
+        CWD,
+        name,
+        AtFlags::SYMLINK_FOLLOW,
+    )?)
+}
+
+/// Whether a file can be made in `folder`; leaves nothing behind.
+pub(crate) fn probe(folder: &Path) -> io::Result<()> {
+    hidden(folder).map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder, a target in it, and what the folder holds.
+    fn place(name: &str) -> (tempfile::TempDir, Target) {
+        let folder = tempfile::tempdir().unwrap();
+        let target = Target::Path(folder.path().join(name));
+        (folder, target)
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let name = |e: io::Result<fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
+        fs::read_dir(folder).unwrap().map(name).collect()
+    }
+
+    #[test]
+    fn a_file_appears_when_it_is_whole() {
+        let (folder, target) = place("a.gif");
+        let mut sink = Sink::create(&target, None).unwrap();
+        sink.write_all(b"whole").unwrap();
+        #[cfg(target_os = "linux")]
+        assert!(names(folder.path()).is_empty());
+        assert_eq!(sink.commit().unwrap(), 5);
+        assert_eq!(names(folder.path()), ["a.gif"]);
+        assert_eq!(fs::read(target.path()).unwrap(), b"whole");
+    }
+
+    #[test]
+    fn a_file_that_is_given_up_leaves_the_old_one() {
+        let (folder, target) = place("a.gif");
+        fs::write(target.path(), "old").unwrap();
+        let mut sink = Sink::create(&target, None).unwrap();
+        sink.write_all(b"half").unwrap();
+        drop(sink);
+        assert_eq!(names(folder.path()), ["a.gif"]);
+        assert_eq!(fs::read(target.path()).unwrap(), b"old");
+    }
+
+    #[test]
+    fn a_limit_is_kept() {
+        let (folder, target) = place("a.gif");
+        let mut sink = Sink::create(&target, Some(4)).unwrap();
+        let error = sink.write_all(b"five!").unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+        drop(sink);
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_folder_that_vanishes_is_named() {
+        let (folder, target) = place("a.gif");
+        let mut sink = Sink::create(&target, None).unwrap();
+        sink.write_all(b"whole").unwrap();
+        fs::remove_dir_all(folder.path()).unwrap();
+        let error = sink.commit().unwrap_err().to_string();
+        assert!(error.contains("a.gif"), "{error}");
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_full_disk_is_told_with_the_files_name() {
+        let target = Target::parse("/dev/full");
+        let mut sink = Sink::create(&target, None).unwrap();
+        sink.write_all(b"no room").unwrap();
+        let error = sink.commit().unwrap_err();
+        assert!(error.to_string().contains("/dev/full"), "{error}");
+        assert!(!error.hint().is_empty());
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_stays_a_link() {
+        let (folder, target) = place("link.gif");
+        let real = folder.path().join("real.gif");
+        fs::write(&real, "old").unwrap();
+        std::os::unix::fs::symlink(&real, target.path()).unwrap();
+        let mut sink = Sink::create(&target, None).unwrap();
+        sink.write_all(b"new").unwrap();
+        sink.commit().unwrap();
+        assert!(fs::symlink_metadata(target.path()).unwrap().is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+    }
+}

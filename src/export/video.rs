@@ -1,0 +1,269 @@
+//! The animation as video: frames through a pipe into `ffmpeg`, where that is on the path.
+
+use std::io::{self, Read as _, Write as _};
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, Stdio};
+
+use super::{Encoder, Frame, Needs, Written};
+use crate::base::error::{Error, Result};
+use crate::draw::paint::raster::Pixels;
+use crate::export::sequence::{FrameTime, Sequence};
+use crate::export::sink::Sink;
+use crate::export::target::Target;
+
+/// The finest step of time in milliseconds; frames are repeated to fill theirs.
+const FINEST_MS: u32 = 20;
+/// Players stumble over fewer frames per second than this.
+const FEWEST_PER_SECOND: f64 = 10.0;
+
+/// A kind of video: the container and how to get it from ffmpeg.
+struct Kind {
+    arguments: &'static [&'static str],
+    /// Container arguments for a pipe, which cannot be gone back in.
+    piped: &'static [&'static str],
+}
+
+const MP4: Kind = Kind {
+    arguments: &[
+        "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4",
+    ],
+    piped: &["-movflags", "frag_keyframe+empty_moov"],
+};
+const WEBM: Kind = Kind {
+    arguments: &[
+        "-c:v",
+        "libvpx-vp9",
+        "-crf",
+        "24",
+        "-b:v",
+        "0",
+        "-row-mt",
+        "1",
+        "-pix_fmt",
+        "yuv420p",
+        "-f",
+        "webm",
+    ],
+    piped: &[],
+};
+
+/// Whether ffmpeg can be run.
+///
+/// # Errors
+/// [`Error::Output`] where it cannot, for the output at `target`.
+pub(crate) fn check(target: &Target) -> Result<()> {
+    let mut command = Command::new("ffmpeg");
+    let command = command.arg("-version").stdin(Stdio::null());
+    let run = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+    run.map(drop)
+        .map_err(|e| missing(target.path().to_owned(), &e))
+}
+
+fn missing(path: PathBuf, error: &io::Error) -> Error {
+    Error::Output {
+        path,
+        reason: format!("video needs `ffmpeg`, which cannot be run: {error}"),
+        hint: "install ffmpeg, or write `.gif` or `.apng`, which need nothing".to_owned(),
+    }
+}
+
+struct Video<'a> {
+    sequence: &'a Sequence<'a>,
+    kind: &'static Kind,
+    target: Target,
+    work: Option<Work>,
+}
+
+/// A process that ends when nobody wants it any more.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself, which is as good.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// ffmpeg at work.
+struct Work {
+    child: Process,
+    /// Where frames go.
+    pipe: Option<ChildStdin>,
+    sink: Sink,
+    /// The length of one repetition in milliseconds.
+    step: u32,
+    /// Milliseconds asked for and repetitions written so far.
+    time: (u64, u64),
+}
+
+/// Begins an MP4 file.
+///
+/// # Errors
+/// [`Error::Usage`] for a name with `{n}`.
+pub(crate) fn start_mp4<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    start(sequence, target, &MP4)
+}
+
+/// Begins a `WebM` file.
+///
+/// # Errors
+/// [`Error::Usage`] for a name with `{n}`.
+pub(crate) fn start_webm<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    start(sequence, target, &WEBM)
+}
+
+fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+    kind: &'static Kind,
+) -> Result<Box<dyn Encoder + 'a>> {
+    target.must_be_one("an animation holds all windows")?;
+    Ok(Box::new(Video {
+        sequence,
+        kind,
+        target: target.clone(),
+        work: None,
+    }))
+}
+
+impl Video<'_> {
+    fn failed(&self, reason: String) -> Error {
+        Error::Output {
+            path: self.target.path().to_owned(),
+            reason,
+            hint: "try `ffmpeg -version`; `.gif` and `.apng` need no ffmpeg".to_owned(),
+        }
+    }
+
+    fn begin(&self, pixels: &Pixels) -> Result<Work> {
+        let mut sink = Sink::create(&self.target, None)?;
+        let step = step(&self.sequence.frame_times());
+        let rate = 1000.0 / f64::from(step);
+        let mut command = Command::new("ffmpeg");
+        command.args(["-hide_banner", "-loglevel", "error", "-y"]);
+        command.args(["-f", "rawvideo", "-pix_fmt", "rgba"]);
+        command.args(["-s", &format!("{}x{}", pixels.width, pixels.height)]);
+        command.args(["-framerate", &rate.to_string(), "-i", "pipe:0", "-an"]);
+        // Most players want even sides: the picture goes on in the colour of its corner.
+        let [r, g, b] = pixels.rgba.first_chunk().copied().unwrap_or([255; 3]);
+        let pad = format!("pad=ceil(iw/2)*2:ceil(ih/2)*2:color=0x{r:02x}{g:02x}{b:02x}");
+        // The filter, unlike `-r`, shows the last frame as long as the others.
+        let fps = rate.max(FEWEST_PER_SECOND);
+        command.args(["-vf", &format!("fps={fps},{pad}")]);
+        // No version and no time in the file: the same sequence gives the same bytes.
+        command.args([
+            "-fflags",
+            "+bitexact",
+            "-flags:v",
+            "+bitexact",
+            "-map_metadata",
+            "-1",
+        ]);
+        command.args(self.kind.arguments);
+        match sink.handle()? {
+            Some(file) => {
+                command.arg("/dev/stdout").stdout(file);
+            }
+            None => {
+                command.args(self.kind.piped).arg("pipe:1");
+            }
+        }
+        // An interrupt on the terminal is ours to handle: ffmpeg ends when its pipe does.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let mut child = child.map_err(|e| missing(self.target.path().to_owned(), &e))?;
+        Ok(Work {
+            pipe: child.stdin.take(),
+            child: Process(child),
+            sink,
+            step,
+            time: (0, 0),
+        })
+    }
+
+    /// What ffmpeg says about its failure.
+    fn complaint(&self, work: &mut Work) -> Error {
+        drop(work.pipe.take());
+        let mut said = String::new();
+        if let Some(pipe) = &mut work.child.0.stderr {
+            // Whatever can be read helps; a failure to read changes nothing.
+            let _ = pipe.take(1 << 16).read_to_string(&mut said);
+        }
+        let _ = work.child.0.wait();
+        let last = said.lines().rev().find(|l| !l.trim().is_empty());
+        self.failed(format!(
+            "ffmpeg failed: {}",
+            last.unwrap_or("it did not say why")
+        ))
+    }
+}
+
+impl Encoder for Video<'_> {
+    fn needs(&self) -> Needs {
+        Needs::Pixels
+    }
+
+    fn plays(&self) -> bool {
+        true
+    }
+
+    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
+        let mut work = match self.work.take() {
+            Some(work) => work,
+            None => self.begin(frame.pixels)?,
+        };
+        if work.show(&frame.pixels.rgba, frame.frame_time.ms).is_err() {
+            return Err(self.complaint(&mut work));
+        }
+        self.work = Some(work);
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<Written> {
+        let mut written = Written::to(&self.target);
+        let Some(mut work) = self.work.take() else {
+            return Ok(written);
+        };
+        drop(work.pipe.take());
+        let status = work.child.0.wait().map_err(work.sink.error())?;
+        if !status.success() {
+            return Err(self.complaint(&mut work));
+        }
+        written.add(work.sink.commit()?);
+        Ok(written)
+    }
+}
+
+impl Work {
+    /// Shows a frame for `ms` milliseconds, rounded so that errors do not add up.
+    fn show(&mut self, rgba: &[u8], ms: u32) -> io::Result<()> {
+        let Some(pipe) = &mut self.pipe else {
+            return Ok(());
+        };
+        self.time.0 += u64::from(ms);
+        let step = u64::from(self.step);
+        let until = ((self.time.0 + step / 2) / step).max(self.time.1 + 1);
+        for _ in self.time.1..until {
+            pipe.write_all(rgba)?;
+        }
+        self.time.1 = until;
+        Ok(())
+    }
+}
+
+/// The longest step that all times are multiples of, but not below [`FINEST_MS`].
+fn step(frame_times: &[FrameTime]) -> u32 {
+    fn common(a: u32, b: u32) -> u32 {
+        if b == 0 { a } else { common(b, a % b) }
+    }
+    let step = frame_times.iter().map(|s| s.ms).fold(0, common);
+    step.max(FINEST_MS)
+}

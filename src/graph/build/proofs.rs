@@ -1,0 +1,173 @@
+//! Everything that is known about a mission: what sources conclude and the user tells, under names in order.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use super::Options;
+use super::roles::role;
+use super::values::Values;
+use crate::base::time::Stamp;
+use crate::evidence::claim::Name;
+use crate::evidence::collector::Collected;
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::times::Stamps;
+use crate::evidence::topology::{Element, Entry};
+use crate::evidence::{Degree, EvidenceLine, SOURCES};
+
+/// All proofs and stated values. Names are numbered anew in the order of their texts.
+pub(crate) fn prove(
+    collected: &mut Collected,
+    options: &Options,
+) -> io::Result<(Vec<Proof>, Values)> {
+    let start = collected.span.map_or(Stamp(0), |s| s.start);
+    let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
+    let mut known = Findings::new(&collected.streams, &mut collected.facts, end);
+    known.take_at_their_word(|source| SOURCES.get(source).is_some_and(|s| s.lasting));
+    for (row, source) in SOURCES.iter().enumerate() {
+        for conclude in source.conclude {
+            conclude(row, &mut known);
+        }
+    }
+    for entry in &options.topology.entries {
+        told(&mut known, entry, (start, end));
+    }
+    explain(&mut known, &collected.messages);
+    if let Some(error) = known.failed {
+        return Err(error);
+    }
+    let mut proofs = known.proofs;
+    let roles = if options.roles {
+        fold(&mut proofs, collected)
+    } else {
+        BTreeMap::new()
+    };
+    let new = collected.facts.renumber();
+    let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
+    for proof in &mut proofs {
+        proof.rename(&to);
+    }
+    let roles: BTreeMap<Name, Name> = roles.into_iter().map(|(a, b)| (to(a), to(b))).collect();
+    let role = |name: Name| roles.get(&name).copied().unwrap_or(name);
+    for stream in &mut collected.streams {
+        stream.topic = to(stream.topic);
+        stream.publisher = stream.publisher.map(to);
+        stream.speaker = stream.publisher.map(role);
+    }
+    let values = Values::new(&mut collected.facts, role)?;
+    Ok((proofs, values))
+}
+
+/// Puts into words what rests on no single message, for elements that somebody asked about.
+fn explain(known: &mut Findings<'_>, messages: &Stamps) {
+    let name = |name: Name| known.facts.text(name);
+    let told = |what| match what {
+        Key::Node(node) => format!("{} lives", name(node)),
+        Key::Topic(topic) => format!("{} exists", name(topic)),
+        Key::Publish(node, topic) => format!("{} publishes {}", name(node), name(topic)),
+        Key::Subscribe(topic, node) => format!("{} subscribes {}", name(node), name(topic)),
+    };
+    let mut pieces = Vec::new();
+    for proof in &known.proofs {
+        let (Some(source), true) = (
+            SOURCES.get(proof.source),
+            known.facts.is_watched(proof.what.names()),
+        ) else {
+            continue;
+        };
+        let (time, text) = match &proof.when {
+            Validity::Messages(at) | Validity::First(at) => {
+                let times = known.streams[*at].times;
+                let first = messages.bounds(times).map(|(first, _)| first);
+                (
+                    first,
+                    format!(
+                        "{}: {} messages from here on",
+                        told(proof.what),
+                        messages.count(times)
+                    ),
+                )
+            }
+            Validity::Like(other) => {
+                let text = format!(
+                    "{}: as long as {} ({})",
+                    told(proof.what),
+                    told(*other),
+                    source.about
+                );
+                (None, text)
+            }
+            Validity::Always => (None, format!("{} ({})", told(proof.what), source.about)),
+            Validity::Signs { .. } | Validity::Begins { .. } | Validity::Whole => continue,
+        };
+        pieces.push(EvidenceLine {
+            time,
+            source: source.word,
+            degree: proof.degree,
+            text,
+        });
+    }
+    known.facts.pieces.extend(pieces);
+}
+
+/// Adds what the user's file says to what is known.
+fn told(known: &mut Findings<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
+    let mut name = |text: &String| known.facts.name(text);
+    let what = match &entry.element {
+        Element::Node(node) => Key::Node(name(node)),
+        Element::Topic(topic) => Key::Topic(name(topic)),
+        Element::Publish(node, topic) => Key::Publish(name(node), name(topic)),
+        Element::Subscribe(node, topic) => Key::Subscribe(name(topic), name(node)),
+    };
+    let at = |offset: Option<i64>, without| offset.map_or(without, |ns| mission.0.plus(ns));
+    let when = match (entry.from_ns, entry.to_ns) {
+        (None, None) => Validity::Whole,
+        (from, to) => Validity::Signs {
+            signs: vec![at(from, mission.0), at(to, mission.1)],
+            ends: Vec::new(),
+            held: false,
+        },
+    };
+    let (word, degree) = if entry.declared {
+        ("launch", Degree::Declared)
+    } else {
+        ("topology", Degree::Stated)
+    };
+    let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
+    if known.facts.is_watched(what.names()) {
+        known.facts.pieces.push(EvidenceLine {
+            time: None,
+            source: word,
+            degree,
+            text: entry.place.clone(),
+        });
+    }
+    known.prove(Proof {
+        what,
+        source,
+        degree,
+        when,
+    });
+}
+
+/// Puts every node under the name of its role; tells which names changed.
+fn fold(proofs: &mut [Proof], collected: &mut Collected) -> BTreeMap<Name, Name> {
+    let mut roles = BTreeMap::new();
+    let mut to = |node: Name| {
+        let text = collected.facts.text(node);
+        match role(&text) {
+            same if *same == *text => node,
+            role => {
+                let role = collected.facts.name(role);
+                roles.insert(node, role);
+                role
+            }
+        }
+    };
+    for proof in proofs {
+        proof.what = proof.what.with_node(&mut to);
+        if let Validity::Like(other) = &mut proof.when {
+            *other = other.with_node(&mut to);
+        }
+    }
+    roles
+}

@@ -1,0 +1,212 @@
+//! Nodes that began anew under the same name: their sequence numbers fall back, or their latched messages come again
+//! after a silence of all that they publish.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use crate::base::time::Stamp;
+use crate::evidence::claim::Name;
+use crate::evidence::collector::Collected;
+use crate::evidence::proof::{Key, Proof, Reliability, Validity};
+use crate::evidence::times::SeriesId;
+
+/// A break in a node's life: its last sign before, its first one after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Restart {
+    pub(crate) death: Stamp,
+    pub(crate) birth: Stamp,
+}
+
+/// Restarts by node, sorted by time.
+pub(crate) type Restarts = BTreeMap<Name, Vec<Restart>>;
+
+/// Sequence numbers that fall back faster than this are records out of order.
+const OUT_OF_ORDER_NS: i64 = 100_000_000;
+/// A latched message after less silence than this tells of no restart.
+const SILENCE_NS: i64 = 1_000_000_000;
+/// Fewer messages than this tell no rhythm.
+const RHYTHM: usize = 5;
+/// A latched topic with more messages than this is published anew all the time.
+const LATCHED: u64 = 20;
+
+/// Finds the restarts of all nodes; `proofs` tell what others say about a node, which may lag behind its end.
+pub(crate) fn restarts(collected: &mut Collected, proofs: &[Proof]) -> io::Result<Restarts> {
+    let mut all = Restarts::new();
+    for (node, streams) in own_streams(collected) {
+        let mut breaks = fallen_back(collected, &streams)?;
+        if breaks.is_empty() && !streams.iter().any(|s| may_be_sent_again(collected, *s)) {
+            continue;
+        }
+        let times = streams
+            .iter()
+            .map(|s| collected.messages.times(collected.streams[*s].times));
+        let times = times.collect::<io::Result<Vec<_>>>()?;
+        breaks.extend(sent_again(collected, &streams, &times));
+        let breaks = narrowed(breaks);
+        if !breaks.is_empty() {
+            let mut signs: Vec<Stamp> = times.concat();
+            signs.extend(said_of(node, proofs));
+            signs.sort_unstable();
+            let found = breaks
+                .iter()
+                .filter_map(|(from, to)| widest_gap(&signs, *from, *to));
+            all.insert(node, found.collect());
+        }
+    }
+    Ok(all)
+}
+
+/// The streams of each publisher that is believed.
+fn own_streams(collected: &Collected) -> BTreeMap<Name, Vec<usize>> {
+    let mut of: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+    for (at, stream) in collected.streams.iter().enumerate() {
+        if let Some(node) = stream
+            .speaker
+            .filter(|_| stream.trust == Reliability::Whole)
+        {
+            of.entry(node).or_default().push(at);
+        }
+    }
+    of
+}
+
+/// When somebody said something of a node.
+fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
+    let of_node = proofs.iter().filter(move |proof| match proof.what {
+        Key::Node(name) | Key::Publish(name, _) | Key::Subscribe(_, name) => name == node,
+        Key::Topic(_) => false,
+    });
+    of_node
+        .flat_map(|proof| match &proof.when {
+            Validity::Signs { signs, .. } | Validity::Begins { signs, .. } => &signs[..],
+            _ => &[],
+        })
+        .copied()
+}
+
+/// Stretches of time in which a sequence number of these streams falls back.
+fn fallen_back(collected: &mut Collected, streams: &[usize]) -> io::Result<Vec<(Stamp, Stamp)>> {
+    let mut topics: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
+    for stream in streams {
+        if let Some(id) = collected.facts.sequences.get(stream) {
+            let topic = collected.streams[*stream].topic;
+            topics.entry(topic).or_default().push(*id);
+        }
+    }
+    let mut found = Vec::new();
+    for ids in topics.values() {
+        let mut before: Option<(Stamp, u32)> = None;
+        collected.facts.times.merge(ids, |timed| {
+            let (time, number) = (timed.time, timed.size);
+            if let Some((last, highest)) = before
+                && number < highest
+                && time.since(last) > OUT_OF_ORDER_NS
+            {
+                found.push((last, time));
+            }
+            before = Some((time, number));
+        })?;
+    }
+    Ok(found)
+}
+
+/// Stretches of time that end with a latched message sent again, in which no stream with a rhythm spoke.
+fn sent_again(
+    collected: &Collected,
+    streams: &[usize],
+    times: &[Vec<Stamp>],
+) -> Vec<(Stamp, Stamp)> {
+    let rhythms: Vec<&Vec<Stamp>> = streams
+        .iter()
+        .zip(times)
+        .filter(|(s, times)| !collected.streams[**s].latched && times.len() >= RHYTHM)
+        .map(|(_, times)| times)
+        .collect();
+    let mut found = Vec::new();
+    for (stream, latched) in streams.iter().zip(times) {
+        if !may_be_sent_again(collected, *stream) || rhythms.is_empty() {
+            continue;
+        }
+        for again in latched.iter().skip(1) {
+            let silences: Option<Vec<Stamp>> =
+                rhythms.iter().map(|r| silent_since(r, *again)).collect();
+            if let Some(since) = silences.and_then(|s| s.into_iter().max()) {
+                found.push((since, *again));
+            }
+        }
+    }
+    found
+}
+
+/// Whether a latched stream has few messages, but more than one.
+fn may_be_sent_again(collected: &Collected, stream: usize) -> bool {
+    let stream = &collected.streams[stream];
+    stream.latched && (2..=LATCHED).contains(&collected.messages.count(stream.times))
+}
+
+/// Since when a stream with a rhythm is silent at `at`, if that is long for it and it spoke before and after.
+fn silent_since(times: &[Stamp], at: Stamp) -> Option<Stamp> {
+    let next = times.partition_point(|t| *t < at);
+    let last = *times.get(next.checked_sub(1)?)?;
+    times.get(next)?;
+    let span = times.last()?.since(*times.first()?);
+    let usual = span / i64::try_from(times.len() - 1).ok()?.max(1);
+    let silence = at.since(last);
+    (silence > SILENCE_NS && silence > usual.saturating_mul(3)).then_some(last)
+}
+
+/// Stretches that overlap tell of the same restart: what they share.
+fn narrowed(mut breaks: Vec<(Stamp, Stamp)>) -> Vec<(Stamp, Stamp)> {
+    breaks.sort_unstable();
+    let mut narrow: Vec<(Stamp, Stamp)> = Vec::new();
+    for (from, to) in breaks {
+        match narrow.last_mut() {
+            Some(last) if from < last.1 => *last = (last.0.max(from), last.1.min(to)),
+            _ => narrow.push((from, to)),
+        }
+    }
+    narrow
+}
+
+/// The longest time between two signs inside a stretch: the node was away then.
+fn widest_gap(signs: &[Stamp], from: Stamp, to: Stamp) -> Option<Restart> {
+    let inside = &signs[signs.partition_point(|t| *t < from)..signs.partition_point(|t| *t <= to)];
+    let gaps = inside.windows(2).map(|pair| (pair[1].since(pair[0]), pair));
+    let (_, pair) = gaps.max_by_key(|(gap, pair)| (*gap, std::cmp::Reverse(pair[0])))?;
+    Some(Restart {
+        death: pair[0],
+        birth: pair[1],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stamps(times: &[i64]) -> Vec<Stamp> {
+        times.iter().map(|t| Stamp(t * 1_000_000_000)).collect()
+    }
+
+    #[test]
+    fn the_node_was_away_in_the_widest_gap() {
+        let signs = stamps(&[1, 2, 3, 20, 21, 22]);
+        let found = widest_gap(&signs, signs[1], signs[4]).unwrap();
+        assert_eq!((found.death, found.birth), (signs[2], signs[3]));
+    }
+
+    #[test]
+    fn what_two_streams_tell_of_one_restart_is_narrowed() {
+        let [a, b, c, d] = [1, 2, 3, 4].map(Stamp);
+        assert_eq!(narrowed(vec![(b, d), (a, c)]), [(b, c)]);
+        assert_eq!(narrowed(vec![(a, b), (c, d)]), [(a, b), (c, d)]);
+    }
+
+    #[test]
+    fn silence_is_measured_against_the_usual() {
+        let steady = stamps(&[0, 10, 20, 30, 40]);
+        assert_eq!(silent_since(&steady, stamps(&[25])[0]), None);
+        let broken = stamps(&[0, 1, 2, 3, 20, 21, 22]);
+        assert_eq!(silent_since(&broken, stamps(&[19])[0]), Some(broken[3]));
+        assert_eq!(silent_since(&broken, stamps(&[30])[0]), None);
+    }
+}

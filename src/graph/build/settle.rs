@@ -1,0 +1,92 @@
+//! The lives of nodes from those of their edges, of edges within those of their nodes, of topics from both.
+
+use std::collections::BTreeMap;
+
+use super::liveness::{Lifetime, Liveness};
+use super::windows::Windows;
+use crate::base::time::Stamp;
+use crate::evidence::claim::Name;
+use crate::evidence::proof::{Key, Proof, Validity};
+
+/// What lives are measured against.
+#[derive(Clone, Copy)]
+pub(crate) struct Frame<'a> {
+    pub(crate) windows: Windows<'a>,
+    /// The first and the last moment.
+    pub(crate) mission: (Stamp, Stamp),
+    /// Windows of silence before somebody who never speaks again counts as gone.
+    pub(crate) grace: usize,
+}
+
+/// Works out all lives.
+pub(crate) fn settle(tracks: &mut BTreeMap<Key, Liveness>, proofs: &[Proof], frame: &Frame<'_>) {
+    for (what, track) in edges(tracks) {
+        let (node, topic) = ends(what);
+        tracks.entry(Key::Node(node)).or_default().learn(&track);
+        tracks.entry(Key::Topic(topic)).or_default().learn(&track);
+    }
+    let linger = |last| frame.windows.last_moment(last, frame.grace);
+    for (what, track) in tracks.iter_mut() {
+        if matches!(what, Key::Node(_)) {
+            track.live(frame.mission, linger);
+        }
+    }
+    let mut of_topics: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
+    for (what, mut track) in edges(tracks) {
+        let (node, topic) = ends(what);
+        let around = tracks.get(&Key::Node(node)).map_or(&[][..], |t| &t.lives);
+        track.live_within(around);
+        of_topics.entry(topic).or_default().extend(&track.lives);
+        tracks.insert(what, track);
+    }
+    for (what, lives) in live_like(tracks, proofs, false) {
+        if !matches!(what, Key::Node(_)) {
+            of_topics.entry(ends(what).1).or_default().extend(lives);
+        }
+    }
+    for (what, track) in tracks.iter_mut() {
+        if let Key::Topic(topic) = what {
+            let edges = of_topics.remove(topic).unwrap_or_default();
+            track.ceased = false;
+            track.live(frame.mission, linger);
+            track.lives.extend(edges);
+        }
+    }
+    live_like(tracks, proofs, true);
+}
+
+/// Lets elements live like others, which are topics or not; tells which did.
+fn live_like(
+    tracks: &mut BTreeMap<Key, Liveness>,
+    proofs: &[Proof],
+    topics: bool,
+) -> Vec<(Key, Vec<Lifetime>)> {
+    let mut done = Vec::new();
+    for proof in proofs {
+        if let Validity::Like(other) = proof.when
+            && matches!(other, Key::Topic(_)) == topics
+            && let Some(lives) = tracks.get(&other).map(|t| t.lives.clone())
+            && let Some(track) = tracks.get_mut(&proof.what)
+            && track.signs.is_empty()
+        {
+            track.lives.clone_from(&lives);
+            done.push((proof.what, lives));
+        }
+    }
+    done
+}
+
+/// All edges.
+fn edges(tracks: &BTreeMap<Key, Liveness>) -> Vec<(Key, Liveness)> {
+    let is_edge = |what: &Key| matches!(what, Key::Publish(..) | Key::Subscribe(..));
+    let edges = tracks.iter().filter(|(what, _)| is_edge(what));
+    edges.map(|(what, track)| (*what, track.clone())).collect()
+}
+
+/// The node and the topic of an edge.
+fn ends(edge: Key) -> (Name, Name) {
+    match edge {
+        Key::Publish(node, topic) | Key::Subscribe(topic, node) => (node, topic),
+        Key::Node(name) | Key::Topic(name) => (name, name),
+    }
+}

@@ -1,0 +1,67 @@
+//! What elements are besides being there: lifecycle states, types and quality of service, as somebody states them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::sync::Arc;
+
+use crate::base::time::{Span, Stamp};
+use crate::evidence::claim::{Claim, Claims, Name};
+
+/// Stated values by node or topic.
+#[derive(Debug, Default)]
+pub(crate) struct Values {
+    /// When a node entered which state, sorted.
+    states: BTreeMap<Name, Vec<(Stamp, Arc<str>)>>,
+    types: BTreeMap<Name, BTreeSet<Arc<str>>>,
+    qualities: BTreeMap<Name, BTreeSet<Arc<str>>>,
+}
+
+impl Values {
+    pub(crate) fn new(facts: &mut Claims, role: impl Fn(Name) -> Name) -> io::Result<Self> {
+        let mut all = Self::default();
+        for fact in facts.list.clone() {
+            match fact.claim {
+                Claim::Lifecycle(node, state) => {
+                    let state = facts.text(state);
+                    let times = facts.times(&fact)?.into_iter();
+                    let states = all.states.entry(role(node)).or_default();
+                    states.extend(times.map(|time| (time, Arc::clone(&state))));
+                }
+                Claim::Type(topic, kind) => {
+                    all.types.entry(topic).or_default().insert(facts.text(kind));
+                }
+                Claim::Quality(topic, words) => {
+                    all.qualities
+                        .entry(topic)
+                        .or_default()
+                        .insert(facts.text(words));
+                }
+                _ => {}
+            }
+        }
+        for states in all.states.values_mut() {
+            states.sort();
+        }
+        Ok(all)
+    }
+
+    /// The state a node is in when a window ends; `None` before its first transition.
+    pub(crate) fn lifecycle(&self, node: Name, window: Span) -> Option<Arc<str>> {
+        let states = self.states.get(&node)?;
+        let next = states.partition_point(|(time, _)| *time < window.end);
+        states
+            .get(next.checked_sub(1)?)
+            .map(|(_, state)| Arc::clone(state))
+    }
+
+    /// The types that somebody states of a topic.
+    pub(crate) fn types(&self, topic: Name) -> impl Iterator<Item = Arc<str>> + '_ {
+        self.types.get(&topic).into_iter().flatten().cloned()
+    }
+
+    /// The quality of service of a topic.
+    pub(crate) fn quality(&self, topic: Name) -> Option<Arc<str>> {
+        let all: Vec<&str> = self.qualities.get(&topic)?.iter().map(|q| &**q).collect();
+        Some(all.join(", ").into())
+    }
+}

@@ -1,0 +1,289 @@
+//! Tells a diff as reconfigurations: thresholds for rates, hand-overs, and the hints that the evidence gave.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::{Change, Delta, Diff, ValueKind, diff};
+use crate::base::time::{Span, Stamp};
+use crate::graph::{EdgeState, Element, Elements, Graph, NodeId, State, TopicId, TopicState};
+
+/// A rate counts as changed from this share on, unless the user says otherwise.
+pub const RATE_CHANGE: f64 = 0.25;
+
+/// Types that many nodes write to in turn, so that a new writer takes over nothing.
+const SHARED: [&str; 8] = [
+    "Log",
+    "ParameterEvent",
+    "TFMessage",
+    "DiagnosticArray",
+    "Status",
+    "Clock",
+    "tfMessage",
+    "TopicStatistics",
+];
+
+/// Finds the reconfigurations of a mission, window by window in order.
+#[derive(Debug)]
+pub struct Changes<'a> {
+    elements: &'a Elements,
+    /// The share by which a rate must change, 0...
+    threshold: f64,
+    before: Option<(Span, Graph)>,
+    /// When each topic was sent on: from the first sign of a publisher to the last.
+    sent: Vec<(Option<Stamp>, Option<Stamp>)>,
+    /// Who last sent messages on each topic.
+    senders: BTreeMap<TopicId, BTreeSet<NodeId>>,
+}
+
+impl<'a> Changes<'a> {
+    /// Nothing seen yet.
+    pub fn new(elements: &'a Elements, threshold: f64) -> Self {
+        Self {
+            elements,
+            threshold,
+            before: None,
+            sent: sent(elements),
+            senders: BTreeMap::new(),
+        }
+    }
+
+    /// What changed from the window before to this one; nothing in the first, which is the base.
+    /// `restarts` are nodes that began anew in it under the same name, and when.
+    ///
+    /// Order: added, removed, rates, hand-overs, restarts, values; each by kind of element and name.
+    pub fn next(&mut self, span: Span, graph: &Graph, restarts: &[(NodeId, Stamp)]) -> Vec<Change> {
+        let mut changes = Vec::new();
+        if let Some((old_span, old)) = self.before.take() {
+            let diff = diff(&old, graph);
+            self.appeared(&diff, span, &mut changes);
+            self.vanished(&diff, span, &mut changes);
+            self.rates(&diff, graph, (old_span, span), &mut changes);
+            self.handed_over(&old, graph, &mut changes);
+            let again = restarts.iter().map(|(node, time)| Change::Restarted {
+                node: *node,
+                time: *time,
+            });
+            changes.extend(again);
+            lifecycles(&diff, &mut changes);
+        } else {
+            self.handed_over(graph, graph, &mut Vec::new());
+        }
+        self.before = Some((span, graph.clone()));
+        changes
+    }
+
+    fn appeared(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
+        let all = ids(&diff.nodes.added, |s| Element::Node(s.id))
+            .chain(ids(&diff.topics.added, |s| Element::Topic(s.id)))
+            .chain(ids(&diff.publishes.added, |s| Element::Publish(s.id)))
+            .chain(ids(&diff.subscribes.added, |s| Element::Subscribe(s.id)));
+        changes.extend(all.map(|what| {
+            let time = self.elements.life(what).0.filter(|t| span.contains(*t));
+            Change::Added { what, time }
+        }));
+    }
+
+    fn vanished(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
+        let all = ids(&diff.nodes.removed, |id| Element::Node(*id))
+            .chain(ids(&diff.topics.removed, |id| Element::Topic(*id)))
+            .chain(ids(&diff.publishes.removed, |id| Element::Publish(*id)))
+            .chain(ids(&diff.subscribes.removed, |id| Element::Subscribe(*id)));
+        changes.extend(all.map(|what| {
+            let time = self.elements.life(what).1.filter(|t| *t < span.end);
+            Change::Removed { what, time }
+        }));
+    }
+
+    fn rates(&self, diff: &Diff, graph: &Graph, spans: (Span, Span), changes: &mut Vec<Change>) {
+        let mut steady = BTreeSet::new();
+        for (old, new) in &diff.topics.changed {
+            let topic = Element::Topic(new.id);
+            let secs = (self.present(topic, spans.0), self.present(topic, spans.1));
+            if is_steady(old, secs.0) && is_steady(new, secs.1) {
+                steady.insert(new.id);
+                changes.extend(self.rate(topic, (old.hz, new.hz), spans));
+            }
+        }
+        let crowded = self.crowded(graph);
+        for (old, new) in &diff.publishes.changed {
+            let topic = self.elements.publishes[new.id as usize].topic;
+            // With one publisher the topic's own change says it all.
+            if crowded.contains(&topic) && steady.contains(&topic) {
+                changes.extend(self.rate(Element::Publish(new.id), (old.hz, new.hz), spans));
+            }
+        }
+    }
+
+    /// The change of a rate, if it is one. What came or went within a window is measured over the part it was there,
+    /// so that coming and going are not told twice.
+    fn rate(
+        &self,
+        what: Element,
+        hz: (Option<f64>, Option<f64>),
+        spans: (Span, Span),
+    ) -> Option<Change> {
+        let (from_hz, to_hz) = (hz.0?, hz.1?);
+        let (before, after) = (self.present(what, spans.0), self.present(what, spans.1));
+        let secs = before.min(after);
+        let over = |hz: f64, span: Span, part: f64| {
+            hz * (span.nanos() as f64 / 1e9) / part.max(f64::MIN_POSITIVE)
+        };
+        let (from, to) = (over(from_hz, spans.0, before), over(to_hz, spans.1, after));
+        let shows = (to_hz - from_hz).abs() > self.threshold * from_hz;
+        (shows && rate_differs(from, to, secs, self.threshold)).then_some(Change::Rate {
+            what,
+            from_hz,
+            to_hz,
+        })
+    }
+
+    /// How many seconds of a window lie between an element's first and last sign of life.
+    fn present(&self, what: Element, span: Span) -> f64 {
+        let (first, last) = match what {
+            Element::Topic(id) => self.sent[id as usize],
+            other => self.elements.life(other),
+        };
+        let start = first.map_or(span.start, |at| at.max(span.start));
+        let end = last.map_or(span.end, |at| at.plus(1).min(span.end));
+        end.since(start).max(0) as f64 / 1e9
+    }
+
+    /// Topics with more than one publisher in this graph.
+    fn crowded(&self, graph: &Graph) -> BTreeSet<TopicId> {
+        let mut seen = BTreeSet::new();
+        let topics = graph
+            .publishes
+            .iter()
+            .map(|s| self.elements.publishes[s.id as usize].topic);
+        topics.filter(|topic| !seen.insert(*topic)).collect()
+    }
+
+    /// A topic changes hands when those who send on it now are all others than those who sent on it last.
+    fn handed_over(&mut self, before: &Graph, after: &Graph, changes: &mut Vec<Change>) {
+        let there = |graph: &Graph, topic| {
+            graph
+                .topics
+                .binary_search_by_key(&topic, |t: &TopicState| t.id)
+                .is_ok()
+        };
+        for (topic, to) in self.sending(after) {
+            let from = self.senders.insert(topic, to.clone()).unwrap_or_default();
+            let other = !from.is_empty() && from.is_disjoint(&to);
+            if other && there(before, topic) && !self.is_shared(topic) {
+                let (from, to) = (from.into_iter().collect(), to.into_iter().collect());
+                changes.push(Change::HandedOver { topic, from, to });
+            }
+        }
+    }
+
+    /// Per topic the nodes that sent messages on it in a window.
+    fn sending(&self, graph: &Graph) -> BTreeMap<TopicId, BTreeSet<NodeId>> {
+        let mut sending: BTreeMap<TopicId, BTreeSet<NodeId>> = BTreeMap::new();
+        for state in graph
+            .publishes
+            .iter()
+            .filter(|s: &&EdgeState| s.count.unwrap_or(0) > 0)
+        {
+            let edge = &self.elements.publishes[state.id as usize];
+            sending.entry(edge.topic).or_default().insert(edge.node);
+        }
+        sending
+    }
+
+    fn is_shared(&self, topic: TopicId) -> bool {
+        let types = &self.elements.topics[topic as usize].types;
+        types
+            .iter()
+            .any(|t| SHARED.contains(&t.rsplit('/').next().unwrap_or(t)))
+    }
+}
+
+fn ids<'s, T>(
+    list: &'s [T],
+    element: impl Fn(&T) -> Element + 's,
+) -> impl Iterator<Item = Element> + 's {
+    list.iter().map(element)
+}
+
+/// Messages in the busier of two windows from which on a rate means something.
+const FEW: f64 = 3.5;
+
+/// A gap this many times the median period long makes a topic one that speaks when it has something to say.
+const UNSTEADY: f64 = 4.0;
+
+/// And so does a median period that, message by message, covers less than this share of the time.
+const COVERED: f64 = 0.6;
+
+/// Whether a rate changed: by more than the share `threshold` of what it was, by more than the two messages that two
+/// windows of the same jittering topic may differ by, and not on a topic too slow for windows of `secs` seconds.
+fn rate_differs(from: f64, to: f64, secs: f64, threshold: f64) -> bool {
+    let by = (to - from).abs();
+    by > threshold * from && by * secs > 2.2 && from.max(to) * secs > FEW
+}
+
+/// Whether a topic sends at a rate at all in a window that it was there for `secs` seconds of: not latched, and in
+/// even steps all the time, as far as is known.
+fn is_steady(topic: &TopicState, secs: f64) -> bool {
+    let even = match (topic.median_period_s, topic.max_gap_s) {
+        (Some(median), Some(gap)) => {
+            gap <= UNSTEADY * median && median * topic.count as f64 >= COVERED * secs
+        }
+        _ => true,
+    };
+    even && topic.state != State::Latched
+}
+
+/// The life of each topic's publishers together; of the topic itself where none is known.
+fn sent(elements: &Elements) -> Vec<(Option<Stamp>, Option<Stamp>)> {
+    let mut sent = vec![(None, None); elements.topics.len()];
+    for edge in elements.publishes.iter().filter(|e| e.first.is_some()) {
+        let (first, last): &mut (Option<Stamp>, Option<Stamp>) = &mut sent[edge.topic as usize];
+        *first = [*first, edge.first].into_iter().flatten().min();
+        *last = (*last).max(edge.last);
+    }
+    let own = elements.topics.iter().map(|t| (t.first, t.last));
+    sent.into_iter()
+        .zip(own)
+        .map(|(sent, own)| if sent.0.is_some() { sent } else { own })
+        .collect()
+}
+
+fn lifecycles(diff: &Diff, changes: &mut Vec<Change>) {
+    let Delta { changed, .. } = &diff.nodes;
+    for (old, new) in changed
+        .iter()
+        .filter(|(old, new)| old.lifecycle != new.lifecycle)
+    {
+        let word = |state: &Option<Arc<str>>| state.clone().unwrap_or_default();
+        changes.push(Change::Value {
+            kind: ValueKind::Lifecycle,
+            what: Element::Node(new.id),
+            from: word(&old.lifecycle),
+            to: word(&new.lifecycle),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_must_change_by_the_share_and_by_more_than_two_messages() {
+        assert!(rate_differs(15.0, 7.4, 10.0, 0.25));
+        assert!(!rate_differs(15.0, 12.0, 10.0, 0.25));
+        assert!(
+            !rate_differs(0.1, 0.0, 10.0, 0.25),
+            "one message of a slow topic"
+        );
+        assert!(
+            !rate_differs(0.3, 0.1, 10.0, 0.25),
+            "a topic too slow for the window"
+        );
+        assert!(
+            !rate_differs(1.0, 2.0, 1.0, 0.25),
+            "one message more in a short last window"
+        );
+        assert!(rate_differs(0.0, 1.0, 10.0, 0.25));
+    }
+}

@@ -1,0 +1,313 @@
+//! Time divided into periods: which windows a mission has.
+
+use crate::base::error::{Error, Result};
+use crate::base::time::{Moment, Period, Span, Stamp, short};
+
+/// How many windows are made at most.
+pub const MOST_WINDOWS: i64 = 100_000;
+
+const SECOND: i64 = 1_000_000_000;
+/// What a bag shorter than five minutes may get, the longest first.
+const SHORT: [i64; 9] = [
+    30 * SECOND,
+    20 * SECOND,
+    10 * SECOND,
+    5 * SECOND,
+    2 * SECOND,
+    SECOND,
+    SECOND / 2,
+    SECOND / 5,
+    SECOND / 10,
+];
+/// What a bag longer than 600 minutes may get, the shortest first.
+const LONG: [i64; 9] = [
+    120 * SECOND,
+    300 * SECOND,
+    600 * SECOND,
+    1800 * SECOND,
+    3600 * SECOND,
+    7200 * SECOND,
+    21_600 * SECOND,
+    43_200 * SECOND,
+    86_400 * SECOND,
+];
+
+/// The length of a window, as asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Length {
+    /// Chosen by the length of the bag: [`default_period`].
+    #[default]
+    Auto,
+    /// One window for the whole bag.
+    All,
+    /// This many equal windows, 1...
+    Parts(u32),
+    /// This long.
+    Fixed(Period),
+}
+
+/// Where windows begin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Align {
+    /// At the first message.
+    #[default]
+    Bag,
+    /// At whole periods of UTC.
+    Clock,
+}
+
+/// How time is to be divided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Division {
+    /// The length of a window.
+    pub length: Length,
+    /// From one window's start to the next; equal to the length if `None`.
+    pub step: Option<Period>,
+    /// Leave out what lies before.
+    pub start: Option<Moment>,
+    /// Leave out what lies after.
+    pub end: Option<Moment>,
+    /// Where windows begin.
+    pub align: Align,
+}
+
+/// The windows of a mission: all as long as the period, a step apart, but for those cut off by its ends.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Windows {
+    /// The time that they divide.
+    pub span: Span,
+    /// The length of a whole window.
+    pub period: Period,
+    /// From one start to the next, never more than the period.
+    pub step: Period,
+    /// Each window's time, in order; at least one.
+    pub spans: Vec<Span>,
+}
+
+impl Windows {
+    /// Whether the window of this place, 0.., is shorter than the period.
+    pub fn partial(&self, index: usize) -> bool {
+        self.spans[index].nanos() < self.period.nanos()
+    }
+}
+
+/// The part of `bag` that a division asks for.
+///
+/// # Errors
+/// [`Error::Usage`] where nothing of the bag lies inside.
+pub fn range(division: &Division, bag: Span) -> Result<Span> {
+    let start = division
+        .start
+        .map_or(bag.start, |m| m.on(bag))
+        .max(bag.start);
+    let end = division.end.map_or(bag.end, |m| m.on(bag)).min(bag.end);
+    if start < end {
+        return Ok(Span { start, end });
+    }
+    Err(Error::usage(
+        format!(
+            "`--start` and `--end` leave nothing of the {} of this bag",
+            short(bag.nanos())
+        ),
+        format!("the bag covers {} to {}", bag.start, bag.end),
+    ))
+}
+
+/// The period for a bag of this length where none was asked for: a minute; from 30 s down to 0.1 s for a bag below
+/// five minutes, so that it has at least five windows; from 2 min up to a day above 600 windows.
+pub fn default_period(nanos: i64) -> Period {
+    let minute = 60 * SECOND;
+    let chosen = if nanos < 5 * minute {
+        SHORT
+            .into_iter()
+            .find(|p| count(nanos, *p) >= 5)
+            .unwrap_or(SHORT[8])
+    } else if count(nanos, minute) > 600 {
+        LONG.into_iter()
+            .find(|p| count(nanos, *p) <= 600)
+            .unwrap_or(LONG[8])
+    } else {
+        minute
+    };
+    Period::from_nanos(chosen).unwrap_or(MINUTE)
+}
+
+const MINUTE: Period = match Period::from_nanos(60 * SECOND) {
+    Some(minute) => minute,
+    None => unreachable!(),
+};
+
+/// The shortest period that covers `nanos` with this many windows.
+fn parts_of(nanos: i64, parts: u32) -> Period {
+    Period::from_nanos(count(nanos, i64::from(parts.max(1)))).unwrap_or(MINUTE)
+}
+
+/// How many windows of `period` it takes to cover `nanos`, both positive.
+fn count(nanos: i64, period: i64) -> i64 {
+    nanos / period + i64::from(nanos % period > 0)
+}
+
+/// Divides `span` (see [`range`]) into windows.
+///
+/// # Errors
+/// [`Error::Usage`] for a step longer than the period and for more than [`MOST_WINDOWS`] windows.
+pub fn divide(division: &Division, span: Span) -> Result<Windows> {
+    let nanos = span.nanos().max(1);
+    let period = match division.length {
+        Length::Auto => default_period(nanos),
+        Length::All => Period::from_nanos(nanos).unwrap_or(MINUTE),
+        Length::Parts(parts) => parts_of(nanos, parts),
+        Length::Fixed(period) => period,
+    };
+    let step = division.step.unwrap_or(period);
+    if step > period {
+        return Err(Error::usage(
+            format!("a step of {step} is longer than the period of {period}"),
+            "windows may overlap but leave no gaps; `--step` is at most `--period`",
+        ));
+    }
+    let first = first_start(division, span, period, step);
+    let many = count(span.end.since(first), step.nanos());
+    if many > MOST_WINDOWS {
+        return Err(too_many(many, nanos));
+    }
+    let starts = (0..many).map(|k| first.plus(k * step.nanos()));
+    let spans = starts.map(|at| Span {
+        start: at.max(span.start),
+        end: at.plus(period.nanos()).min(span.end),
+    });
+    Ok(Windows {
+        span,
+        period,
+        step,
+        spans: spans.collect(),
+    })
+}
+
+fn first_start(division: &Division, span: Span, period: Period, step: Period) -> Stamp {
+    match (division.align, division.length) {
+        (Align::Clock, Length::Auto | Length::Fixed(_)) => {
+            let back = span.start.0.rem_euclid(step.nanos().max(period.nanos()));
+            span.start.plus(-back)
+        }
+        _ => span.start,
+    }
+}
+
+fn too_many(many: i64, nanos: i64) -> Error {
+    let ladder = SHORT.into_iter().rev().chain([60 * SECOND]).chain(LONG);
+    let enough = ladder
+        .into_iter()
+        .find(|p| count(nanos, *p) <= MOST_WINDOWS);
+    let enough = enough.unwrap_or_else(|| count(nanos, MOST_WINDOWS));
+    Error::usage(
+        format!("{many} windows are more than {MOST_WINDOWS}"),
+        format!("`--period {}` would do", plain(enough)),
+    )
+}
+
+/// A period as `--period` takes it.
+pub fn plain(nanos: i64) -> String {
+    if nanos % SECOND == 0 {
+        format!("{}s", nanos / SECOND)
+    } else {
+        format!(
+            "{}ms",
+            nanos.div_euclid(1_000_000) + i64::from(nanos % 1_000_000 > 0)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn secs(from: i64, to: i64) -> Span {
+        Span {
+            start: Stamp(from * SECOND),
+            end: Stamp(to * SECOND),
+        }
+    }
+
+    fn every(text: &str) -> Division {
+        Division {
+            length: Period::parse(text).map_or(Length::Auto, Length::Fixed),
+            ..Division::default()
+        }
+    }
+
+    #[test]
+    fn the_last_window_is_cut_at_the_end() {
+        let windows = divide(&every("10"), secs(100, 125)).unwrap();
+        assert_eq!(
+            windows.spans,
+            [secs(100, 110), secs(110, 120), secs(120, 125)]
+        );
+        assert_eq!((windows.partial(1), windows.partial(2)), (false, true));
+    }
+
+    #[test]
+    fn a_smaller_step_makes_windows_overlap() {
+        let division = Division {
+            step: Period::parse("5"),
+            ..every("10")
+        };
+        let windows = divide(&division, secs(0, 20)).unwrap();
+        assert_eq!(
+            windows.spans,
+            [secs(0, 10), secs(5, 15), secs(10, 20), secs(15, 20)]
+        );
+    }
+
+    #[test]
+    fn the_clock_aligns_windows_to_whole_periods() {
+        let division = Division {
+            align: Align::Clock,
+            ..every("10")
+        };
+        let windows = divide(&division, secs(104, 125)).unwrap();
+        assert_eq!(
+            windows.spans,
+            [secs(104, 110), secs(110, 120), secs(120, 125)]
+        );
+    }
+
+    #[test]
+    fn the_default_period_gives_five_to_six_hundred_windows() {
+        let chosen = |s: i64| default_period(s * SECOND).nanos() / SECOND;
+        assert_eq!(
+            [chosen(330), chosen(299), chosen(49), chosen(5)],
+            [60, 30, 10, 1]
+        );
+        assert_eq!([chosen(600 * 60), chosen(601 * 60)], [60, 120]);
+        assert_eq!(default_period(1).nanos(), SECOND / 10);
+    }
+
+    #[test]
+    fn too_many_windows_name_a_period_that_would_do() {
+        let error = divide(&every("1ms"), secs(0, 3600)).unwrap_err();
+        assert!(error.is_usage());
+        assert_eq!(error.hint(), "`--period 100ms` would do");
+        assert!(divide(&every("100ms"), secs(0, 3600)).is_ok());
+    }
+
+    #[test]
+    fn start_and_end_cut_the_bag() {
+        let cut = |start, end| {
+            let moment = |t: Option<&str>| t.and_then(Moment::parse);
+            range(
+                &Division {
+                    start: moment(start),
+                    end: moment(end),
+                    ..Division::default()
+                },
+                secs(100, 200),
+            )
+        };
+        assert_eq!(cut(Some("30"), Some("-30s")).unwrap(), secs(130, 170));
+        assert_eq!(
+            cut(None, Some("0")).unwrap_err().to_string(),
+            "`--start` and `--end` leave nothing of the 100 s of this bag"
+        );
+    }
+}

@@ -1,0 +1,164 @@
+//! Which edges to turn around so that no cycle is left.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The edges to reverse when each edge in turn is reversed if and only if it closes a cycle with those before it.
+pub(crate) fn in_order(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
+    let mut after: Vec<Vec<usize>> = vec![Vec::new(); n];
+    let mut seen = vec![usize::MAX; n];
+    let mut reversed = vec![false; edges.len()];
+    for (i, &(from, to)) in edges.iter().enumerate() {
+        if from == to {
+            continue;
+        }
+        reversed[i] = reaches(&after, to, from, &mut seen, i);
+        let (from, to) = if reversed[i] { (to, from) } else { (from, to) };
+        after[from].push(to);
+    }
+    reversed
+}
+
+/// Whether a path leads from `start` to `goal`; `seen` holds the round in which an item was last met.
+fn reaches(
+    after: &[Vec<usize>],
+    start: usize,
+    goal: usize,
+    seen: &mut [usize],
+    round: usize,
+) -> bool {
+    let mut stack = vec![start];
+    seen[start] = round;
+    while let Some(item) = stack.pop() {
+        if item == goal {
+            return true;
+        }
+        for &next in &after[item] {
+            if seen[next] != round {
+                seen[next] = round;
+                stack.push(next);
+            }
+        }
+    }
+    false
+}
+
+/// The edges to reverse when all edges between two clusters must run one way; pairs with more edges choose first.
+/// `home` is the innermost cluster of each item, `parent` the cluster around each, with 0 for the outside.
+pub(crate) fn by_cluster(edges: &[(usize, usize)], home: &[usize], parent: &[usize]) -> Vec<bool> {
+    let sides: Vec<(usize, usize)> = edges
+        .iter()
+        .map(|&ends| parting(ends, home, parent))
+        .collect();
+    let mut pairs: BTreeMap<(usize, usize), (Reverse<usize>, usize)> = BTreeMap::new();
+    for (i, &pair) in sides.iter().enumerate() {
+        pairs.entry(pair).or_insert((Reverse(0), i)).0.0 += 1;
+    }
+    let mut order: Vec<_> = pairs.into_iter().collect();
+    order.sort_by_key(|&(_, rank)| rank);
+    let pairs: Vec<(usize, usize)> = order.into_iter().map(|(pair, _)| pair).collect();
+    let turns = in_order(home.len() + parent.len(), &pairs);
+    let turn: BTreeMap<_, _> = pairs.into_iter().zip(turns).collect();
+    sides
+        .iter()
+        .map(|pair| turn.get(pair).copied().unwrap_or(false))
+        .collect()
+}
+
+/// What an edge leaves and enters inside the innermost cluster around both of its ends: a vertex `v` or a cluster `c`,
+/// told as `home.len() + c`.
+fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usize, usize) {
+    let (mut a, mut b) = ((from, home[from]), (to, home[to]));
+    while a.1 != b.1 {
+        // Parents have smaller numbers than their children.
+        let deeper = if a.1 > b.1 { &mut a } else { &mut b };
+        *deeper = (home.len() + deeper.1, parent[deeper.1]);
+    }
+    (a.0, b.0)
+}
+
+/// The edges to reverse by the greedy order of Eades, Lin and Smyth (1993): sinks last, sources first, then whatever
+/// has the most outgoing edges to spare.
+pub(crate) fn greedy(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
+    let place = greedy_order(n, edges);
+    edges
+        .iter()
+        .map(|&(from, to)| place[from] > place[to])
+        .collect()
+}
+
+fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
+    let (mut after, mut before) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+    for &(from, to) in edges.iter().filter(|(from, to)| from != to) {
+        after[from].push(to);
+        before[to].push(from);
+    }
+    let mut outgoing: Vec<usize> = after.iter().map(Vec::len).collect();
+    let mut incoming: Vec<usize> = before.iter().map(Vec::len).collect();
+    let mut left: BTreeSet<usize> = (0..n).collect();
+    let (mut first, mut last) = (Vec::new(), Vec::new());
+    while !left.is_empty() {
+        let sink = left.iter().find(|&&v| outgoing[v] == 0).copied();
+        let source = || left.iter().find(|&&v| incoming[v] == 0).copied();
+        let busiest = || {
+            let spare = |v: usize| (outgoing[v] + n) - incoming[v].min(outgoing[v] + n);
+            left.iter().copied().max_by_key(|&v| (spare(v), Reverse(v)))
+        };
+        let Some(v) = sink.or_else(source).or_else(busiest) else {
+            break;
+        };
+        left.remove(&v);
+        if sink.is_some() {
+            last.push(v);
+        } else {
+            first.push(v);
+        }
+        for &u in &before[v] {
+            outgoing[u] -= 1;
+        }
+        for &u in &after[v] {
+            incoming[u] -= 1;
+        }
+    }
+    let mut place = vec![0; n];
+    for (i, v) in first.into_iter().chain(last.into_iter().rev()).enumerate() {
+        place[v] = i;
+    }
+    place
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn leaves_no_cycle(n: usize, edges: &[(usize, usize)], reversed: &[bool]) -> bool {
+        let turned: Vec<(usize, usize)> = edges
+            .iter()
+            .zip(reversed)
+            .filter(|((from, to), _)| from != to)
+            .map(|(&(from, to), &turn)| if turn { (to, from) } else { (from, to) })
+            .collect();
+        in_order(n, &turned).iter().all(|turn| !turn)
+    }
+
+    #[test]
+    fn a_ring_loses_its_last_edge() {
+        assert_eq!(in_order(3, &[(0, 1), (1, 2), (2, 0)]), [false, false, true]);
+    }
+
+    #[test]
+    fn both_ways_leave_no_cycle() {
+        let edges = [
+            (0, 1),
+            (1, 0),
+            (1, 2),
+            (2, 2),
+            (2, 3),
+            (3, 1),
+            (4, 0),
+            (3, 4),
+        ];
+        assert!(leaves_no_cycle(5, &edges, &in_order(5, &edges)));
+        assert!(leaves_no_cycle(5, &edges, &greedy(5, &edges)));
+    }
+}

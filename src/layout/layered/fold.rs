@@ -1,0 +1,172 @@
+//! Folds crowded layers: where few are known to subscribe, most nodes would stand in one layer and most topics in the
+//! next; sources move to later layers, more of them if that suits the page.
+
+/// Ranks with at least `layers` layers and the sources spread evenly over them; `None` if there is nothing to spread.
+///
+/// A source is a vertex without predecessors; it may move as far back as its longest path allows. `home` is the cluster
+/// of each vertex: sources of one cluster move together where that costs nothing. The edges must not form a cycle.
+pub(crate) fn fold(
+    rank: &[usize],
+    edges: &[(usize, usize)],
+    home: &[usize],
+    layers: usize,
+) -> Option<Vec<usize>> {
+    let deep = rank.iter().max().map_or(0, |r| r + 1);
+    if deep < 2 {
+        return None;
+    }
+    let layers = layers.max(deep);
+    let graph = Graph::new(rank, edges);
+    let mut load = vec![0_usize; layers + 1];
+    for v in (0..rank.len()).filter(|&v| !graph.is_source(v) && !graph.is_leaf(v)) {
+        load[rank[v]] += 1;
+    }
+    let mut sources: Vec<usize> = (0..rank.len()).filter(|&v| graph.is_source(v)).collect();
+    sources.sort_by_key(|&v| (usize::MAX - graph.depth[v], home[v], v));
+    let mut folded = vec![0; rank.len()];
+    for source in sources {
+        let leaves = graph.leaves(source);
+        let last = layers - 1 - graph.depth[source];
+        let worst = |r: usize| (load[r] + 1).max(load[r + 1] + leaves);
+        let at = (0..=last).min_by_key(|&r| (worst(r), r)).unwrap_or(0);
+        load[at] += 1;
+        load[at + 1] += leaves;
+        folded[source] = at;
+    }
+    for &v in graph.order.iter().filter(|&&v| !graph.is_source(v)) {
+        folded[v] = graph.before[v]
+            .iter()
+            .map(|&u| folded[u] + 1)
+            .max()
+            .unwrap_or(0);
+    }
+    Some(squeezed(&folded))
+}
+
+/// How many layers suit `n` boxes on a page of this aspect (width by height), with edges from left to right and from
+/// top to bottom. A box with the gap behind it is about five times as long as it is high, and one and a half times as
+/// wide as the distance between layers below each other.
+pub(crate) fn suitable(n: usize, aspect: f64) -> [usize; 2] {
+    let n = n as f64;
+    let layers = |square: f64| {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "the root of a small positive number"
+        )]
+        let whole = square.clamp(1.0, 1e6).sqrt().round() as usize;
+        whole
+    };
+    [layers(aspect * n / 5.0), layers(1.5 * n / aspect.max(0.01))]
+}
+
+/// The edges both ways, and the longest path behind each vertex.
+struct Graph {
+    before: Vec<Vec<usize>>,
+    after: Vec<Vec<usize>>,
+    depth: Vec<usize>,
+    /// The vertices by rank: along the edges.
+    order: Vec<usize>,
+}
+
+impl Graph {
+    fn new(rank: &[usize], edges: &[(usize, usize)]) -> Self {
+        let n = rank.len();
+        let (mut before, mut after) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+        for &(from, to) in edges.iter().filter(|(from, to)| from != to) {
+            after[from].push(to);
+            before[to].push(from);
+        }
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by_key(|&v| (rank[v], v));
+        let mut depth = vec![0; n];
+        for &v in order.iter().rev() {
+            depth[v] = after[v]
+                .iter()
+                .map(|&u: &usize| depth[u] + 1)
+                .max()
+                .unwrap_or(0);
+        }
+        Self {
+            before,
+            after,
+            depth,
+            order,
+        }
+    }
+
+    fn is_source(&self, v: usize) -> bool {
+        self.before[v].is_empty()
+    }
+
+    /// Whether a vertex hangs on one source only and leads nowhere.
+    fn is_leaf(&self, v: usize) -> bool {
+        self.after[v].is_empty()
+            && self.before[v].split_first().is_some_and(|(first, rest)| {
+                self.is_source(*first) && rest.iter().all(|u| u == first)
+            })
+    }
+
+    fn leaves(&self, source: usize) -> usize {
+        self.after[source]
+            .iter()
+            .filter(|&&v| self.is_leaf(v))
+            .count()
+    }
+}
+
+/// The same ranks without empty ones.
+fn squeezed(rank: &[usize]) -> Vec<usize> {
+    let mut used: Vec<usize> = rank.to_vec();
+    used.sort_unstable();
+    used.dedup();
+    rank.iter()
+        .map(|r| used.partition_point(|u| u < r))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `n` sources with a leaf each, all of them writing to one more topic.
+    fn stars(n: usize) -> (Vec<usize>, Vec<(usize, usize)>) {
+        let hub = 2 * n;
+        let edges = (0..n).flat_map(|k| [(k, n + k), (k, hub)]).collect();
+        let rank = (0..=hub).map(|v| usize::from(v >= n)).collect();
+        (rank, edges)
+    }
+
+    #[test]
+    fn stars_are_spread_over_the_layers() {
+        let (rank, edges) = stars(12);
+        let folded = fold(&rank, &edges, &[0; 25], 6).unwrap();
+        assert!(edges.iter().all(|&(from, to)| folded[from] < folded[to]));
+        let widest = (0..6)
+            .map(|r| folded.iter().filter(|f| **f == r).count())
+            .max();
+        assert!(widest <= Some(6), "{folded:?}");
+        assert!(
+            folded[..12]
+                .iter()
+                .zip(&folded[12..24])
+                .all(|(node, topic)| node + 1 == *topic)
+        );
+    }
+
+    #[test]
+    fn a_deep_graph_stays_as_it_is() {
+        let edges = [(0, 1), (1, 2), (2, 3)];
+        assert_eq!(
+            fold(&[0, 1, 2, 3], &edges, &[0; 4], 3),
+            Some(vec![0, 1, 2, 3])
+        );
+        assert_eq!(fold(&[0, 0], &[], &[0; 2], 3), None);
+    }
+
+    #[test]
+    fn wide_pages_suit_more_layers_from_left_to_right() {
+        assert_eq!(suitable(100, 2.0), [6, 9]);
+        assert_eq!(suitable(0, 0.0), [1, 1]);
+    }
+}

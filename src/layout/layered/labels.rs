@@ -1,0 +1,285 @@
+//! Where the label of each edge stands: on the edge or beside it, on no box, no title and no other label.
+
+use std::collections::BTreeMap;
+
+use crate::base::geometry::{Point, Rect, Size};
+use crate::layout::{Layout, Plan, Route};
+
+/// Where along an edge a label is tried, best first.
+const STATIONS: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
+/// The room between a label and its edge, if it stands beside.
+const ASIDE: f64 = 2.0;
+/// How bad it is to lie on another edge, and to hide most of the own edge.
+const ON_EDGE: f64 = 2.0;
+const HIDING: f64 = 4.0;
+
+/// Places the labels of all routes; one that has no room anywhere gets none. Short edges choose first.
+pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
+    let lines: Vec<Line> = layout.routes.iter().map(Line::new).collect();
+    let mut order: Vec<usize> = (0..lines.len())
+        .filter(|&i| plan.links[i].label.is_some())
+        .collect();
+    if order.is_empty() {
+        return;
+    }
+    order.sort_by(|&a, &b| {
+        lines[a]
+            .length()
+            .total_cmp(&lines[b].length())
+            .then(a.cmp(&b))
+    });
+    let area = layout.size.w * layout.size.h / layout.boxes.len().max(1) as f64;
+    let mut taken = Field::new(area.sqrt().max(40.0));
+    for rect in &layout.boxes {
+        taken.insert(rect.grown(1.0), 0);
+    }
+    for (frame, cluster) in layout.clusters.iter().zip(&plan.clusters) {
+        taken.insert(
+            Rect::new(
+                frame.x + 4.0,
+                frame.y + 2.0,
+                cluster.title.w + 4.0,
+                cluster.title.h,
+            ),
+            0,
+        );
+    }
+    let mut edges = Field::new(taken.cell);
+    for (i, line) in lines.iter().enumerate() {
+        for piece in line.points.windows(2) {
+            edges.insert(between(piece[0], piece[1]), i);
+        }
+    }
+    for i in order {
+        let Some(size) = plan.links[i].label else {
+            continue;
+        };
+        layout.routes[i].label = lines[i].spot(size, i, &taken, &edges);
+        if let Some(spot) = layout.routes[i].label {
+            taken.insert(Rect::around(spot, size).grown(0.5), 0);
+        }
+    }
+}
+
+fn between(a: Point, b: Point) -> Rect {
+    Rect::new(
+        a.x.min(b.x),
+        a.y.min(b.y),
+        (a.x - b.x).abs(),
+        (a.y - b.y).abs(),
+    )
+}
+
+/// A route as a chain of short straight pieces.
+struct Line {
+    points: Vec<Point>,
+    /// How far along the line each point is.
+    at: Vec<f64>,
+}
+
+impl Line {
+    fn new(route: &Route) -> Self {
+        let mut points = vec![route.start];
+        for &[a, b, to] in &route.curves {
+            let from = points[points.len() - 1];
+            let level = (from.y - to.y).abs() < 0.1 || (from.x - to.x).abs() < 0.1;
+            let steps = if level { 1 } else { 8 };
+            points.extend(
+                (1..=steps)
+                    .map(|step| on_cubic([from, a, b, to], f64::from(step) / f64::from(steps))),
+            );
+        }
+        let mut at = vec![0.0];
+        for piece in points.windows(2) {
+            let last = at[at.len() - 1];
+            at.push(last + libm::hypot(piece[1].x - piece[0].x, piece[1].y - piece[0].y));
+        }
+        Self { points, at }
+    }
+
+    fn length(&self) -> f64 {
+        self.at.last().copied().unwrap_or(0.0)
+    }
+
+    /// The point at a part of the length, and whether the line runs rather sideways there.
+    fn station(&self, part: f64) -> Option<(Point, bool)> {
+        let goal = self.length() * part;
+        let i = self
+            .at
+            .windows(2)
+            .position(|pair| pair[0] <= goal && goal <= pair[1] && pair[0] < pair[1])?;
+        let (a, b) = (self.points[i], self.points[i + 1]);
+        let t = (goal - self.at[i]) / (self.at[i + 1] - self.at[i]);
+        let point = Point::new(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t);
+        Some((point, (b.x - a.x).abs() > (b.y - a.y).abs()))
+    }
+
+    /// The best middle for a label of this size, if any is free.
+    fn spot(&self, size: Size, own: usize, taken: &Field, edges: &Field) -> Option<Point> {
+        let mut best: Option<(f64, Point)> = None;
+        for (turn, &part) in STATIONS.iter().enumerate() {
+            let Some((point, sideways)) = self.station(part) else {
+                continue;
+            };
+            for (penalty, spot) in self.around(point, size, sideways) {
+                let cost = penalty + 0.1 * turn as f64;
+                if best.is_some_and(|(least, _)| least <= cost)
+                    || taken.hits(&Rect::around(spot, size)).any(|_| true)
+                {
+                    continue;
+                }
+                let mut met: Vec<usize> = edges
+                    .hits(&Rect::around(spot, size))
+                    .filter(|&edge| edge != own)
+                    .collect();
+                met.sort_unstable();
+                met.dedup();
+                let cost = cost + ON_EDGE * met.len() as f64;
+                if best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, spot));
+                }
+            }
+        }
+        best.map(|(_, spot)| spot)
+    }
+
+    /// The middles on and beside a point of the line, each with how bad it is.
+    fn around(&self, point: Point, size: Size, sideways: bool) -> [(f64, Point); 3] {
+        let (hidden, away) = if sideways {
+            (size.w, Point::new(0.0, size.h / 2.0 + ASIDE))
+        } else {
+            (size.h, Point::new(size.w / 2.0 + ASIDE, 0.0))
+        };
+        let on = if self.length() > 2.5 * hidden {
+            0.3
+        } else {
+            HIDING
+        };
+        [
+            (on, point),
+            (0.4, Point::new(point.x - away.x, point.y - away.y)),
+            (0.5, Point::new(point.x + away.x, point.y + away.y)),
+        ]
+    }
+}
+
+/// The point at `t` of a cubic, by its four points.
+fn on_cubic(points: [Point; 4], t: f64) -> Point {
+    let rest = 1.0 - t;
+    let weights = [
+        rest * rest * rest,
+        3.0 * rest * rest * t,
+        3.0 * rest * t * t,
+        t * t * t,
+    ];
+    points
+        .iter()
+        .zip(weights)
+        .fold(Point::default(), |sum, (point, weight)| {
+            Point::new(sum.x + weight * point.x, sum.y + weight * point.y)
+        })
+}
+
+/// Rectangles with a number each, found by place.
+struct Field {
+    cell: f64,
+    cells: BTreeMap<(i64, i64), Vec<usize>>,
+    rects: Vec<(Rect, usize)>,
+}
+
+impl Field {
+    fn new(cell: f64) -> Self {
+        Self {
+            cell,
+            cells: BTreeMap::new(),
+            rects: Vec::new(),
+        }
+    }
+
+    fn insert(&mut self, rect: Rect, number: usize) {
+        for cell in self.cells_of(&rect) {
+            self.cells.entry(cell).or_default().push(self.rects.len());
+        }
+        self.rects.push((rect, number));
+    }
+
+    /// The numbers of the rectangles that share a point with this one; a number may come more than once.
+    fn hits<'a>(&'a self, rect: &'a Rect) -> impl Iterator<Item = usize> + 'a {
+        let near = self
+            .cells_of(rect)
+            .into_iter()
+            .filter_map(|cell| self.cells.get(&cell))
+            .flatten();
+        near.map(|&i| &self.rects[i])
+            .filter(|(other, _)| touches(other, rect))
+            .map(|&(_, number)| number)
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "places on a drawing of at most a few million pixels"
+    )]
+    fn cells_of(&self, rect: &Rect) -> Vec<(i64, i64)> {
+        let cell = |at: f64| (at / self.cell).floor() as i64;
+        let rows = cell(rect.y)..=cell(rect.bottom());
+        rows.flat_map(|row| (cell(rect.x)..=cell(rect.right())).map(move |column| (row, column)))
+            .collect()
+    }
+}
+
+/// Whether the two share a point; a rectangle may be as thin as a line.
+fn touches(a: &Rect, b: &Rect) -> bool {
+    a.x < b.right()
+        && b.x < a.right().max(a.x + 1e-6)
+        && a.y < b.bottom()
+        && b.y < a.bottom().max(a.y + 1e-6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::tests::{link, vertex};
+    use crate::layout::{Link, Orientation};
+
+    #[test]
+    fn two_labels_on_two_near_edges_stand_apart() {
+        let labelled = Link {
+            label: Some(Size::new(40.0, 13.0)),
+            ..link(0, 1)
+        };
+        let plan = Plan {
+            vertices: vec![vertex(None); 2],
+            links: vec![labelled; 2],
+            clusters: vec![],
+        };
+        let level = |y: f64| Route {
+            start: Point::new(80.0, y),
+            curves: vec![[
+                Point::new(110.0, y),
+                Point::new(170.0, y),
+                Point::new(200.0, y),
+            ]],
+            label: None,
+        };
+        let mut layout = Layout {
+            orientation: Orientation::LeftRight,
+            size: Size::new(280.0, 30.0),
+            boxes: vec![
+                Rect::new(0.0, 0.0, 80.0, 30.0),
+                Rect::new(200.0, 0.0, 80.0, 30.0),
+            ],
+            routes: vec![level(12.0), level(18.0)],
+            clusters: vec![],
+            remarks: vec![],
+        };
+        place(&plan, &mut layout);
+        let rect = |i: usize| Rect::around(layout.routes[i].label.unwrap(), Size::new(40.0, 13.0));
+        assert!(!rect(0).overlaps(&rect(1)));
+        assert!(
+            layout
+                .boxes
+                .iter()
+                .all(|b| !b.overlaps(&rect(0)) && !b.overlaps(&rect(1)))
+        );
+    }
+}

@@ -1,0 +1,191 @@
+//! The order of the items in each layer: barycentre and median sweeps with transposition, fewest crossings kept.
+//!
+//! It knows its sibling that sorts; the two are one step, in two files for their length.
+
+use super::crossings::CrossingReducer;
+use crate::layout::{Layers, Rows};
+
+/// How often one order is swept at most, and after how many sweeps without gain it is given up.
+const SWEEPS: usize = 24;
+const PATIENCE: usize = 6;
+/// How often the best order is shaken at most.
+const SHAKES: usize = 8;
+
+/// The best order found and its number of crossings, borders of clusters included. `effort` counts edges swept: the
+/// search begins anew, then shakes the best order, until it is spent.
+pub(crate) fn order(layers: &Layers, effort: usize) -> (Rows, u64) {
+    let mut search = Search {
+        layers,
+        effort,
+        best: (Rows::new(), u64::MAX),
+    };
+    search.improve(&depth_first(layers, true), true);
+    if search.effort > 0 {
+        search.improve_flat();
+    }
+    if search.effort > 0 {
+        search.improve(&depth_first(layers, false), false);
+    }
+    let mut dice = Dice(1);
+    for _ in 0..SHAKES {
+        if search.effort == 0 || search.best.1 == 0 {
+            break;
+        }
+        let shaken = search.shaken(&mut dice);
+        search.improve(&shaken, dice.throw() > 0.0);
+    }
+    search.best
+}
+
+/// A search for an order with few crossings.
+struct Search<'a> {
+    layers: &'a Layers,
+    effort: usize,
+    best: (Rows, u64),
+}
+
+impl Search<'_> {
+    /// Sorts by these keys and sweeps while that gains something.
+    fn improve(&mut self, key: &[f64], downwards: bool) {
+        let edges = self.layers.rank.len();
+        let mut sorter = CrossingReducer::new(self.layers, key);
+        let mut found = (sorter.rows.clone(), sorter.crossings());
+        let mut stalled = 0;
+        for sweep in 0..SWEEPS {
+            sorter.sweep((sweep % 2 == 0) == downwards, sweep % 4 >= 2);
+            sorter.transpose();
+            self.effort = self.effort.saturating_sub(edges);
+            let crossings = sorter.crossings();
+            stalled += 1;
+            if crossings < found.1 {
+                found = (sorter.rows.clone(), crossings);
+                stalled = 0;
+            }
+            if stalled > PATIENCE || found.1 == 0 {
+                break;
+            }
+        }
+        if found.1 <= self.best.1 {
+            self.best = found;
+        }
+    }
+
+    /// Begins with the best order that disregards clusters.
+    fn improve_flat(&mut self) {
+        if self.layers.parent.len() < 2 {
+            return;
+        }
+        let flat = self.layers.without_clusters();
+        let mut search = Search {
+            layers: &flat,
+            effort: self.effort,
+            best: (Rows::new(), u64::MAX),
+        };
+        search.improve(&depth_first(&flat, false), true);
+        self.effort = search.effort;
+        let mut key = vec![f64::NAN; self.layers.rank.len()];
+        for row in &search.best.0 {
+            for (i, &v) in row.iter().enumerate() {
+                key[v] = i as f64 - row.len() as f64 / 2.0;
+            }
+        }
+        self.improve(&key, true);
+    }
+
+    /// Keys near the places of the best rows, with some clusters and a few items thrown elsewhere.
+    fn shaken(&self, dice: &mut Dice) -> Vec<f64> {
+        let rows = &self.best.0;
+        let widest = rows.iter().map(Vec::len).max().unwrap_or(0) as f64;
+        let mut throw = |odds: f64| {
+            if dice.throw() + 0.5 < odds {
+                dice.throw() * widest
+            } else {
+                0.0
+            }
+        };
+        let shift: Vec<f64> = self.layers.parent.iter().map(|_| throw(0.3)).collect();
+        let mut key = vec![0.0; self.layers.rank.len()];
+        for row in rows {
+            for (i, &v) in row.iter().enumerate() {
+                key[v] = i as f64 - row.len() as f64 / 2.0 + throw(0.05);
+                let mut cluster = self.layers.home[v];
+                while cluster != 0 {
+                    key[v] += shift[cluster];
+                    cluster = self.layers.parent[cluster];
+                }
+            }
+        }
+        key
+    }
+}
+
+/// The same throws on every machine: Knuth's linear congruence.
+struct Dice(u64);
+
+impl Dice {
+    /// A number from -0.5 to 0.5.
+    fn throw(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+    }
+}
+
+/// When a walk through the graph meets each item; it begins at the sources, or at the sinks.
+fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
+    let n = layers.rank.len();
+    let ends = if sources { &layers.up } else { &layers.down };
+    let mut met = vec![f64::NAN; n];
+    let mut clock = 0.0;
+    for begin in (0..n).filter(|&v| ends[v].is_empty()).chain(0..n) {
+        let mut stack = vec![begin];
+        while let Some(v) = stack.pop() {
+            if met[v].is_nan() {
+                met[v] = clock;
+                clock += 1.0;
+                stack.extend(
+                    layers.down[v]
+                        .iter()
+                        .chain(&layers.up[v])
+                        .filter(|&&u| met[u].is_nan()),
+                );
+            }
+        }
+    }
+    met
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::Kind;
+
+    /// Three layers of two; each item leads to the one diagonally across.
+    fn crossed() -> Layers {
+        let mut layers = Layers {
+            vertices: 6,
+            kind: vec![Kind::Vertex; 6],
+            rank: vec![0, 0, 1, 1, 2, 2],
+            home: vec![0; 6],
+            up: vec![Vec::new(); 6],
+            down: vec![Vec::new(); 6],
+            parent: vec![0],
+            ranks: 3,
+            ..Layers::default()
+        };
+        for (from, to) in [(0, 3), (1, 2), (2, 5), (3, 4)] {
+            layers.down[from].push(to);
+            layers.up[to].push(from);
+        }
+        layers
+    }
+
+    #[test]
+    fn crossings_that_need_not_be_are_undone() {
+        let (rows, crossings) = order(&crossed(), 1000);
+        assert_eq!(crossings, 0);
+        assert_eq!(rows.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2, 2]);
+    }
+}

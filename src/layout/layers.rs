@@ -1,0 +1,169 @@
+//! A part cut into layers: long edges led through the layers between their ends, clusters bordered in each layer.
+
+use crate::layout::{Kind, Layers, Part};
+
+/// Which cluster a long edge passes a layer in, besides the one around both of its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Lane {
+    /// No other.
+    Outside,
+    /// The one that it comes to, or else the one that it came from, if that spans the layer.
+    Inside,
+}
+
+/// The layers of a part with these ranks; an edge that runs against them is led the other way.
+pub(crate) fn cut(part: &Part, rank: &[usize], lane: Lane) -> Layers {
+    let n = part.vertices.len();
+    let mut layers = Layers {
+        vertices: n,
+        kind: vec![Kind::Vertex; n],
+        rank: rank.to_vec(),
+        home: part.home.clone(),
+        up: vec![Vec::new(); n],
+        down: vec![Vec::new(); n],
+        chains: Vec::new(),
+        parent: part.parent.clone(),
+        span: spans(part, rank),
+        borders: Vec::new(),
+        ranks: rank.iter().max().map_or(0, |r| r + 1),
+    };
+    for &(from, to) in &part.ends {
+        let chain = match rank[from].cmp(&rank[to]) {
+            std::cmp::Ordering::Less => layers.chain(from, to, lane),
+            std::cmp::Ordering::Greater => layers.chain(to, from, lane),
+            std::cmp::Ordering::Equal => Vec::new(),
+        };
+        layers.chains.push(chain);
+    }
+    layers.add_borders();
+    layers
+}
+
+/// How many items the layers would have.
+pub(crate) fn items(part: &Part, rank: &[usize]) -> usize {
+    let bends = part
+        .ends
+        .iter()
+        .map(|&(from, to)| rank[from].abs_diff(rank[to]).saturating_sub(1))
+        .sum::<usize>();
+    let borders = spans(part, rank)
+        .iter()
+        .skip(1)
+        .map(|(low, high)| 2 * (high - low + 1))
+        .sum::<usize>();
+    part.vertices.len() + bends + borders
+}
+
+/// The first and last rank in each cluster.
+fn spans(part: &Part, rank: &[usize]) -> Vec<(usize, usize)> {
+    let mut span = vec![(usize::MAX, 0); part.parent.len()];
+    for (&home, &rank) in part.home.iter().zip(rank) {
+        let mut cluster = home;
+        while cluster != 0 {
+            let (low, high) = &mut span[cluster];
+            (*low, *high) = ((*low).min(rank), (*high).max(rank));
+            cluster = part.parent[cluster];
+        }
+    }
+    span
+}
+
+impl Layers {
+    fn push(&mut self, kind: Kind, rank: usize, home: usize) -> usize {
+        self.kind.push(kind);
+        self.rank.push(rank);
+        self.home.push(home);
+        self.up.push(Vec::new());
+        self.down.push(Vec::new());
+        self.kind.len() - 1
+    }
+
+    fn link(&mut self, before: usize, after: usize) {
+        self.down[before].push(after);
+        self.up[after].push(before);
+    }
+
+    /// Leads an edge from its earlier end to its later.
+    fn chain(&mut self, from: usize, to: usize, lane: Lane) -> Vec<usize> {
+        let shared = self.shared_home(from, to);
+        let mut chain = vec![from];
+        for rank in self.rank[from] + 1..self.rank[to] {
+            let home = match lane {
+                Lane::Outside => shared,
+                Lane::Inside => {
+                    let spanning = |end| self.spanning(end, rank, shared);
+                    spanning(to).or_else(|| spanning(from)).unwrap_or(shared)
+                }
+            };
+            let bend = self.push(Kind::Bend, rank, home);
+            self.link(chain[chain.len() - 1], bend);
+            chain.push(bend);
+        }
+        self.link(chain[chain.len() - 1], to);
+        chain.push(to);
+        chain
+    }
+
+    /// The innermost cluster around both.
+    fn shared_home(&self, a: usize, b: usize) -> usize {
+        let (mut a, mut b) = (self.home[a], self.home[b]);
+        while a != b {
+            // Parents have smaller numbers than their children.
+            if a > b {
+                a = self.parent[a];
+            } else {
+                b = self.parent[b];
+            }
+        }
+        a
+    }
+
+    /// The innermost cluster around an end, but inside `around`, that spans a layer.
+    fn spanning(&self, end: usize, rank: usize, around: usize) -> Option<usize> {
+        let mut cluster = self.home[end];
+        while cluster != around {
+            let (low, high) = self.span[cluster];
+            if (low..=high).contains(&rank) {
+                return Some(cluster);
+            }
+            cluster = self.parent[cluster];
+        }
+        None
+    }
+
+    /// Puts a border of each cluster first and last into every layer that it spans.
+    fn add_borders(&mut self) {
+        self.borders = vec![(0, 0)];
+        for cluster in 1..self.parent.len() {
+            let (low, high) = self.span[cluster];
+            self.borders.push((self.kind.len(), self.kind.len() + 1));
+            for rank in low..=high {
+                let top = self.push(Kind::Top, rank, cluster);
+                let bottom = self.push(Kind::Bottom, rank, cluster);
+                if rank > low {
+                    self.link(top - 2, top);
+                    self.link(bottom - 2, bottom);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_edge_bends_in_every_layer_between() {
+        let part = Part {
+            vertices: vec![0, 1, 2],
+            ends: vec![(0, 1), (1, 2), (2, 0)],
+            home: vec![0; 3],
+            parent: vec![0],
+            ..Part::default()
+        };
+        let layers = cut(&part, &[0, 1, 2], Lane::Outside);
+        assert_eq!(layers.chains, [vec![0, 1], vec![1, 2], vec![0, 3, 2]]);
+        assert_eq!(layers.kind[3], Kind::Bend);
+    }
+}

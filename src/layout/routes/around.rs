@@ -1,0 +1,293 @@
+//! Routes between boxes that stand anywhere: straight where nothing is in the way, else around the corners of boxes.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use crate::base::geometry::{Point, Rect, Size};
+use crate::layout::{Outline, Plan, Route};
+
+/// How near to a foreign box an edge may come, and how far from it an edge turns.
+const CLEAR: f64 = 3.0;
+const TURN: f64 = 5.0;
+/// The distance of edges between the same two boxes.
+const PARALLEL: f64 = 6.0;
+/// How many pairs of line and box may be looked at, over all edges; what is left then runs straight.
+const EFFORT: usize = 40_000_000;
+
+/// A route per link; also how many of them run through foreign boxes because no way was found.
+pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
+    let mut map = Map::new(boxes);
+    let mut met: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    let mut routes = vec![Route::default(); plan.links.len()];
+    let mut straight = 0;
+    for i in plan.valid_links() {
+        let (from, to) = (plan.links[i].from, plan.links[i].to);
+        let count = met.entry((from.min(to), from.max(to))).or_insert(0);
+        *count += 1;
+        let ends = (
+            Place {
+                plan,
+                boxes,
+                v: from,
+            },
+            Place { plan, boxes, v: to },
+        );
+        if from == to {
+            routes[i] = ends.0.self_loop(*count);
+            continue;
+        }
+        let (a, b) = shifted(&ends, *count);
+        let way = map.way(a, b, (from, to)).unwrap_or_else(|| {
+            straight += 1;
+            vec![a, b]
+        });
+        routes[i] = drawn(&ends, &way);
+    }
+    (routes, straight)
+}
+
+/// A vertex where it stands.
+struct Place<'a> {
+    plan: &'a Plan,
+    boxes: &'a [Rect],
+    v: usize,
+}
+
+impl Place<'_> {
+    fn rect(&self) -> Rect {
+        self.boxes[self.v]
+    }
+
+    /// Where the line from a point inside to a point outside leaves the outline.
+    fn leaves(&self, inside: Point, outside: Point) -> Point {
+        let rect = self.rect();
+        let (mut low, mut high) = (0.0, 1.0);
+        let at = |t: f64| {
+            Point::new(
+                inside.x + (outside.x - inside.x) * t,
+                inside.y + (outside.y - inside.y) * t,
+            )
+        };
+        for _ in 0..40 {
+            let middle = f64::midpoint(low, high);
+            if contains(&rect, self.plan.vertices[self.v].outline, at(middle)) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        at(high)
+    }
+
+    /// A small arc on top, the later ones around the earlier.
+    fn self_loop(&self, count: usize) -> Route {
+        let (rect, n) = (self.rect(), count as f64);
+        let half = (3.0 + 3.0 * n).min(rect.w / 4.0);
+        let (x, top) = (rect.centre().x, rect.y - 6.0 - 8.0 * n);
+        let foot =
+            |x: f64| self.leaves(Point::new(x, rect.centre().y), Point::new(x, rect.y - 1.0));
+        let (start, end) = (foot(x - half), foot(x + half));
+        Route {
+            start,
+            curves: vec![[Point::new(start.x, top), Point::new(end.x, top), end]],
+            label: None,
+        }
+    }
+}
+
+fn contains(rect: &Rect, outline: Outline, p: Point) -> bool {
+    let centre = rect.centre();
+    let (x, y) = (
+        (p.x - centre.x) / (rect.w / 2.0).max(1e-9),
+        (p.y - centre.y) / (rect.h / 2.0).max(1e-9),
+    );
+    match outline {
+        Outline::Box => x.abs() <= 1.0 && y.abs() <= 1.0,
+        Outline::Ellipse => x * x + y * y <= 1.0,
+    }
+}
+
+/// The ends of the `count`-th edge between two boxes, inside both, beside those of the edges before.
+fn shifted((from, to): &(Place, Place), count: usize) -> (Point, Point) {
+    let (start, end) = (from.rect().centre(), to.rect().centre());
+    let step = (count / 2) as f64
+        * if count.is_multiple_of(2) {
+            PARALLEL
+        } else {
+            -PARALLEL
+        };
+    // The same side for edges there and back.
+    let step = if from.v < to.v { step } else { -step };
+    let length = libm::hypot(end.x - start.x, end.y - start.y).max(1e-9);
+    let aside = Point::new(
+        (start.y - end.y) / length * step,
+        (end.x - start.x) / length * step,
+    );
+    let inside = |rect: Rect| {
+        let (most, centre) = (Size::new(rect.w / 4.0, rect.h / 4.0), rect.centre());
+        Point::new(
+            centre.x + aside.x.clamp(-most.w, most.w),
+            centre.y + aside.y.clamp(-most.h, most.h),
+        )
+    };
+    (inside(from.rect()), inside(to.rect()))
+}
+
+/// The way cut at the outlines, as straight pieces.
+fn drawn((a, b): &(Place, Place), way: &[Point]) -> Route {
+    let last = way.len() - 1;
+    let start = a.leaves(way[0], way[1]);
+    let mut points = vec![start];
+    points.extend(&way[1..last]);
+    points.push(b.leaves(way[last], way[last - 1]));
+    let third =
+        |p: Point, q: Point, t: f64| Point::new(p.x + (q.x - p.x) * t, p.y + (q.y - p.y) * t);
+    let piece = |pair: &[Point]| {
+        [
+            third(pair[0], pair[1], 1.0 / 3.0),
+            third(pair[0], pair[1], 2.0 / 3.0),
+            pair[1],
+        ]
+    };
+    Route {
+        start,
+        curves: points.windows(2).map(piece).collect(),
+        label: None,
+    }
+}
+
+/// What stands in the way, and where one can turn.
+struct Map {
+    obstacles: Vec<Rect>,
+    corners: Vec<Point>,
+    effort: usize,
+}
+
+impl Map {
+    fn new(boxes: &[Rect]) -> Self {
+        let obstacles: Vec<Rect> = boxes.iter().map(|rect| rect.grown(CLEAR)).collect();
+        let mut corners = Vec::new();
+        for rect in boxes.iter().map(|rect| rect.grown(TURN)) {
+            for (x, y) in [
+                (rect.x, rect.y),
+                (rect.right(), rect.y),
+                (rect.x, rect.bottom()),
+                (rect.right(), rect.bottom()),
+            ] {
+                let dot = Rect::new(x, y, 1e-6, 1e-6);
+                if !obstacles.iter().any(|other| other.overlaps(&dot)) {
+                    corners.push(Point::new(x, y));
+                }
+            }
+        }
+        Self {
+            obstacles,
+            corners,
+            effort: EFFORT,
+        }
+    }
+
+    /// The shortest way around the boxes that are not its own.
+    fn way(&mut self, a: Point, b: Point, own: (usize, usize)) -> Option<Vec<Point>> {
+        if self.clear(a, b, own) {
+            return Some(vec![a, b]);
+        }
+        let mut points = vec![a, b];
+        points.extend(&self.corners);
+        let far = |p: Point, q: Point| libm::hypot(p.x - q.x, p.y - q.y);
+        let mut best = vec![f64::INFINITY; points.len()];
+        let mut from = vec![0; points.len()];
+        let mut done = vec![false; points.len()];
+        best[0] = 0.0;
+        // Lengths are not negative, so their bits sort like them.
+        let mut queue = BinaryHeap::from([(Reverse(far(a, b).to_bits()), 0)]);
+        while let Some((_, at)) = queue.pop() {
+            if at == 1 {
+                return Some(traced(&points, &from));
+            }
+            if std::mem::replace(&mut done[at], true) {
+                continue;
+            }
+            for next in 1..points.len() {
+                let length = best[at] + far(points[at], points[next]);
+                if done[next] || length >= best[next] || !self.clear(points[at], points[next], own)
+                {
+                    continue;
+                }
+                (best[next], from[next]) = (length, at);
+                queue.push((Reverse((length + far(points[next], b)).to_bits()), next));
+            }
+        }
+        None
+    }
+
+    /// Whether a line meets no box besides its own; without effort left, no line does.
+    fn clear(&mut self, a: Point, b: Point, own: (usize, usize)) -> bool {
+        if self.effort < self.obstacles.len() {
+            return false;
+        }
+        self.effort -= self.obstacles.len();
+        let foreign = |v: usize| v != own.0 && v != own.1;
+        !self
+            .obstacles
+            .iter()
+            .enumerate()
+            .any(|(v, rect)| foreign(v) && meets(a, b, rect))
+    }
+}
+
+/// The points on the way to the second one.
+fn traced(points: &[Point], from: &[usize]) -> Vec<Point> {
+    let mut way = vec![points[1]];
+    let mut at = 1;
+    while at != 0 {
+        at = from[at];
+        way.push(points[at]);
+    }
+    way.reverse();
+    way
+}
+
+/// Whether a line runs through the inside of a box (Liang and Barsky 1984).
+fn meets(a: Point, b: Point, rect: &Rect) -> bool {
+    let (mut low, mut high) = (0.0_f64, 1.0_f64);
+    for (start, way, least, most) in [
+        (a.x, b.x - a.x, rect.x, rect.right()),
+        (a.y, b.y - a.y, rect.y, rect.bottom()),
+    ] {
+        if way.abs() < 1e-12 {
+            if start <= least || start >= most {
+                return false;
+            }
+            continue;
+        }
+        let (t, u) = ((least - start) / way, (most - start) / way);
+        (low, high) = (low.max(t.min(u)), high.min(t.max(u)));
+    }
+    low < high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::tests::{link, vertex};
+
+    #[test]
+    fn an_edge_goes_around_what_stands_between() {
+        let plan = Plan {
+            vertices: vec![vertex(None); 3],
+            links: vec![link(0, 2)],
+            clusters: vec![],
+        };
+        let boxes = [0.0, 150.0, 300.0].map(|x| Rect::new(x, 0.0, 80.0, 30.0));
+        let (routes, straight) = routes(&plan, &boxes);
+        assert_eq!(straight, 0);
+        assert!(routes[0].curves.len() > 1);
+        let ends: Vec<Point> = routes[0].points().collect();
+        assert!(
+            !ends
+                .windows(2)
+                .any(|pair| meets(pair[0], pair[1], &boxes[1]))
+        );
+    }
+}

@@ -1,0 +1,306 @@
+//! How much room everything takes: distances across, columns along, and the boxes around clusters.
+//!
+//! Here x runs along the edges and y across; [`Spacing::turned`] brings sizes there and back.
+
+use crate::base::geometry::{Rect, Size};
+use crate::layout::{Kind, Layers, Orientation, Part, Plan, Rows};
+
+/// The room between boxes side by side, between edges side by side, and between an edge and anything else.
+const BOX_GAP: f64 = 12.0;
+const EDGE_GAP: f64 = 7.0;
+/// The room between a cluster's border and what is inside, and outside.
+const PADDING: f64 = 7.0;
+const MARGIN: f64 = 4.0;
+/// The room before and after a label between two layers.
+const LABEL_GAP: f64 = 12.0;
+/// The room that the first self loop takes beside its vertex, and each further one.
+const LOOP: (f64, f64) = (14.0, 6.0);
+
+/// The sizes of one part, seen in one orientation.
+pub(crate) struct Spacing<'a> {
+    layers: &'a Layers,
+    orientation: Orientation,
+    /// The size of each vertex.
+    pub(crate) size: Vec<Size>,
+    /// How many self loops each vertex has.
+    loops: Vec<usize>,
+    /// The longest label along that stands between a layer and the next.
+    label: Vec<f64>,
+    /// The size of each cluster's title; the first stands for the outside.
+    title: Vec<Size>,
+}
+
+impl<'a> Spacing<'a> {
+    pub(crate) fn new(
+        plan: &Plan,
+        part: &Part,
+        layers: &'a Layers,
+        orientation: Orientation,
+    ) -> Self {
+        let mut loops = vec![0; part.vertices.len()];
+        for &(from, _) in part.ends.iter().filter(|(from, to)| from == to) {
+            loops[from] += 1;
+        }
+        let mut label = vec![0.0_f64; layers.ranks];
+        for (&i, chain) in part.links.iter().zip(&layers.chains) {
+            if let (Some(size), &[first, _]) = (plan.links[i].label, chain.as_slice()) {
+                let label = &mut label[layers.rank[first]];
+                *label = label.max(turned(size, orientation).w);
+            }
+        }
+        let size = |&v: &usize| turned(plan.vertices[v].size, orientation);
+        let title = |&c: &usize| turned(plan.clusters[c].title, orientation);
+        Self {
+            layers,
+            orientation,
+            size: part.vertices.iter().map(size).collect(),
+            loops,
+            label,
+            title: std::iter::once(Size::default())
+                .chain(part.clusters.iter().map(title))
+                .collect(),
+        }
+    }
+
+    /// The room that the self loops of a vertex take on each side across.
+    pub(crate) fn loop_room(&self, v: usize) -> f64 {
+        match self.loops[v] {
+            0 => 0.0,
+            n => LOOP.0 + LOOP.1 * (n - 1) as f64,
+        }
+    }
+
+    /// The distances between neighbours in every row.
+    pub(crate) fn apart(&self, rows: &Rows) -> Vec<Vec<f64>> {
+        let distance = |pair: &[usize]| {
+            self.reach(pair[0], true) + self.reach(pair[1], false) + self.gap(pair[0], pair[1])
+        };
+        let mut apart: Vec<Vec<f64>> = rows
+            .iter()
+            .map(|row| row.windows(2).map(distance).collect())
+            .collect();
+        for cluster in (1..self.layers.parent.len()).rev() {
+            let rank = self.layers.span[cluster].0;
+            self.widen_for_title(cluster, &rows[rank], &mut apart[rank]);
+        }
+        apart
+    }
+
+    /// How far an item reaches across from its middle; borders reach inwards only.
+    fn reach(&self, item: usize, onwards: bool) -> f64 {
+        match (self.layers.kind[item], self.orientation) {
+            (Kind::Vertex, _) => self.size[item].h / 2.0 + self.loop_room(item),
+            (Kind::Top, Orientation::LeftRight) if onwards => {
+                PADDING + self.title[self.layers.home[item]].h
+            }
+            (Kind::Top, Orientation::TopBottom) if onwards => PADDING,
+            (Kind::Bottom, _) if !onwards => PADDING,
+            _ => 0.0,
+        }
+    }
+
+    fn gap(&self, a: usize, b: usize) -> f64 {
+        match (self.layers.kind[a], self.layers.kind[b]) {
+            (Kind::Vertex, Kind::Vertex) => BOX_GAP,
+            (Kind::Vertex | Kind::Bend, Kind::Vertex | Kind::Bend) => EDGE_GAP,
+            (Kind::Top, Kind::Vertex | Kind::Top) | (Kind::Vertex | Kind::Bottom, Kind::Bottom) => {
+                0.0
+            }
+            _ => MARGIN,
+        }
+    }
+
+    /// Keeps the borders of a cluster far enough apart for a title that runs across.
+    fn widen_for_title(&self, cluster: usize, row: &[usize], apart: &mut [f64]) {
+        let (top, bottom) = self.layers.borders[cluster];
+        let at = |item| row.iter().position(|&v| v == item);
+        if let (Some(first), Some(last)) = (at(top), at(bottom)) {
+            let gaps = &mut apart[first..last];
+            let missing = self.title[cluster].h + 2.0 * PADDING - gaps.iter().sum::<f64>();
+            if let Some(gap) = gaps.last_mut() {
+                *gap += missing.max(0.0);
+            }
+        }
+    }
+
+    /// The extent of every layer along.
+    pub(crate) fn columns(&self, rows: &Rows, across: &[f64]) -> Vec<(f64, f64)> {
+        let depth = self.depths();
+        let mut width = self.widths();
+        let bending = rows.iter().map(|row| self.bending_room(row, across));
+        let gaps: Vec<f64> = bending
+            .zip(&self.label)
+            .map(|(room, label)| room.max(label + LABEL_GAP))
+            .collect();
+        self.widen_for_titles(&mut width, &gaps);
+        let mut at = 0.0;
+        let mut columns = Vec::new();
+        for (rank, width) in width.into_iter().enumerate() {
+            at += depth[rank].0;
+            columns.push((at, at + width));
+            at += width + depth[rank].1 + gaps[rank];
+        }
+        columns
+    }
+
+    fn widths(&self) -> Vec<f64> {
+        let mut width = vec![0.0_f64; self.layers.ranks];
+        for (v, size) in self.size.iter().enumerate() {
+            let width = &mut width[self.layers.rank[v]];
+            *width = width.max(size.w);
+        }
+        width
+    }
+
+    /// Makes the last layer of a cluster wide enough for a title that runs along.
+    fn widen_for_titles(&self, width: &mut [f64], gaps: &[f64]) {
+        for cluster in 1..self.layers.parent.len() {
+            let (low, high) = self.layers.span[cluster];
+            let own = width[low..=high].iter().sum::<f64>() + gaps[low..high].iter().sum::<f64>();
+            width[high] += (self.title[cluster].w - own).max(0.0);
+        }
+    }
+
+    /// The room that borders of clusters need before and after every layer.
+    fn depths(&self) -> Vec<(f64, f64)> {
+        let mut depth = vec![(0.0_f64, 0.0_f64); self.layers.ranks];
+        for cluster in 1..self.layers.parent.len() {
+            let (low, high) = self.layers.span[cluster];
+            let (before, after) = (self.depth(cluster, low).0, self.depth(cluster, high).1);
+            depth[low].0 = depth[low].0.max(before);
+            depth[high].1 = depth[high].1.max(after);
+        }
+        depth
+    }
+
+    /// The room that the borders from `cluster` outwards need before and after a layer.
+    fn depth(&self, cluster: usize, rank: usize) -> (f64, f64) {
+        let (mut before, mut after) = (0.0, 0.0);
+        let mut cluster = cluster;
+        while cluster != 0 {
+            let (low, high) = self.layers.span[cluster];
+            if low == rank {
+                before += self.lead(cluster);
+            }
+            if high == rank {
+                after += PADDING;
+            }
+            cluster = self.layers.parent[cluster];
+        }
+        (before, after)
+    }
+
+    /// The room between the border where a cluster begins along and what is inside.
+    fn lead(&self, cluster: usize) -> f64 {
+        match self.orientation {
+            Orientation::LeftRight => PADDING,
+            Orientation::TopBottom => PADDING + self.title[cluster].w,
+        }
+    }
+
+    /// The room between the border where a cluster begins across and what is inside.
+    fn headroom(&self, cluster: usize) -> f64 {
+        match self.orientation {
+            Orientation::LeftRight => PADDING + self.title[cluster].h,
+            Orientation::TopBottom => PADDING,
+        }
+    }
+
+    /// The room that edges need to bend after a row: more for many and for steep ones.
+    fn bending_room(&self, row: &[usize], across: &[f64]) -> f64 {
+        let (mut edges, mut steepest) = (0.0, 0.0_f64);
+        for &v in row
+            .iter()
+            .filter(|&&v| matches!(self.layers.kind[v], Kind::Vertex | Kind::Bend))
+        {
+            for &u in &self.layers.down[v] {
+                edges += 1.0;
+                steepest = steepest.max((across[v] - across[u]).abs());
+            }
+        }
+        20.0 + (edges * 0.4_f64).min(11.0) + (steepest * 0.04).min(16.0)
+    }
+
+    /// A box around each cluster, children inside their parents, all in their borders.
+    pub(crate) fn frames(
+        &self,
+        boxes: &[Rect],
+        across: &[f64],
+        columns: &[(f64, f64)],
+    ) -> Vec<Rect> {
+        let mut content: Vec<Option<Rect>> = vec![None; self.layers.parent.len()];
+        let add = |content: &mut Option<Rect>, rect: Rect| {
+            *content = Some(content.map_or(rect, |all| all.union(&rect)));
+        };
+        for (v, rect) in boxes.iter().enumerate() {
+            let room = self.loop_room(v);
+            let rect = Rect::new(rect.x, rect.y - room, rect.w, rect.h + 2.0 * room);
+            add(&mut content[self.layers.home[v]], rect);
+        }
+        let mut frames = vec![Rect::default(); self.layers.parent.len()];
+        for cluster in (1..frames.len()).rev() {
+            frames[cluster] = self.frame(
+                cluster,
+                &content[cluster].unwrap_or_default(),
+                across,
+                columns,
+            );
+            add(&mut content[self.layers.parent[cluster]], frames[cluster]);
+        }
+        frames.split_off(1)
+    }
+
+    fn frame(
+        &self,
+        cluster: usize,
+        content: &Rect,
+        across: &[f64],
+        columns: &[(f64, f64)],
+    ) -> Rect {
+        let ((top, bottom), (low, high)) =
+            (self.layers.borders[cluster], self.layers.span[cluster]);
+        let (lead, head) = (self.lead(cluster), self.headroom(cluster));
+        let mut frame = Rect::new(
+            content.x - lead,
+            content.y - head,
+            content.w + lead + PADDING,
+            content.h + head + PADDING,
+        );
+        // A title longer than that may need the room up to the borders.
+        let wanted = self.title[cluster];
+        let room = (columns[low].0 - lead, columns[high].1 + PADDING);
+        (frame.x, frame.w) = stretched((frame.x, frame.w), wanted.w + 2.0 * PADDING, room);
+        let room = (across[top], across[bottom]);
+        (frame.y, frame.h) = stretched((frame.y, frame.h), wanted.h + 2.0 * PADDING, room);
+        frame
+    }
+}
+
+/// A stretch `(start, length)` made at least `wanted` long: to its end if there is room, else to its start too.
+fn stretched((start, length): (f64, f64), wanted: f64, room: (f64, f64)) -> (f64, f64) {
+    if length >= wanted {
+        return (start, length);
+    }
+    let end = room.1.max(start + length);
+    (start.min(end - wanted).max(room.0.min(start)), wanted)
+}
+
+/// A size on the page as along and across, or back.
+pub(crate) fn turned(size: Size, orientation: Orientation) -> Size {
+    match orientation {
+        Orientation::LeftRight => size,
+        Orientation::TopBottom => Size::new(size.h, size.w),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_grows_without_leaving_what_it_held() {
+        assert_eq!(stretched((10.0, 30.0), 50.0, (0.0, 100.0)), (10.0, 50.0));
+        assert_eq!(stretched((10.0, 30.0), 50.0, (0.0, 45.0)), (0.0, 50.0));
+        assert_eq!(stretched((10.0, 30.0), 35.0, (0.0, 20.0)), (5.0, 35.0));
+    }
+}

@@ -1,0 +1,100 @@
+//! The whole sequence: every window with its graph and what changed; written as JSON and read back as an input.
+
+pub mod events;
+pub mod info;
+
+mod json;
+pub use json::read::read_json;
+pub use json::write::write_json;
+
+use crate::bag::Report;
+use crate::base::geometry::Rect;
+use crate::base::notice::Notices;
+use crate::base::time::{Period, Span, Stamp};
+use crate::graph::diff::{Change, Changes};
+use crate::graph::{Elements, Graph, NodeId};
+
+/// One window with its graph.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Window {
+    /// Its place, 0...
+    pub index: usize,
+    /// Its time; the last one may be shorter than the period.
+    pub span: Span,
+    /// Whether it is shorter than the period.
+    pub partial: bool,
+    /// Messages in it.
+    pub messages: u64,
+    /// The graph.
+    pub graph: Graph,
+    /// What changed against the window before; empty in the first.
+    pub changes: Vec<Change>,
+}
+
+/// A mission as a sequence of graphs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mission {
+    /// The bags it was read from, in order.
+    pub bags: Vec<Report>,
+    /// From the first message to the last, plus 1 ns.
+    pub span: Span,
+    /// All messages in it.
+    pub messages: u64,
+    /// The length of a window.
+    pub period: Period,
+    /// From the start of one window to the start of the next.
+    pub step: Period,
+    /// Names, types and evidence, once.
+    pub elements: Elements,
+    /// The windows in order; those without a message are there too.
+    pub windows: Vec<Window>,
+    /// Where everything was drawn, if it was.
+    pub layout: Option<Places>,
+    /// What went wrong without stopping us.
+    pub notices: Notices,
+}
+
+/// The places of a drawing, in pixels at scale 1, y down.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Places {
+    /// The width of the whole.
+    pub width: f64,
+    /// The height of the whole.
+    pub height: f64,
+    /// `LR` or `TB`.
+    pub orientation: String,
+    /// A box per node and topic drawn, sorted by (what, name).
+    pub boxes: Vec<Place>,
+}
+
+/// The place of one node or topic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// `node` or `topic`.
+    pub what: String,
+    /// Its full name.
+    pub name: String,
+    /// Where it stands.
+    pub rect: Rect,
+}
+
+impl Mission {
+    /// Finds what changed from each window to the next, anew. A rate must change by more than the share `threshold`;
+    /// `restarts` are nodes that began anew under the same name, and when, sorted by time.
+    pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
+        let mut changes = Changes::new(&self.elements, threshold);
+        for window in &mut self.windows {
+            let inside: Vec<_> = restarts
+                .iter()
+                .copied()
+                .filter(|(_, at)| window.span.contains(*at))
+                .collect();
+            window.changes = changes.next(window.span, &window.graph, &inside);
+        }
+    }
+
+    /// Nanoseconds from the mission's start to `at`.
+    pub fn offset(&self, at: Stamp) -> i64 {
+        at.since(self.span.start)
+    }
+}

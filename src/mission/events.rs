@@ -1,0 +1,150 @@
+//! The reconfiguration log: every change of a mission as one row with its time, in order.
+
+use crate::base::name::last_part;
+use crate::base::time::{Stamp, offset};
+use crate::graph::diff::Change;
+use crate::graph::{Edge, Element};
+use crate::mission::Mission;
+
+/// One reconfiguration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// When, as exactly as the bag tells; the start of the window where it does not.
+    pub time: Stamp,
+    /// Whether `time` is the exact moment, not only the window's start.
+    pub exact: bool,
+    /// The window that shows it, 0...
+    pub window: usize,
+    /// What happened: the word of the change in JSON.
+    pub kind: &'static str,
+    /// To what: `node`, `topic`, `publish` or `subscribe`.
+    pub what: &'static str,
+    /// Its name; of an edge the node's.
+    pub name: String,
+    /// The topic of an edge.
+    pub topic: Option<String>,
+    /// Before: a rate in Hz, nodes, a value.
+    pub from: Option<String>,
+    /// After.
+    pub to: Option<String>,
+}
+
+/// Every change of the mission, sorted by time, then as the windows list them.
+pub fn events(mission: &Mission) -> Vec<Event> {
+    let all = mission.windows.iter().flat_map(|window| {
+        window
+            .changes
+            .iter()
+            .map(|change| event(mission, window.index, window.span.start, change))
+    });
+    let mut events: Vec<Event> = all.collect();
+    events.sort_by_key(|e| (e.window, e.time));
+    events
+}
+
+fn event(mission: &Mission, window: usize, start: Stamp, change: &Change) -> Event {
+    let names = |nodes: &[u32]| {
+        let names: Vec<&str> = nodes
+            .iter()
+            .map(|n| mission.elements.nodes[*n as usize].name.as_str())
+            .collect();
+        Some(names.join(" "))
+    };
+    let (what, time, from, to) = match change {
+        Change::Added { what, time } | Change::Removed { what, time } => (*what, *time, None, None),
+        Change::Restarted { node, time } => (Element::Node(*node), Some(*time), None, None),
+        Change::Rate {
+            what,
+            from_hz,
+            to_hz,
+        } => (*what, None, Some(hz(*from_hz)), Some(hz(*to_hz))),
+        Change::HandedOver { topic, from, to } => {
+            (Element::Topic(*topic), None, names(from), names(to))
+        }
+        Change::Value { what, from, to, .. } => {
+            (*what, None, Some(from.to_string()), Some(to.to_string()))
+        }
+    };
+    let (name, topic) = named(mission, what);
+    Event {
+        time: time.unwrap_or(start),
+        exact: time.is_some(),
+        window,
+        kind: change.word(),
+        what: what.word(),
+        name,
+        topic,
+        from,
+        to,
+    }
+}
+
+/// The name of a node or topic; the node and topic of an edge.
+fn named(mission: &Mission, what: Element) -> (String, Option<String>) {
+    let elements = &mission.elements;
+    let node = |id: u32| elements.nodes[id as usize].name.to_string();
+    let topic = |id: u32| elements.topics[id as usize].name.to_string();
+    let edge = |edge: &Edge| (node(edge.node), Some(topic(edge.topic)));
+    match what {
+        Element::Node(id) => (node(id), None),
+        Element::Topic(id) => (topic(id), None),
+        Element::Publish(id) => edge(&elements.publishes[id as usize]),
+        Element::Subscribe(id) => edge(&elements.subscribes[id as usize]),
+    }
+}
+
+/// A rate as people say it: three significant digits.
+pub fn hz(rate: f64) -> String {
+    let digits = match rate.abs() {
+        r if r >= 99.95 => 0,
+        r if r >= 9.995 => 1,
+        _ => 2,
+    };
+    let text = format!("{rate:.digits$}");
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
+    text.to_owned()
+}
+
+impl Event {
+    /// The event as one sentence without a period: `/planner appeared`, `/scan 15 → 7.4 Hz`.
+    pub fn sentence(&self) -> String {
+        let (from, to) = (
+            self.from.as_deref().unwrap_or(""),
+            self.to.as_deref().unwrap_or(""),
+        );
+        let name = match &self.topic {
+            Some(topic) if self.what == "publish" => format!("{} → {topic}", self.name),
+            Some(topic) => format!("{topic} → {}", self.name),
+            None => self.name.clone(),
+        };
+        match self.kind {
+            "added" => format!("{name} appeared"),
+            "removed" => format!("{name} vanished"),
+            "rate" => format!("{name} {from} → {to} Hz"),
+            "handed_over" => format!("{name} handed over from {from} to {to}"),
+            "restarted" => format!("{name} restarted"),
+            kind => format!("{name} {kind} {} → {}", last_part(from), last_part(to)),
+        }
+    }
+
+    /// When it happened, counted from the mission's start, such as `07:10.2`; `~` in front where only the window is known.
+    pub fn at(&self, mission: &Mission) -> String {
+        let about = if self.exact { "" } else { "~" };
+        format!("{about}{}", offset(mission.offset(self.time)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_said_with_three_digits() {
+        let said: Vec<_> = [0.0, 0.125, 7.4, 15.0, 29.97, 100.0, 1234.5].map(hz).into();
+        assert_eq!(said, ["0", "0.12", "7.4", "15", "30", "100", "1234"]);
+    }
+}

@@ -1,0 +1,343 @@
+//! What a bag holds, what is known of its graph and by which evidence, and what cannot be known.
+
+mod advice;
+mod survey;
+mod text;
+mod why;
+
+use serde::Serialize;
+
+pub use advice::advice;
+pub use survey::{SurveyRow, survey_csv, survey_text};
+pub use text::text;
+pub use why::why;
+
+use crate::evidence::{Degree, Evidence};
+use crate::graph::{Element, NodeId};
+use crate::mission::Mission;
+
+/// All that `bagreel info` tells of one mission. Written as JSON with these names.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Info {
+    /// Always `bagreel.info/1`.
+    pub schema: &'static str,
+    /// The bags of the mission.
+    pub bags: Vec<BagInfo>,
+    /// The first log time, ns since 1970.
+    pub start_ns: i64,
+    /// The last log time + 1 ns.
+    pub end_ns: i64,
+    /// From the first to the last message in seconds.
+    pub duration_s: f64,
+    /// All messages.
+    pub messages: u64,
+    /// How many nodes are known how well.
+    pub nodes_by_degree: Degrees,
+    /// How many publications are known how well.
+    pub publishes_by_degree: Degrees,
+    /// How many subscriptions are known how well.
+    pub subscribes_by_degree: Degrees,
+    /// Topics that carry messages and of which no subscriber is known.
+    pub topics_without_subscriber: usize,
+    /// Each kind of evidence found, with what it proves.
+    pub evidence: Vec<EvidenceInfo>,
+    /// Topics, sorted by name.
+    pub topics: Vec<TopicInfo>,
+    /// Nodes, sorted by name.
+    pub nodes: Vec<NodeInfo>,
+    /// What would have told more, and how to record it; empty if nothing is missing.
+    pub advice: Vec<String>,
+    /// What went wrong without stopping us.
+    pub notices: Vec<String>,
+}
+
+/// One of the bags.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "the names say what `bag::Report` documents")]
+pub struct BagInfo {
+    pub name: String,
+    pub format: String,
+    pub compression: Vec<String>,
+    pub tier: &'static str,
+    pub tier_reason: Option<String>,
+    pub complete: bool,
+    pub file_bytes: u64,
+    pub facts: Vec<(String, String)>,
+}
+
+/// How many elements are known how well at their best.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "the names are those of `Degree`")]
+pub struct Degrees {
+    pub measured: usize,
+    pub stated: usize,
+    pub inferred: usize,
+    pub declared: usize,
+}
+
+impl Degrees {
+    fn add(&mut self, degree: Degree) {
+        match degree {
+            Degree::Measured => self.measured += 1,
+            Degree::Stated => self.stated += 1,
+            Degree::Inferred => self.inferred += 1,
+            Degree::Declared => self.declared += 1,
+        }
+    }
+
+    /// All of them together.
+    pub fn total(&self) -> usize {
+        self.measured + self.stated + self.inferred + self.declared
+    }
+}
+
+/// A kind of evidence and how much it proves.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct EvidenceInfo {
+    /// Its word in JSON.
+    pub source: &'static str,
+    /// Nodes that it proves.
+    pub nodes: usize,
+    /// Publications that it proves.
+    pub publishes: usize,
+    /// Subscriptions that it proves.
+    pub subscribes: usize,
+}
+
+/// A topic over the whole mission.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TopicInfo {
+    /// Its name.
+    pub name: String,
+    /// Its types, sorted.
+    pub types: Vec<String>,
+    /// Messages.
+    pub count: u64,
+    /// Messages per second from the first message to the last; `None` with fewer than two.
+    pub hz: Option<f64>,
+    /// Payload bytes, if known.
+    pub bytes: Option<u64>,
+    /// Who publishes it.
+    pub publishers: Vec<String>,
+    /// Who subscribes it, as far as known.
+    pub subscribers: Vec<String>,
+    /// Quality of service, if known.
+    pub qos: Option<String>,
+    /// Messages per equal part of the mission.
+    pub activity: Vec<u64>,
+}
+
+/// A node over the whole mission.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NodeInfo {
+    /// Its name.
+    pub name: String,
+    /// How well it is known at its best.
+    pub degree: &'static str,
+    /// What proves it.
+    pub evidence: Vec<&'static str>,
+    /// First sign of life, ns since 1970.
+    pub first_ns: Option<i64>,
+    /// Last sign of life.
+    pub last_ns: Option<i64>,
+    /// How many topics it publishes.
+    pub publishes: usize,
+    /// How many topics it is known to subscribe.
+    pub subscribes: usize,
+    /// Messages that it sent, where publishers are known.
+    pub sent: Option<u64>,
+    /// Messages on the topics that it is known to subscribe; `None` if it is known to subscribe none.
+    pub received: Option<u64>,
+}
+
+/// Tells of a mission; its windows become the parts of each topic's activity.
+pub fn info(mission: &Mission) -> Info {
+    let elements = &mission.elements;
+    let best = BestDegrees::of(mission);
+    let sent = sent(mission);
+    let topics = topics(mission);
+    let nodes = elements.nodes.iter().enumerate().map(|(id, node)| {
+        let own = |edge: &&crate::graph::Edge| edge.node as usize == id;
+        let subscribed = || elements.subscribes.iter().filter(own);
+        let received = subscribed()
+            .map(|edge| topics[edge.topic as usize].count)
+            .sum();
+        NodeInfo {
+            name: node.name.to_string(),
+            degree: best.nodes[id].word(),
+            evidence: node.evidence.words().collect(),
+            first_ns: node.first.map(|t| t.0),
+            last_ns: node.last.map(|t| t.0),
+            publishes: elements.publishes.iter().filter(own).count(),
+            subscribes: subscribed().count(),
+            sent: sent[id],
+            received: (subscribed().count() > 0).then_some(received),
+        }
+    });
+    let silent_ears = topics
+        .iter()
+        .filter(|t| t.count > 0 && t.subscribers.is_empty())
+        .count();
+    Info {
+        schema: "bagreel.info/1",
+        bags: bags(mission),
+        start_ns: mission.span.start.0,
+        end_ns: mission.span.end.0,
+        duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
+        messages: mission.messages,
+        nodes_by_degree: counted(&best.nodes),
+        publishes_by_degree: counted(&best.publishes),
+        subscribes_by_degree: counted(&best.subscribes),
+        topics_without_subscriber: silent_ears,
+        evidence: evidence(mission),
+        nodes: nodes.collect(),
+        topics,
+        advice: advice(mission, silent_ears),
+        notices: mission.notices.iter().map(|n| n.text).collect(),
+    }
+}
+
+/// Any part of this module as JSON, ending in a new line.
+pub fn json(value: &impl Serialize) -> String {
+    // Only maps with keys that are no strings fail, and there are none.
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+}
+
+fn bags(mission: &Mission) -> Vec<BagInfo> {
+    let told = mission.bags.iter().map(|bag| BagInfo {
+        name: bag.name.clone(),
+        format: bag.format.clone(),
+        compression: bag.compression.clone(),
+        tier: bag.tier.word(),
+        tier_reason: bag.tier_reason.clone(),
+        complete: bag.complete,
+        file_bytes: bag.file_bytes,
+        facts: bag.facts.clone(),
+    });
+    told.collect()
+}
+
+/// The best degree of every element over all windows.
+struct BestDegrees {
+    nodes: Vec<Degree>,
+    publishes: Vec<Degree>,
+    subscribes: Vec<Degree>,
+}
+
+impl BestDegrees {
+    fn of(mission: &Mission) -> Self {
+        let elements = &mission.elements;
+        let mut best = Self {
+            nodes: vec![Degree::Declared; elements.nodes.len()],
+            publishes: vec![Degree::Declared; elements.publishes.len()],
+            subscribes: vec![Degree::Declared; elements.subscribes.len()],
+        };
+        for window in &mission.windows {
+            let graph = &window.graph;
+            graph
+                .nodes
+                .iter()
+                .for_each(|s| better(&mut best.nodes[s.id as usize], s.degree));
+            graph
+                .publishes
+                .iter()
+                .for_each(|s| better(&mut best.publishes[s.id as usize], s.degree));
+            graph
+                .subscribes
+                .iter()
+                .for_each(|s| better(&mut best.subscribes[s.id as usize], s.degree));
+        }
+        best
+    }
+}
+
+fn better(best: &mut Degree, degree: Degree) {
+    *best = degree.min(*best);
+}
+
+fn counted(degrees: &[Degree]) -> Degrees {
+    let mut all = Degrees::default();
+    for degree in degrees {
+        all.add(*degree);
+    }
+    all
+}
+
+/// Messages that each node sent; `None` where no count is known.
+fn sent(mission: &Mission) -> Vec<Option<u64>> {
+    let mut sent: Vec<Option<u64>> = vec![None; mission.elements.nodes.len()];
+    for state in mission.windows.iter().flat_map(|w| &w.graph.publishes) {
+        let node: NodeId = mission.elements.publishes[state.id as usize].node;
+        if let Some(count) = state.count {
+            *sent[node as usize].get_or_insert(0) += count;
+        }
+    }
+    sent
+}
+
+fn topics(mission: &Mission) -> Vec<TopicInfo> {
+    let elements = &mission.elements;
+    let mut topics: Vec<TopicInfo> = elements
+        .topics
+        .iter()
+        .map(|topic| TopicInfo {
+            name: topic.name.to_string(),
+            types: topic.types.iter().map(ToString::to_string).collect(),
+            count: 0,
+            hz: None,
+            bytes: None,
+            publishers: Vec::new(),
+            subscribers: Vec::new(),
+            qos: topic.qos.as_deref().map(str::to_owned),
+            activity: vec![0; mission.windows.len()],
+        })
+        .collect();
+    for window in &mission.windows {
+        for state in &window.graph.topics {
+            let topic = &mut topics[state.id as usize];
+            topic.count += state.count;
+            topic.bytes = state
+                .bytes
+                .map_or(topic.bytes, |b| Some(topic.bytes.unwrap_or(0) + b));
+            topic.activity[window.index] = state.count;
+        }
+    }
+    let name = |node: NodeId| elements.nodes[node as usize].name.to_string();
+    for edge in &elements.publishes {
+        topics[edge.topic as usize].publishers.push(name(edge.node));
+    }
+    for edge in &elements.subscribes {
+        topics[edge.topic as usize]
+            .subscribers
+            .push(name(edge.node));
+    }
+    for (id, topic) in topics.iter_mut().enumerate() {
+        let life = elements.life(Element::Topic(u32::try_from(id).unwrap_or(u32::MAX)));
+        topic.hz = life
+            .0
+            .zip(life.1)
+            .and_then(|(first, last)| mean_rate(topic.count, last.since(first)));
+    }
+    topics
+}
+
+/// Messages per second when `count` of them span `nanos`; `None` with fewer than two.
+fn mean_rate(count: u64, nanos: i64) -> Option<f64> {
+    (count > 1 && nanos > 0).then(|| (count - 1) as f64 / (nanos as f64 / 1e9))
+}
+
+fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {
+    let elements = &mission.elements;
+    let holds = |all: Evidence, word| all.words().any(|w| w == word);
+    let count = |sets: &mut dyn Iterator<Item = Evidence>, word| {
+        sets.filter(|set| holds(*set, word)).count()
+    };
+    let rows = Evidence::all_words().map(|source| EvidenceInfo {
+        source,
+        nodes: count(&mut elements.nodes.iter().map(|n| n.evidence), source),
+        publishes: count(&mut elements.publishes.iter().map(|e| e.evidence), source),
+        subscribes: count(&mut elements.subscribes.iter().map(|e| e.evidence), source),
+    });
+    rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0)
+        .collect()
+}

@@ -1,0 +1,149 @@
+//! Explains an element: what proves it, when it lived, and each piece of evidence with its time and text.
+
+use std::fmt::Write as _;
+
+use crate::base::error::{Error, Result};
+use crate::base::time::{Stamp, offset};
+use crate::evidence::EvidenceLine;
+use crate::graph::{Edge, Element};
+use crate::mission::Mission;
+
+/// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each with its
+/// evidence and life, then the `pieces` in order of time. Plain text, a line each; names are as recorded.
+///
+/// # Errors
+/// [`Error::Usage`] if the mission has no such element, naming those that come close.
+pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Result<String> {
+    let found = elements(mission, names);
+    if found.is_empty() {
+        return Err(unknown(mission, names));
+    }
+    let mut out = String::new();
+    for (element, title) in found {
+        // Writing to a string cannot fail.
+        let _ = describe(&mut out, mission, element, &title);
+    }
+    for piece in pieces {
+        let at = piece
+            .time
+            .map_or_else(|| "always".to_owned(), |time| offset(mission.offset(time)));
+        let _ = writeln!(
+            out,
+            "{at:>12}  {:<18} {:<9} {}",
+            piece.source,
+            piece.degree.word(),
+            piece.text.escape_debug()
+        );
+    }
+    Ok(out)
+}
+
+/// Everything that is named, with how to call it.
+fn elements(mission: &Mission, names: &[String]) -> Vec<(Element, String)> {
+    let all = &mission.elements;
+    let node = |edge: &Edge| all.nodes[edge.node as usize].name.as_str();
+    let topic = |edge: &Edge| all.topics[edge.topic as usize].name.as_str();
+    let mut found = Vec::new();
+    if let [name] = names {
+        let nodes = (0..)
+            .zip(&all.nodes)
+            .filter(|(_, n)| n.name.as_str() == name);
+        found.extend(nodes.map(|(id, n)| (Element::Node(id), format!("node {}", n.name))));
+        let topics = (0..)
+            .zip(&all.topics)
+            .filter(|(_, t)| t.name.as_str() == name);
+        found.extend(topics.map(|(id, t)| (Element::Topic(id), format!("topic {}", t.name))));
+        return found;
+    }
+    let is_asked = |edge: &&Edge| names.iter().all(|n| n == node(edge) || n == topic(edge));
+    let publishes = (0..).zip(&all.publishes).filter(|(_, e)| is_asked(e));
+    found.extend(publishes.map(|(id, e)| {
+        (
+            Element::Publish(id),
+            format!("{} publishes {}", node(e), topic(e)),
+        )
+    }));
+    let subscribes = (0..).zip(&all.subscribes).filter(|(_, e)| is_asked(e));
+    found.extend(subscribes.map(|(id, e)| {
+        (
+            Element::Subscribe(id),
+            format!("{} subscribes {}", node(e), topic(e)),
+        )
+    }));
+    found
+}
+
+fn describe(
+    out: &mut String,
+    mission: &Mission,
+    element: Element,
+    title: &str,
+) -> std::fmt::Result {
+    let all = &mission.elements;
+    let evidence = match element {
+        Element::Node(id) => all.nodes[id as usize].evidence,
+        Element::Topic(id) => all.topics[id as usize].evidence,
+        Element::Publish(id) => all.publishes[id as usize].evidence,
+        Element::Subscribe(id) => all.subscribes[id as usize].evidence,
+    };
+    let at = |time: Option<Stamp>| {
+        time.map_or_else(|| "?".to_owned(), |time| offset(mission.offset(time)))
+    };
+    let (first, last) = all.life(element);
+    let words: Vec<&str> = evidence.words().collect();
+    writeln!(
+        out,
+        "{title}\n  proved by {}; first sign {}, last sign {}",
+        words.join(", "),
+        at(first),
+        at(last)
+    )?;
+    let windows = mission
+        .windows
+        .iter()
+        .filter(|w| shows(&w.graph, element))
+        .count();
+    writeln!(
+        out,
+        "  there in {windows} of {} parts of the mission",
+        mission.windows.len()
+    )
+}
+
+fn shows(graph: &crate::graph::Graph, element: Element) -> bool {
+    match element {
+        Element::Node(id) => graph.nodes.iter().any(|s| s.id == id),
+        Element::Topic(id) => graph.topics.iter().any(|s| s.id == id),
+        Element::Publish(id) => graph.publishes.iter().any(|s| s.id == id),
+        Element::Subscribe(id) => graph.subscribes.iter().any(|s| s.id == id),
+    }
+}
+
+/// How many names are offered instead.
+const OFFERED: usize = 5;
+
+fn unknown(mission: &Mission, names: &[String]) -> Error {
+    let all = &mission.elements;
+    let known = all
+        .nodes
+        .iter()
+        .map(|n| n.name.as_str())
+        .chain(all.topics.iter().map(|t| t.name.as_str()));
+    let last = |name: &str| name.rsplit('/').next().unwrap_or_default().to_lowercase();
+    let close = known.filter(|known| {
+        names
+            .iter()
+            .any(|n| !last(n).is_empty() && known.to_lowercase().contains(&last(n)))
+    });
+    let close: Vec<&str> = close.take(OFFERED).collect();
+    let hint = if close.is_empty() {
+        "`bagreel info` lists every name".to_owned()
+    } else {
+        format!("close to it: {}", close.join(", "))
+    };
+    let what = match names {
+        [name] => format!("no node or topic is called `{name}`"),
+        names => format!("nothing connects `{}`", names.join("` and `")),
+    };
+    Error::usage(what, hint)
+}

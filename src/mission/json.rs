@@ -1,0 +1,7 @@
+//! A mission as JSON, written as a stream and read back.
+
+pub(crate) mod lines;
+pub(crate) mod names;
+pub(crate) mod raw;
+pub(crate) mod read;
+pub(crate) mod write;

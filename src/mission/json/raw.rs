@@ -1,0 +1,162 @@
+//! The keys of an evolution's JSON, all but the names and times optional.
+
+use serde::Deserialize;
+
+use crate::base::time::Stamp;
+use crate::evidence::{Degree, Evidence};
+use crate::graph::{EdgeState, State};
+
+#[derive(Deserialize)]
+pub(crate) struct Raw {
+    pub(crate) schema: String,
+    #[serde(default)]
+    pub(crate) bags: Vec<RawBag>,
+    pub(crate) start_ns: Option<i64>,
+    pub(crate) end_ns: Option<i64>,
+    pub(crate) messages: Option<u64>,
+    pub(crate) period_ns: Option<i64>,
+    pub(crate) step_ns: Option<i64>,
+    pub(crate) windows: Vec<RawWindow>,
+    pub(crate) layout: Option<RawLayout>,
+    #[serde(default)]
+    pub(crate) notices: Vec<RawNotice>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawBag {
+    #[serde(default)]
+    pub(crate) name: String,
+    #[serde(default)]
+    pub(crate) format: String,
+    #[serde(default)]
+    pub(crate) compression: Vec<String>,
+    #[serde(default)]
+    pub(crate) tier: String,
+    pub(crate) complete: Option<bool>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawNotice {
+    #[serde(default)]
+    pub(crate) kind: String,
+    pub(crate) count: Option<u64>,
+    #[serde(default)]
+    pub(crate) text: String,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawLayout {
+    #[serde(default)]
+    pub(crate) width: f64,
+    #[serde(default)]
+    pub(crate) height: f64,
+    #[serde(default)]
+    pub(crate) orientation: String,
+    #[serde(default)]
+    pub(crate) boxes: Vec<RawBox>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawBox {
+    pub(crate) what: String,
+    pub(crate) name: String,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) w: f64,
+    pub(crate) h: f64,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawWindow {
+    pub(crate) start_ns: i64,
+    pub(crate) end_ns: i64,
+    pub(crate) partial: Option<bool>,
+    pub(crate) messages: Option<u64>,
+    #[serde(default)]
+    pub(crate) nodes: Vec<RawNode>,
+    #[serde(default)]
+    pub(crate) topics: Vec<RawTopic>,
+    #[serde(default)]
+    pub(crate) publishes: Vec<RawEdge>,
+    #[serde(default)]
+    pub(crate) subscribes: Vec<RawEdge>,
+}
+
+/// What every element may say of itself.
+#[derive(Deserialize)]
+pub(crate) struct RawState {
+    pub(crate) state: Option<String>,
+    pub(crate) degree: Option<String>,
+    #[serde(default)]
+    pub(crate) evidence: Vec<String>,
+    pub(crate) first_ns: Option<i64>,
+    pub(crate) last_ns: Option<i64>,
+    pub(crate) count: Option<u64>,
+    pub(crate) hz: Option<f64>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawNode {
+    pub(crate) name: String,
+    pub(crate) role: Option<String>,
+    pub(crate) lifecycle: Option<String>,
+    #[serde(flatten)]
+    pub(crate) rest: RawState,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawTopic {
+    pub(crate) name: String,
+    #[serde(default)]
+    pub(crate) types: Vec<String>,
+    pub(crate) bytes: Option<u64>,
+    pub(crate) median_period_s: Option<f64>,
+    pub(crate) max_gap_s: Option<f64>,
+    pub(crate) qos: Option<String>,
+    #[serde(flatten)]
+    pub(crate) rest: RawState,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawEdge {
+    pub(crate) node: String,
+    pub(crate) topic: String,
+    #[serde(flatten)]
+    pub(crate) rest: RawState,
+}
+
+impl RawState {
+    pub(crate) fn state(&self) -> State {
+        let known = State::ALL
+            .into_iter()
+            .find(|s| self.state.as_deref() == Some(s.word()));
+        known.unwrap_or(State::Active)
+    }
+
+    pub(crate) fn degree(&self) -> Degree {
+        let known = Degree::ALL
+            .into_iter()
+            .find(|d| self.degree.as_deref() == Some(d.word()));
+        known.unwrap_or(Degree::Stated)
+    }
+
+    pub(crate) fn evidence(&self) -> Evidence {
+        self.evidence
+            .iter()
+            .fold(Evidence::NONE, |all, word| all.and(Evidence::of(word)))
+    }
+
+    pub(crate) fn life(&self) -> (Option<Stamp>, Option<Stamp>) {
+        (self.first_ns.map(Stamp), self.last_ns.map(Stamp))
+    }
+
+    pub(crate) fn edge(&self, id: u32) -> EdgeState {
+        EdgeState {
+            id,
+            state: self.state(),
+            degree: self.degree(),
+            count: self.count,
+            hz: self.hz,
+        }
+    }
+}

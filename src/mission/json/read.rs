@@ -1,0 +1,233 @@
+//! Reads an evolution back: our own JSON, or a graph over time that another tool wrote with our keys.
+//!
+//! Required are `schema`, the windows' times and the elements' names; what else is missing is unknown, unknown keys are
+//! ignored, and changes are left to be computed anew.
+
+use std::path::Path;
+
+use super::names::Names;
+use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice};
+use super::write::SCHEMA;
+use crate::bag::{Report, Tier};
+use crate::base::error::{Error, Result};
+use crate::base::geometry::Rect;
+use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::time::{Period, Span, Stamp};
+use crate::mission::{Mission, Place, Places, Window};
+
+/// Reads the text of an evolution; `path` is only named in errors.
+///
+/// # Errors
+/// [`Error::BadFile`] with the line for what is no JSON or has no such keys, for another schema, and for windows that
+/// are not in order of time.
+pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
+    let bad = |line: usize, reason: String| Error::BadFile {
+        path: path.to_owned(),
+        line,
+        reason,
+        hint: "an evolution is what `bagreel render BAG -o x.json` writes".to_owned(),
+    };
+    let raw: Raw = serde_json::from_str(text).map_err(|e| bad(e.line(), e.to_string()))?;
+    if raw.schema != SCHEMA {
+        return Err(bad(0, format!("schema `{}` is not `{SCHEMA}`", raw.schema)));
+    }
+    let spans = spans(&raw).map_err(|reason| bad(0, reason))?;
+    Ok(build(raw, &spans))
+}
+
+/// The windows' times, checked.
+fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
+    if raw.windows.is_empty() {
+        return Err("it has no windows".to_owned());
+    }
+    let spans: Vec<Span> = raw
+        .windows
+        .iter()
+        .map(|w| Span {
+            start: Stamp(w.start_ns),
+            end: Stamp(w.end_ns),
+        })
+        .collect();
+    for (index, span) in spans.iter().enumerate() {
+        if span.start >= span.end {
+            return Err(format!("window {index} ends before it starts"));
+        }
+        if index > 0 && spans[index - 1].start > span.start {
+            return Err(format!(
+                "window {index} starts before the one in front of it"
+            ));
+        }
+    }
+    Ok(spans)
+}
+
+fn build(raw: Raw, spans: &[Span]) -> Mission {
+    let mut names = Names::default();
+    raw.windows.iter().for_each(|w| names.window(w));
+    let (elements, places) = names.elements();
+    let start = spans.iter().map(|s| s.start).min().unwrap_or_default();
+    let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
+    let span = Span {
+        start: raw.start_ns.map_or(start, Stamp).min(start),
+        end: raw.end_ns.map_or(end, Stamp).max(end),
+    };
+    let longest = spans.iter().map(Span::nanos).max().unwrap_or(1);
+    let fallback = || Period::from_nanos(longest.max(1));
+    let period = raw
+        .period_ns
+        .and_then(Period::from_nanos)
+        .or_else(fallback)
+        .unwrap_or(ONE);
+    let windows: Vec<Window> = raw
+        .windows
+        .iter()
+        .zip(spans)
+        .enumerate()
+        .map(|(index, (window, span))| {
+            let counts = || {
+                window
+                    .topics
+                    .iter()
+                    .filter_map(|t| t.rest.count)
+                    .fold(0, u64::saturating_add)
+            };
+            Window {
+                index,
+                span: *span,
+                partial: window.partial.unwrap_or(span.nanos() < period.nanos()),
+                messages: window.messages.unwrap_or_else(counts),
+                graph: places.graph(window),
+                changes: Vec::new(),
+            }
+        })
+        .collect();
+    Mission {
+        bags: raw.bags.into_iter().map(report).collect(),
+        span,
+        messages: raw.messages.unwrap_or_else(|| {
+            windows
+                .iter()
+                .map(|w| w.messages)
+                .fold(0, u64::saturating_add)
+        }),
+        period,
+        step: raw.step_ns.and_then(Period::from_nanos).unwrap_or(period),
+        elements,
+        windows,
+        layout: raw.layout.map(layout),
+        notices: notices(raw.notices),
+    }
+}
+
+const ONE: Period = match Period::from_nanos(1) {
+    Some(one) => one,
+    None => unreachable!(),
+};
+
+fn report(raw: RawBag) -> Report {
+    let tiers = [Tier::Index, Tier::Forward, Tier::Verify];
+    Report {
+        name: raw.name,
+        format: raw.format,
+        compression: raw.compression,
+        tier: tiers
+            .into_iter()
+            .find(|t| t.word() == raw.tier)
+            .unwrap_or(Tier::Forward),
+        tier_reason: None,
+        complete: raw.complete.unwrap_or(true),
+        bytes_read: 0,
+        file_bytes: 0,
+        facts: Vec::new(),
+    }
+}
+
+fn layout(raw: RawLayout) -> Places {
+    let place = |b: RawBox| Place {
+        what: b.what,
+        name: b.name,
+        rect: Rect::new(b.x, b.y, b.w, b.h),
+    };
+    Places {
+        width: raw.width,
+        height: raw.height,
+        orientation: raw.orientation,
+        boxes: raw.boxes.into_iter().map(place).collect(),
+    }
+}
+
+/// Notices of an earlier run are kept as notes: what was lost then is not lost now.
+fn notices(raw: Vec<RawNotice>) -> Notices {
+    let mut notices = Notices::new();
+    notices.extend(raw.into_iter().map(|n| Notice {
+        kind: NoticeKind::from_word(&n.kind).unwrap_or(NoticeKind::Note),
+        count: n.count.unwrap_or(1).max(1),
+        text: n.text,
+    }));
+    notices
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::State;
+    use crate::mission::write_json;
+
+    const SMALL: &str = r#"{"schema": "bagreel.evolution/1", "future": 1, "windows": [
+        {"start_ns": 0, "end_ns": 10, "nodes": [{"name": "/b"}, {"name": "/a", "state": "silent"}],
+         "publishes": [{"node": "/b", "topic": "/t", "count": 4}]},
+        {"start_ns": 10, "end_ns": 15, "topics": [{"name": "/t", "count": 3}]}]}"#;
+
+    fn read(text: &str) -> Result<Mission> {
+        read_json(text, Path::new("x.json"))
+    }
+
+    #[test]
+    fn only_times_and_names_are_required() {
+        let mission = read(SMALL).unwrap();
+        let names: Vec<_> = mission
+            .elements
+            .nodes
+            .iter()
+            .map(|n| n.name.as_str())
+            .collect();
+        assert_eq!(names, ["/a", "/b"]);
+        assert_eq!(mission.windows[0].graph.nodes[0].state, State::Silent);
+        assert_eq!(
+            mission.windows[0].graph.topics.len(),
+            1,
+            "an edge brings its ends"
+        );
+        assert_eq!(
+            (mission.period.nanos(), mission.windows[1].partial),
+            (10, true)
+        );
+        assert_eq!(mission.windows[1].messages, 3);
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_equal() {
+        let mut first = Vec::new();
+        let mut mission = read(SMALL).unwrap();
+        mission.find_changes(0.25, &[]);
+        write_json(&mission, &mut first).unwrap();
+        let mut again = read(std::str::from_utf8(&first).unwrap()).unwrap();
+        again.find_changes(0.25, &[]);
+        let mut second = Vec::new();
+        write_json(&again, &mut second).unwrap();
+        assert_eq!(
+            String::from_utf8(first).unwrap(),
+            String::from_utf8(second).unwrap()
+        );
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_its_line() {
+        let said = |text| read(text).unwrap_err().to_string();
+        assert!(said("{\n\"schema\": 3}").contains("line 2"));
+        assert!(said(r#"{"schema": "other/9", "windows": []}"#).contains("`other/9`"));
+        let back =
+            r#"{"schema": "bagreel.evolution/1", "windows": [{"start_ns": 5, "end_ns": 5}]}"#;
+        assert!(said(back).contains("window 0 ends before it starts"));
+    }
+}

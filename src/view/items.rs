@@ -1,0 +1,338 @@
+//! Who is on stage: every box and arrow of the mission, and where each element of the graph went.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::collapse::{Collapse, swallows};
+use super::group::{Groups, groups};
+use super::names::is_debug_label;
+use super::select::{Selection, finish, select};
+use super::{Arrow, ArrowKind, Item, ItemKind, Mode, ViewOptions};
+use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
+
+/// Where an edge of the graph went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// Nowhere.
+    Hidden,
+    /// Into this arrow.
+    Arrow(u32),
+    /// Inside this item.
+    Inside(u32),
+}
+
+/// Every box and arrow, and the way from the graph's elements to them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Viewed {
+    pub(crate) selection: Selection,
+    pub(crate) items: Vec<Item>,
+    pub(crate) arrows: Vec<Arrow>,
+    /// Per node of the mission, its item.
+    pub(crate) node: Vec<Option<u32>>,
+    /// Per topic of the mission, its item.
+    pub(crate) topic: Vec<Option<u32>>,
+    /// Per publication. In mode *nodes* it may be part of several arrows and is told by `pairs` alone.
+    pub(crate) publish: Vec<Place>,
+    /// Per subscription.
+    pub(crate) subscribe: Vec<Place>,
+    /// Per arrow from node to node, the publications and subscriptions that it joins.
+    pub(crate) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
+    /// Node and topic of each publication.
+    pub(crate) published: Vec<(NodeId, TopicId)>,
+    /// Node and topic of each subscription.
+    pub(crate) subscribed: Vec<(NodeId, TopicId)>,
+    /// Per publication, and per topic with publications, the arrows that carry it from its node.
+    pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
+    /// Arrows from node to node that were too many.
+    pub(crate) dropped: usize,
+}
+
+/// How many pairs of publishers and subscribers are drawn from node to node. One topic with thousands of both has
+/// millions, which nobody could read.
+const MOST_PAIRS: usize = 200_000;
+
+type Key = (ItemKind, Arc<str>);
+type Ends = (u32, u32, ArrowKind);
+
+impl Viewed {
+    pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
+        let mut selection = select(elements, options);
+        let grouping = match options.mode {
+            Mode::Nodes => super::Grouping::NONE,
+            _ => options.group,
+        };
+        let seen: Vec<bool> = selection.topics.iter().map(Option::is_none).collect();
+        let groups = groups(elements, &seen, grouping);
+        let mut grouped = vec![false; elements.topics.len()];
+        for id in groups.values().flatten() {
+            if let Some(grouped) = grouped.get_mut(*id as usize) {
+                *grouped = true;
+            }
+        }
+        finish(&mut selection, elements, options, &grouped);
+        let pair = |edge: &Edge| (edge.node, edge.topic);
+        let mut viewed = Self {
+            selection,
+            published: elements.publishes.iter().map(pair).collect(),
+            subscribed: elements.subscribes.iter().map(pair).collect(),
+            ..Self::default()
+        };
+        viewed.set_items(elements, options, &groups);
+        if options.mode == Mode::Nodes {
+            viewed.set_direct(elements, options);
+        } else {
+            viewed.set_arrows(elements);
+        }
+        viewed.set_carriers(elements);
+        viewed
+    }
+
+    fn set_items(&mut self, elements: &Elements, options: &ViewOptions, groups: &Groups) {
+        let collapse = Collapse::new(options);
+        let seen = |reasons: &[Option<_>], at: usize| reasons.get(at) == Some(&None);
+        let nodes: Vec<Option<Key>> = (elements.nodes.iter().enumerate())
+            .map(|(at, node)| {
+                let plain = || (ItemKind::Node, node.name.shared());
+                seen(&self.selection.nodes, at).then(|| {
+                    let space = collapse.of(node.name.as_str());
+                    space.map_or_else(plain, |s| (ItemKind::Namespace, s.into()))
+                })
+            })
+            .collect();
+        let mut topics: Vec<Option<Key>> = vec![None; elements.topics.len()];
+        if options.mode != Mode::Nodes {
+            for (at, topic) in elements.topics.iter().enumerate() {
+                if seen(&self.selection.topics, at) {
+                    topics[at] = Some((ItemKind::Topic, topic.name.shared()));
+                }
+            }
+            set_groups(&mut topics, groups);
+            if !collapse.is_empty() {
+                swallow(elements, &collapse, &nodes, &mut topics);
+            }
+        }
+        let mut members: BTreeMap<&Key, Vec<Element>> = BTreeMap::new();
+        for (key, id) in nodes.iter().zip(0..) {
+            if let Some(key) = key {
+                members.entry(key).or_default().push(Element::Node(id));
+            }
+        }
+        for (key, id) in topics.iter().zip(0..) {
+            if let Some(key) = key {
+                members.entry(key).or_default().push(Element::Topic(id));
+            }
+        }
+        let places: BTreeMap<&Key, u32> = members.keys().copied().zip(0..).collect();
+        let place = |key: &Option<Key>| key.as_ref().and_then(|key| places.get(key).copied());
+        self.node = nodes.iter().map(place).collect();
+        self.topic = topics.iter().map(place).collect();
+        self.items = members
+            .into_iter()
+            .map(|((kind, name), members)| Item {
+                kind: *kind,
+                name: Arc::clone(name),
+                members,
+                cluster: None,
+            })
+            .collect();
+    }
+
+    fn set_arrows(&mut self, elements: &Elements) {
+        let mut arrows: BTreeMap<Ends, Vec<Element>> = BTreeMap::new();
+        let publish: Vec<Option<Ends>> = elements
+            .publishes
+            .iter()
+            .map(|edge| {
+                let (node, topic) = self.ends(edge)?;
+                Some((node, topic, ArrowKind::Publish))
+            })
+            .collect();
+        let subscribe: Vec<Option<Ends>> = elements
+            .subscribes
+            .iter()
+            .map(|edge| {
+                let (node, topic) = self.ends(edge)?;
+                Some((topic, node, ArrowKind::Subscribe))
+            })
+            .collect();
+        let all = publish.iter().zip((0..).map(Element::Publish));
+        let all = all.chain(subscribe.iter().zip((0..).map(Element::Subscribe)));
+        for (ends, element) in all {
+            if let Some(ends) = ends.as_ref().filter(|(from, to, _)| from != to) {
+                arrows.entry(ends.clone()).or_default().push(element);
+            }
+        }
+        let places: BTreeMap<&Ends, u32> = arrows.keys().zip(0..).collect();
+        let place = |ends: &Option<Ends>| match ends {
+            None => Place::Hidden,
+            Some((from, to, _)) if from == to => Place::Inside(*from),
+            Some(ends) => places
+                .get(ends)
+                .map_or(Place::Hidden, |at| Place::Arrow(*at)),
+        };
+        self.publish = publish.iter().map(place).collect();
+        self.subscribe = subscribe.iter().map(place).collect();
+        self.arrows = arrows.into_iter().map(|(ends, m)| arrow(ends, m)).collect();
+    }
+
+    /// The items of an edge's node and topic.
+    fn ends(&self, edge: &Edge) -> Option<(u32, u32)> {
+        Some((
+            self.item_of_node(edge.node)?,
+            *self.topic.get(edge.topic as usize)?.as_ref()?,
+        ))
+    }
+
+    fn item_of_node(&self, node: NodeId) -> Option<u32> {
+        self.node.get(node as usize).copied().flatten()
+    }
+
+    /// Arrows from publishers to subscribers, one per topic between two of them.
+    fn set_direct(&mut self, elements: &Elements, options: &ViewOptions) {
+        let mut subscribers: Vec<Vec<(EdgeId, u32)>> = vec![Vec::new(); elements.topics.len()];
+        for (edge, id) in elements.subscribes.iter().zip(0..) {
+            let item = self.item_of_node(edge.node);
+            if let (Some(list), Some(item)) = (subscribers.get_mut(edge.topic as usize), item) {
+                list.push((id, item));
+            }
+        }
+        let mut arrows: BTreeMap<Ends, Vec<(EdgeId, EdgeId)>> = BTreeMap::new();
+        let mut pairs = 0;
+        for (edge, publish) in elements.publishes.iter().zip(0..) {
+            let at = edge.topic as usize;
+            let (Some(from), Some(topic)) = (self.item_of_node(edge.node), elements.topics.get(at))
+            else {
+                continue;
+            };
+            let name = topic.name.as_str();
+            if self.selection.topics.get(at) != Some(&None)
+                || options.hide.debug && is_debug_label(name)
+            {
+                continue;
+            }
+            for (subscribe, to) in subscribers.get(at).into_iter().flatten() {
+                let inside = from == *to && self.is_namespace(from);
+                pairs += usize::from(!inside);
+                if inside || pairs > MOST_PAIRS {
+                    continue;
+                }
+                let ends = (from, *to, ArrowKind::Direct(topic.name.shared()));
+                arrows.entry(ends).or_default().push((publish, *subscribe));
+            }
+        }
+        self.dropped = pairs.saturating_sub(MOST_PAIRS);
+        self.publish = vec![Place::Hidden; elements.publishes.len()];
+        self.subscribe = vec![Place::Hidden; elements.subscribes.len()];
+        for (ends, pairs) in arrows {
+            let publishes = pairs.iter().map(|(p, _)| Element::Publish(*p));
+            let others = pairs.iter().map(|(_, s)| Element::Subscribe(*s));
+            let members: BTreeSet<Element> = publishes.chain(others).collect();
+            self.arrows.push(arrow(ends, members.into_iter().collect()));
+            self.pairs.push(pairs);
+        }
+    }
+
+    /// Notes which arrows each topic's publications are part of.
+    fn set_carriers(&mut self, elements: &Elements) {
+        for (arrow, id) in self.arrows.iter().zip(0..) {
+            for member in &arrow.members {
+                let Element::Publish(publish) = member else {
+                    continue;
+                };
+                if let Some(edge) = elements.publishes.get(*publish as usize) {
+                    let topic = self.carriers.entry(Element::Topic(edge.topic)).or_default();
+                    topic.push(id);
+                    self.carriers.entry(*member).or_default().push(id);
+                }
+            }
+        }
+    }
+
+    fn is_namespace(&self, item: u32) -> bool {
+        let item = self.items.get(item as usize);
+        item.is_some_and(|item| item.kind == ItemKind::Namespace)
+    }
+}
+
+fn arrow((from, to, kind): Ends, members: Vec<Element>) -> Arrow {
+    Arrow {
+        from,
+        to,
+        kind,
+        members,
+    }
+}
+
+/// Puts the topics of each group into its box, whose name is made unlike that of every topic.
+fn set_groups(topics: &mut [Option<Key>], groups: &Groups) {
+    for ids in groups.values() {
+        for id in ids {
+            topics[*id as usize] = None;
+        }
+    }
+    let mut taken: BTreeSet<Arc<str>> = topics
+        .iter()
+        .flatten()
+        .map(|key| Arc::clone(&key.1))
+        .collect();
+    for (name, ids) in groups {
+        let mut name = name.clone();
+        while taken.contains(name.as_str()) {
+            name.push_str("_2");
+        }
+        let name: Arc<str> = name.into();
+        taken.insert(Arc::clone(&name));
+        for id in ids {
+            topics[*id as usize] = Some((ItemKind::Group, Arc::clone(&name)));
+        }
+    }
+}
+
+/// Moves topics and groups that belong inside a collapsed namespace into it.
+fn swallow(
+    elements: &Elements,
+    collapse: &Collapse<'_>,
+    nodes: &[Option<Key>],
+    topics: &mut [Option<Key>],
+) {
+    type Spaces<'a> = Vec<Option<&'a str>>;
+    let mut ends: BTreeMap<Key, (Spaces<'_>, Spaces<'_>)> = BTreeMap::new();
+    for key in topics.iter().flatten() {
+        ends.entry(key.clone()).or_default();
+    }
+    let space = |edge: &Edge| {
+        let node = edge.node as usize;
+        nodes.get(node)?.as_ref()?;
+        Some(
+            elements
+                .nodes
+                .get(node)
+                .and_then(|n| collapse.of(n.name.as_str())),
+        )
+    };
+    let publishes = elements.publishes.iter().map(|e| (e, true));
+    let subscribes = elements.subscribes.iter().map(|e| (e, false));
+    for (edge, publishes) in publishes.chain(subscribes) {
+        let key = topics.get(edge.topic as usize).and_then(Option::as_ref);
+        let lists = key.and_then(|key| ends.get_mut(key));
+        if let (Some((p, s)), Some(space)) = (lists, space(edge)) {
+            if publishes {
+                p.push(space);
+            } else {
+                s.push(space);
+            }
+        }
+    }
+    let inside: BTreeMap<Key, Arc<str>> = ends
+        .into_iter()
+        .filter_map(|(key, (p, s))| {
+            let space = swallows(collapse.of(&key.1), &p, &s)?;
+            Some((key, space.into()))
+        })
+        .collect();
+    for topic in topics.iter_mut().flatten() {
+        if let Some(space) = inside.get(topic) {
+            *topic = (ItemKind::Namespace, Arc::clone(space));
+        }
+    }
+}

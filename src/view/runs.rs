@@ -1,0 +1,415 @@
+//! A mission as data for a page: per element one flat list of when it became what, so that any window is one search away.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Serialize, Serializer};
+
+use crate::evidence::Degree;
+use crate::graph::State;
+use crate::view::{Frame, Mark, Shown, View};
+
+/// From this window on, this value of a table, until the next run of the same list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Run {
+    /// A place in [`View::frames`].
+    pub from: u32,
+    /// A place in the table.
+    pub value: u32,
+}
+
+/// What becomes of one item or arrow. Lists are sorted by window; before its first run a list has value 0.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ElementRuns {
+    /// Its class words: places in [`Runs::classes`].
+    pub classes: Vec<Run>,
+    /// Its rate: places in [`Runs::labels`]. While it is not there, the last value stays.
+    pub rates: Vec<Run>,
+    /// Its lifecycle state: places in [`Runs::labels`]. While it is not there, the last value stays.
+    pub lifecycles: Vec<Run>,
+}
+
+/// The whole sequence of a view as runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Runs {
+    /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`: not there.
+    pub classes: Vec<String>,
+    /// Rates and lifecycle states as they are written; the first is empty: not known.
+    pub labels: Vec<String>,
+    /// A life per item of the view.
+    pub items: Vec<ElementRuns>,
+    /// A life per arrow of the view.
+    pub arrows: Vec<ElementRuns>,
+}
+
+/// The value of a list in a window, 0 before its first run.
+pub fn at(list: &[Run], window: u32) -> u32 {
+    let after = list.partition_point(|run| run.from <= window);
+    after.checked_sub(1).map_or(0, |last| list[last].value)
+}
+
+impl Runs {
+    /// The runs of a view. `label` writes a rate in hertz.
+    pub fn of(view: &View, label: impl Fn(f64) -> String) -> Self {
+        let mut classes = Table::starting_with(None);
+        let mut labels = Table::starting_with(String::new());
+        let mut runs = |count, shown: fn(&Frame) -> &[Shown], are_arrows| {
+            let mut recorder = RunRecorder {
+                classes: &mut classes,
+                labels: &mut labels,
+                label: &label,
+                are_arrows,
+                runs: vec![ElementRuns::default(); count],
+                last_hz: vec![None; count],
+            };
+            for (frame, window) in view.frames.iter().zip(0..) {
+                recorder.take(shown(frame), window);
+            }
+            recorder.runs
+        };
+        let mut items = runs(view.items.len(), |f| &f.items, false);
+        let mut arrows = runs(view.arrows.len(), |f| &f.arrows, true);
+        // The most frequent value gets the shortest number.
+        let both = || items.iter().chain(&arrows);
+        let new_classes = classes.by_frequency(both().flat_map(|l| &l.classes));
+        let texts = |l: &'_ ElementRuns| [l.rates.clone(), l.lifecycles.clone()].concat();
+        let all_texts: Vec<Run> = both().flat_map(texts).collect();
+        let new_labels = labels.by_frequency(&all_texts);
+        for life in items.iter_mut().chain(&mut arrows) {
+            renumber(&mut life.classes, &new_classes);
+            renumber(&mut life.rates, &new_labels);
+            renumber(&mut life.lifecycles, &new_labels);
+        }
+        Self {
+            classes: classes.sorted(&new_classes, |class| {
+                class.map_or("off".to_owned(), Class::words)
+            }),
+            labels: labels.sorted(&new_labels, Clone::clone),
+            items,
+            arrows,
+        }
+    }
+}
+
+impl Runs {
+    /// All class words that occur.
+    pub fn words(&self) -> BTreeSet<&str> {
+        self.classes
+            .iter()
+            .flat_map(|class| class.split(' '))
+            .collect()
+    }
+
+    /// How many elements have a mark of this class in each window in which there are any.
+    pub fn counts(&self, class: &str) -> BTreeMap<u32, usize> {
+        let has = |words: &String| words.split(' ').any(|word| word == class);
+        let marked: Vec<bool> = self.classes.iter().map(has).collect();
+        let mut counts = BTreeMap::new();
+        for run in self
+            .items
+            .iter()
+            .chain(&self.arrows)
+            .flat_map(|life| &life.classes)
+        {
+            if marked[run.value as usize] {
+                *counts.entry(run.from).or_default() += 1;
+            }
+        }
+        counts
+    }
+}
+
+/// What decides the look of an element in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Class {
+    state: State,
+    degree: Degree,
+    mark: Option<Mark>,
+    /// How thick an arrow is; 0 for items.
+    step: u8,
+}
+
+impl Class {
+    fn of(shown: &Shown, is_arrow: bool) -> Self {
+        Self {
+            state: shown.state,
+            degree: shown.degree,
+            mark: shown.mark,
+            step: if is_arrow { width_step(shown.hz) } else { 0 },
+        }
+    }
+
+    fn words(self) -> String {
+        let mut words = vec![self.state.word().to_owned()];
+        if self.degree != Degree::Measured {
+            words.push(self.degree.word().to_owned());
+        }
+        if let Some(mark) = self.mark {
+            words.push(mark.class().to_owned());
+            words.extend((mark.class() == "changed").then(|| word(mark).to_owned()));
+        }
+        if self.step > 0 {
+            words.push(format!("w{}", self.step));
+        }
+        words.join(" ")
+    }
+}
+
+/// The class word that tells a mark from all others: the class of its badge.
+pub fn word(mark: Mark) -> &'static str {
+    match mark {
+        Mark::Added => "added",
+        Mark::Removed => "removed",
+        Mark::Faster => "faster",
+        Mark::Slower => "slower",
+        Mark::HandedOver => "handed-over",
+        Mark::Restarted => "restarted",
+        Mark::Changed => "other",
+        Mark::Inside => "inside",
+    }
+}
+
+/// The thickest arrow's step.
+pub const STEPS: u8 = 6;
+
+/// The thickness of an arrow of this rate: a step per half a decade of 1 + Hz, 0..=[`STEPS`].
+fn width_step(hz: Option<f64>) -> u8 {
+    let decades = libm::log10(1.0 + hz.filter(|hz| hz.is_finite()).unwrap_or(0.0).max(0.0));
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and STEPS"
+    )]
+    let step = libm::round(decades * 2.0).clamp(0.0, f64::from(STEPS)) as u8;
+    step
+}
+
+/// The width of a step's middle, in decades of 1 + Hz.
+pub fn decades(step: u8) -> f64 {
+    f64::from(step) / 2.0
+}
+
+/// Different values in order of appearance.
+struct Table<T> {
+    places: BTreeMap<T, u32>,
+}
+
+impl<T: Ord + Clone> Table<T> {
+    fn starting_with(first: T) -> Self {
+        Self {
+            places: BTreeMap::from([(first, 0)]),
+        }
+    }
+
+    fn place(&mut self, value: T) -> u32 {
+        let next = u32::try_from(self.places.len()).unwrap_or(u32::MAX);
+        *self.places.entry(value).or_insert(next)
+    }
+
+    /// The new place of each old one: the first stays, then the more frequent, then the older.
+    fn by_frequency<'a>(&self, runs: impl IntoIterator<Item = &'a Run>) -> Vec<u32> {
+        let mut uses = vec![0_u64; self.places.len()];
+        for run in runs {
+            uses[run.value as usize] += 1;
+        }
+        let mut order: Vec<usize> = (0..uses.len()).collect();
+        order.sort_by_key(|old| (*old > 0, Reverse(uses[*old])));
+        let mut new = vec![0; uses.len()];
+        for (place, old) in (0..).zip(order) {
+            new[old] = place;
+        }
+        new
+    }
+
+    fn sorted(&self, new: &[u32], write: impl Fn(&T) -> String) -> Vec<String> {
+        let mut out = vec![String::new(); new.len()];
+        for (value, old) in &self.places {
+            out[new[*old as usize] as usize] = write(value);
+        }
+        out
+    }
+}
+
+fn renumber(list: &mut [Run], new: &[u32]) {
+    for run in list {
+        run.value = new[run.value as usize];
+    }
+}
+
+/// Writes the lives of the items, or of the arrows, window by window.
+struct RunRecorder<'a, F> {
+    classes: &'a mut Table<Option<Class>>,
+    labels: &'a mut Table<String>,
+    label: F,
+    are_arrows: bool,
+    runs: Vec<ElementRuns>,
+    /// The rate last written; rates are mostly the same, and writing one takes time.
+    last_hz: Vec<Option<u64>>,
+}
+
+impl<F: Fn(f64) -> String> RunRecorder<'_, F> {
+    fn take(&mut self, shown: &[Shown], window: u32) {
+        let mut there = vec![false; self.runs.len()];
+        for one in shown {
+            let id = one.id as usize;
+            let Some(life) = self.runs.get_mut(id) else {
+                continue;
+            };
+            there[id] = true;
+            let class = self.classes.place(Some(Class::of(one, self.are_arrows)));
+            push(&mut life.classes, window, class);
+            if one.mark == Some(Mark::Removed) {
+                continue;
+            }
+            let hz = one.hz.map(f64::to_bits);
+            if hz != self.last_hz[id] {
+                self.last_hz[id] = hz;
+                let text = one.hz.map_or(String::new(), &self.label);
+                push(&mut life.rates, window, self.labels.place(text));
+            }
+            let lifecycle = one.lifecycle.as_deref().unwrap_or_default();
+            if !lifecycle.is_empty() || !life.lifecycles.is_empty() {
+                let place = self.labels.place(lifecycle.to_owned());
+                push(&mut life.lifecycles, window, place);
+            }
+        }
+        for (life, _) in self.runs.iter_mut().zip(there).filter(|(_, there)| !there) {
+            push(&mut life.classes, window, 0);
+        }
+    }
+}
+
+/// Notes a value unless it is what the list has already.
+fn push(list: &mut Vec<Run>, window: u32, value: u32) {
+    if list.last().map_or(0, |last| last.value) != value {
+        list.push(Run {
+            from: window,
+            value,
+        });
+    }
+}
+
+/// A list as flat numbers: windows since the run before, value, windows since, value, …
+pub fn flat(list: &[Run]) -> Vec<u32> {
+    let mut before = 0;
+    let mut out = Vec::with_capacity(list.len() * 2);
+    for run in list {
+        out.extend([run.from - before, run.value]);
+        before = run.from;
+    }
+    out
+}
+
+impl Serialize for ElementRuns {
+    /// `[classes, rates, lifecycles]`, each [`flat`].
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        [&self.classes, &self.rates, &self.lifecycles]
+            .map(|list| flat(list))
+            .serialize(to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::time::{Span, Stamp};
+
+    /// One element over the windows: there with this mark and rate, or not there.
+    type Story<'a> = &'a [Option<(Option<Mark>, f64)>];
+
+    fn runs(story: Story<'_>) -> Runs {
+        let frame = |(index, there): (usize, &Option<(Option<Mark>, f64)>)| Frame {
+            index,
+            span: Span {
+                start: Stamp(0),
+                end: Stamp(1),
+            },
+            partial: false,
+            messages: 0,
+            items: Vec::new(),
+            arrows: there
+                .iter()
+                .map(|(mark, hz)| Shown {
+                    id: 0,
+                    state: State::Active,
+                    degree: Degree::Measured,
+                    mark: *mark,
+                    hz: Some(*hz),
+                    from_hz: None,
+                    count: None,
+                    lifecycle: None,
+                })
+                .collect(),
+            tally: crate::view::Counts::default(),
+            caption: Vec::new(),
+        };
+        let view = View {
+            arrows: vec![crate::view::Arrow {
+                from: 0,
+                to: 0,
+                kind: crate::view::ArrowKind::Publish,
+                members: Vec::new(),
+            }],
+            frames: story.iter().enumerate().map(frame).collect(),
+            ..View::default()
+        };
+        Runs::of(&view, |hz| format!("{hz:.0}"))
+    }
+
+    fn told(runs: &Runs, windows: u32) -> Vec<(&str, &str)> {
+        let life = &runs.arrows[0];
+        let tell = |w| {
+            let class = &runs.classes[at(&life.classes, w) as usize];
+            let label = &runs.labels[at(&life.rates, w) as usize];
+            (class.as_str(), label.as_str())
+        };
+        (0..windows).map(tell).collect()
+    }
+
+    #[test]
+    fn every_window_can_be_sought() {
+        let added = Some((Some(Mark::Added), 10.0));
+        let removed = Some((Some(Mark::Removed), 0.0));
+        let runs = runs(&[
+            None,
+            added,
+            Some((None, 10.0)),
+            Some((None, 0.0)),
+            removed,
+            None,
+        ]);
+        let expected = [
+            ("off", ""),
+            ("active added w2", "10"),
+            ("active w2", "10"),
+            ("active", "0"),
+            ("active removed", "0"),
+            ("off", "0"),
+        ];
+        assert_eq!(told(&runs, 6), expected);
+    }
+
+    #[test]
+    fn what_stays_the_same_is_one_spell() {
+        let runs = runs(&[Some((None, 9.8)); 50]);
+        assert_eq!(
+            serde_json::to_string(&runs.arrows).unwrap(),
+            "[[[0,1],[0,1],[]]]"
+        );
+        assert_eq!(told(&runs, 50)[49], ("active w2", "10"));
+    }
+
+    #[test]
+    fn the_most_frequent_class_has_the_shortest_number() {
+        let (slow, fast) = (Some((None, 1.0)), Some((None, 1000.0)));
+        let runs = runs(&[slow, None, fast, None, fast, None, fast]);
+        assert_eq!(runs.classes, ["off", "active w6", "active w1"]);
+    }
+
+    #[test]
+    fn lists_are_written_as_steps() {
+        let list = [(3, 1), (10, 0), (12, 5)].map(|(from, value)| Run { from, value });
+        assert_eq!(flat(&list), [3, 1, 7, 0, 2, 5]);
+        assert_eq!([2, 3, 11, 99].map(|w| at(&list, w)), [0, 1, 0, 5]);
+    }
+}
