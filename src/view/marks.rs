@@ -62,10 +62,10 @@ impl News {
         match what {
             Element::Node(id) => self.add_item(viewed, viewed.node.get(id as usize), mark, from_hz),
             Element::Topic(id) => {
-                self.add_item(viewed, viewed.topic.get(id as usize), mark, from_hz)
+                self.add_item(viewed, viewed.topic.get(id as usize), mark, from_hz);
             }
             Element::Publish(id) => {
-                self.add_edge(viewed, place(&viewed.publish, id), mark, from_hz)
+                self.add_edge(viewed, place(&viewed.publish, id), mark, from_hz);
             }
             Element::Subscribe(id) => {
                 self.add_edge(viewed, place(&viewed.subscribe, id), mark, from_hz);
