@@ -2,6 +2,7 @@
 
 pub mod events;
 pub mod info;
+pub mod ledger;
 
 mod json;
 pub use json::read::read_json;
@@ -13,6 +14,8 @@ use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
 use crate::graph::{Elements, Graph, NodeId};
+
+pub use ledger::Ledger;
 
 /// One window with its graph.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +51,8 @@ pub struct Mission {
     pub elements: Elements,
     /// The windows in order; those without a message are there too.
     pub windows: Vec<Window>,
+    /// What happened, in continuous time.
+    pub ledger: Ledger,
     /// Where everything was drawn, if it was.
     pub layout: Option<Places>,
     /// What went wrong without stopping us.

@@ -30,7 +30,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["collector"],
     ]),
     ("graph", &[&["build", "diff", "window"]]),
-    ("mission", &[&["events", "json"], &["info"]]),
+    ("mission", &[&["ledger"], &["events", "json"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "filter", "names", "runs", "union"],
         &["options"],

@@ -62,6 +62,7 @@ fn mission(windows: usize) -> (Mission, View) {
         step: period,
         elements: graph::Elements::default(),
         windows: Vec::new(),
+        ledger: bagreel::mission::Ledger::default(),
         layout: None,
         notices: notice::Notices::new(),
     };

@@ -399,6 +399,7 @@ mod tests {
             step: period,
             elements: Elements::default(),
             windows: Vec::new(),
+            ledger: crate::mission::Ledger::default(),
             layout: None,
             notices: Notices::new(),
         };

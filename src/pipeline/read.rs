@@ -220,6 +220,7 @@ fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Resu
         step: windows.step,
         elements: built.elements,
         windows: list,
+        ledger: crate::mission::Ledger::default(),
         layout: None,
         notices,
     };

@@ -39,6 +39,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         step: period,
         elements,
         windows,
+        ledger: crate::mission::Ledger::default(),
         layout: None,
         notices: Notices::new(),
     };

@@ -114,6 +114,7 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
         step: raw.step_ns.and_then(Period::from_nanos).unwrap_or(period),
         elements,
         windows,
+        ledger: crate::mission::Ledger::default(),
         layout: raw.layout.map(layout),
         notices: notices(raw.notices),
     }
