@@ -51,7 +51,7 @@ fn the_example_has_the_phases_of_its_script_and_counts_their_nodes() {
     let name = &mission.ledger.phases[2].name;
     assert_eq!(
         &**name,
-        "+3 nodes: emergency_stop, obstacle_detector, replanner"
+        "+3 nodes: emergency_stop, obstacle_detector and replanner"
     );
 }
 

@@ -160,7 +160,11 @@ fn told(spans: &[Span], found: &[Configuration], ramps: &[bool], unit: &str) -> 
         let count = |list: &[&Arc<str>]| u32::try_from(list.len()).unwrap_or(u32::MAX);
         Phase {
             span: spans[k],
-            name: if ramps[k] { name::ramp(found[k].names.len(), unit) } else { name::of_changes(k == 0, &added, &removed, unit) },
+            name: if ramps[k] {
+                name::ramp(found[k].names.len(), unit)
+            } else {
+                name::of_changes(k == 0, &added, &removed, unit)
+            },
             nodes_added: count(&added),
             nodes_removed: count(&removed),
             is_ramp: ramps[k],

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use crate::base::name::last_part;
+use crate::base::words::{count, some_of};
 
 /// The most names that are listed.
 const MOST: usize = 3;
 
-/// `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `−3 nodes: replanner, …`, `same nodes`.
+/// `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `−1 node: replanner`, `same nodes`.
 pub(crate) fn of_changes(
     is_first: bool,
     added: &[&Arc<str>],
@@ -15,29 +16,22 @@ pub(crate) fn of_changes(
     unit: &str,
 ) -> Arc<str> {
     let text = match (is_first, added, removed) {
-        (true, ..) => counted(added.len(), unit),
+        (true, ..) => count(added.len(), unit),
         (_, [], []) => format!("same {unit}s"),
-        (_, [], removed) => format!("−{}: {}", counted(removed.len(), unit), listed(removed)),
-        (_, added, _) => format!("+{}: {}", counted(added.len(), unit), listed(added)),
+        (_, [], removed) => format!("−{}: {}", count(removed.len(), unit), listed(removed)),
+        (_, added, _) => format!("+{}: {}", count(added.len(), unit), listed(added)),
     };
     Arc::from(text)
 }
 
 /// `ramp to 22 nodes`.
 pub(crate) fn ramp(nodes: usize, unit: &str) -> Arc<str> {
-    Arc::from(format!("ramp to {}", counted(nodes, unit)))
-}
-
-fn counted(n: usize, unit: &str) -> String {
-    format!("{n} {unit}{}", if n == 1 { "" } else { "s" })
+    Arc::from(format!("ramp to {}", count(nodes, unit)))
 }
 
 fn listed(names: &[&Arc<str>]) -> String {
-    let first: Vec<&str> = names.iter().take(MOST).map(|n| last_part(n)).collect();
-    match names.len() - first.len() {
-        0 => first.join(", "),
-        more => format!("{} and {more} more", first.join(", ")),
-    }
+    let names: Vec<&str> = names.iter().map(|n| last_part(n)).collect();
+    some_of(&names, MOST)
 }
 
 #[cfg(test)]
