@@ -4,6 +4,7 @@
 mod action;
 mod call;
 mod evaluator;
+mod expression;
 mod value;
 
 use std::collections::BTreeMap;
