@@ -29,7 +29,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["publishers", "source"],
         &["collector"],
     ]),
-    ("graph", &[&["build", "diff", "window"]]),
+    ("graph", &[&["lives"], &["build", "diff", "window"]]),
     ("mission", &[&["ledger"], &["events", "json"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "filter", "names", "runs", "union"],

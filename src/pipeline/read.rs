@@ -103,7 +103,9 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
     let mut mission = read_json(&text, path)?;
     drop(text);
-    mission.find_changes(reading.rate_change, &[]);
+    if mission.ledger.entries.is_empty() {
+        mission.find_changes(reading.rate_change, &[]);
+    }
     Ok(mission)
 }
 
@@ -210,6 +212,7 @@ fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Resu
             messages: inside,
             graph,
             changes: Vec::new(),
+            entries: Vec::new(),
         })
         .collect();
     let mut mission = Mission {
@@ -224,7 +227,7 @@ fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Resu
         layout: None,
         notices,
     };
-    mission.find_changes(reading.rate_change, &built.restarts);
+    mission.tell(&built.lives, reading.rate_change);
     Ok(mission)
 }
 
