@@ -6,6 +6,7 @@
 mod build;
 pub mod diff;
 pub mod lives;
+pub mod sending;
 pub mod window;
 
 use std::sync::Arc;

@@ -78,7 +78,7 @@ fn a_node_lives_until_its_rhythm_breaks() {
     );
     assert_eq!(states(&built, "/x"), ["-", "active", "active", "-", "-"]);
     assert_eq!(built.messages, [1, 4, 2, 0, 1]);
-    let life = built.lives.nodes[0].lives[0];
+    let life = built.lives.nodes[1].lives[0];
     let ended = life.ended.unwrap();
     assert_eq!((ended.time.0, ended.latest.0), (22 * SECOND, 24 * SECOND));
     assert_eq!(life.began.unwrap().time.0, 12 * SECOND);
@@ -95,7 +95,7 @@ fn no_evidence_is_not_absence() {
     );
     assert_eq!(states(&built, "/x")[1..], ["active"; 9]);
     assert_eq!(states(&built, "/y"), ["active"; 10]);
-    assert!(built.lives.nodes[0].lives[0].ended.is_none());
+    assert!(built.lives.nodes[1].lives[0].ended.is_none());
 }
 
 #[test]

@@ -278,6 +278,17 @@ impl Liveness {
         }
     }
 
+    /// When the last of some edges ended, of which this is one and the others ended at `last`; `None` if nothing tells
+    /// that it did.
+    pub(crate) fn closed(&self, last: Stamp) -> Option<Stamp> {
+        if self.signs.is_empty() {
+            return (!self.is_whole()).then_some(last);
+        }
+        let end = self.ends.iter().max()?;
+        let open = self.signs.iter().any(|sign| sign > end);
+        (!open).then_some(last.max(*end))
+    }
+
     /// Whether messages prove it, all of them latched.
     pub(crate) fn is_latched(&self) -> bool {
         self.senders.0 > 0 && self.senders.0 == self.senders.1

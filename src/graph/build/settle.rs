@@ -15,10 +15,22 @@ pub(crate) fn settle(
     restarts: &Restarts,
     mission: (Stamp, Stamp),
 ) {
+    let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
     for (what, track) in edges(tracks) {
         let (node, topic) = ends(what);
+        let last = closed.entry(node).or_insert(Some(Stamp::MIN));
+        *last = last.and_then(|last| track.closed(last));
         tracks.entry(Key::Node(node)).or_default().learn(&track);
         tracks.entry(Key::Topic(topic)).or_default().know(&track);
+    }
+    // Whose last connection was closed, and who was not heard of again, is gone.
+    for (node, end) in closed {
+        let end = end.filter(|end| *end > Stamp::MIN);
+        if let (Some(end), Some(track)) = (end, tracks.get_mut(&Key::Node(node)))
+            && track.signs.iter().all(|sign| *sign <= end)
+        {
+            track.ends.push(end);
+        }
     }
     for (what, track) in tracks.iter_mut() {
         if let Key::Node(node) = what {
