@@ -125,7 +125,11 @@ impl Mission {
                 .collect();
             window.changes = changes.next(window.span, &window.graph, &inside);
         }
-        let windows: Vec<_> = self.windows.iter().map(|w| (w.span, &w.changes[..])).collect();
+        let windows: Vec<_> = self
+            .windows
+            .iter()
+            .map(|w| (w.span, &w.changes[..]))
+            .collect();
         let (entries, places) = ledger::of_changes(&windows, &self.elements);
         self.ledger.entries = entries;
         for (window, places) in self.windows.iter_mut().zip(places) {

@@ -235,8 +235,8 @@ struct Followed<'a> {
 /// Puts the messages of one stream on a track: of a publication, or of a topic.
 fn follow(track: &mut Liveness, rates: &Rates, place: usize, what: &Followed<'_>) {
     let sender = rates.of.get(place).and_then(|of| rates.senders.get(*of));
-    let trace = rates.traces.get(place).copied().flatten();
-    let (Some((first, last)), Some(sender)) = (trace, sender) else {
+    let spoke = rates.traces.get(place).copied().flatten();
+    let (Some((first, last)), Some(sender)) = (spoke, sender) else {
         track.extent = track.extent.max(Extent::Whole);
         return;
     };
@@ -251,5 +251,7 @@ fn follow(track: &mut Liveness, rates: &Rates, place: usize, what: &Followed<'_>
     track.signs.extend([first, last]);
     track.heard = track.heard.max(Some(last));
     let pulse = Pulse::of(&sender.stretches, what.restarts);
-    track.pulses.extend(pulse.filter(|_| what.beats && !latched));
+    track
+        .pulses
+        .extend(pulse.filter(|_| what.beats && !latched));
 }

@@ -174,7 +174,11 @@ pub fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<
         // From the last message of any of them to the first of any.
         let sends = |s: &&Stretch| s.last > from && to.is_none_or(|to| s.first < to);
         let others = || senders.iter().flat_map(|s| s.iter()).filter(sends);
-        if others().next().is_none() && all.last().is_none_or(|last| last.1.is_some_and(|end| end <= from)) {
+        if others().next().is_none()
+            && all
+                .last()
+                .is_none_or(|last| last.1.is_some_and(|end| end <= from))
+        {
             all.push((from, to));
         }
     }

@@ -25,7 +25,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         messages: 0,
         graph: graph(words, &elements),
         changes: Vec::new(),
-            entries: Vec::new(),
+        entries: Vec::new(),
     });
     let windows: Vec<Window> = windows.collect();
     let period = Period::from_nanos(SECOND).unwrap();

@@ -98,11 +98,14 @@ impl Assembly<'_> {
             }
         }
         for (node, id) in &self.nodes {
-            let states = self.values.transitions(*node).map(|(time, state)| Transition {
-                node: *id,
-                time: *time,
-                state: std::sync::Arc::clone(state),
-            });
+            let states = self
+                .values
+                .transitions(*node)
+                .map(|(time, state)| Transition {
+                    node: *id,
+                    time: *time,
+                    state: std::sync::Arc::clone(state),
+                });
             self.built.lives.transitions.extend(states);
         }
         let order = |t: &Transition| (t.time, t.node);
@@ -230,9 +233,8 @@ impl Assembly<'_> {
                 let state = match tally {
                     _ if track.is_declared() => State::Declared,
                     _ if track.is_latched() => State::Latched,
-                    Some(_) => State::Active,
                     None if track.senders.0 == 0 || is_silent(&silent, *span) => State::Silent,
-                    None => State::Active,
+                    _ => State::Active,
                 };
                 self.built.graphs[window].topics.push(TopicState {
                     id,
@@ -263,8 +265,9 @@ impl Assembly<'_> {
             let state = match count {
                 _ if track.is_declared() => State::Declared,
                 _ if track.is_latched() => State::Latched,
-                Some(1..) => State::Active,
-                _ if track.senders.0 == 0 || is_silent(&silent, *span) => State::Silent,
+                None | Some(0) if track.senders.0 == 0 || is_silent(&silent, *span) => {
+                    State::Silent
+                }
                 _ => State::Active,
             };
             let state = edge_state(id, track, state, *span, count);
@@ -291,7 +294,9 @@ impl Assembly<'_> {
                 Ok(state) => state,
                 Err(_) => State::Silent,
             };
-            graph.subscribes.push(edge_state(id, track, state, *span, None));
+            graph
+                .subscribes
+                .push(edge_state(id, track, state, *span, None));
         }
     }
 

@@ -60,7 +60,11 @@ impl Pulse {
     /// The rhythm of a sender, if it has one.
     pub(crate) fn of(stretches: &[Stretch], restarts: &[Restart]) -> Option<Self> {
         let last = stretches.last()?;
-        let away = |p: &[Stretch]| restarts.iter().any(|r| p[0].last <= r.birth && r.death <= p[1].first);
+        let away = |p: &[Stretch]| {
+            restarts
+                .iter()
+                .any(|r| p[0].last <= r.birth && r.death <= p[1].first)
+        };
         let pauses = stretches.windows(2).filter(|p| !away(p));
         let pauses = pauses.map(|p| p[1].first.since(p[0].last));
         (last.count >= FEWEST).then(|| Self {
@@ -176,7 +180,10 @@ impl Liveness {
             life.to = life.ended.map_or(mission.1, |end| end.time);
         }
         if let Some(life) = self.lives.first_mut() {
-            let rhythm = self.pulses.iter().filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
+            let rhythm = self
+                .pulses
+                .iter()
+                .filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
             let period = rhythm.map(|p| p.period).min();
             life.begin(mission.0, period);
         }
@@ -406,7 +413,10 @@ fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
             Some(life) if open => life.to = *sign,
             _ => {
                 let mut life = Lifetime::at(*sign);
-                life.began = life.began.map(|b| Bound { earliest: gone, ..b });
+                life.began = life.began.map(|b| Bound {
+                    earliest: gone,
+                    ..b
+                });
                 lives.push(life);
             }
         }

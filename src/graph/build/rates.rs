@@ -129,7 +129,10 @@ const LATE_NS: i64 = 500_000_000;
 
 impl Heard {
     fn hear(&mut self, time: Stamp) {
-        let late = self.times.last().is_none_or(|last| time.since(*last) > LATE_NS);
+        let late = self
+            .times
+            .last()
+            .is_none_or(|last| time.since(*last) > LATE_NS);
         self.passed += 1;
         if !late && self.passed < self.every {
             return;

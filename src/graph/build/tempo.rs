@@ -109,7 +109,8 @@ fn best(times: &[Stamp], step: usize, range: std::ops::RangeInclusive<usize>) ->
             continue;
         }
         let left = times[at].since(times[0]) as f64;
-        let gain = cost(n as f64, whole) - cost(at as f64, left) - cost((n - at) as f64, whole - left);
+        let gain =
+            cost(n as f64, whole) - cost(at as f64, left) - cost((n - at) as f64, whole - left);
         if gain > most {
             (found, most) = (Some(at), gain);
         }
@@ -204,8 +205,9 @@ mod tests {
 
     fn told(runs: &[(usize, i64)]) -> Vec<(u64, i64, bool)> {
         let all = stretches(&times(runs));
-        let ms = |s: &Stretch| libm::round(1e3 / s.hz()) as i64;
-        all.iter().map(|s| (s.count, ms(s), s.is_joined)).collect()
+        all.iter()
+            .map(|s| (s.count, s.period / 1_000_000, s.is_joined))
+            .collect()
     }
 
     #[test]
@@ -231,7 +233,10 @@ mod tests {
         let found = told(&[(50, 100), (1, 30_000), (50, 100)]);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(!found[1].2);
-        assert_eq!(told(&[(50, 100), (1, 300), (50, 100), (1, 900), (50, 100)]).len(), 1);
+        assert_eq!(
+            told(&[(50, 100), (1, 300), (50, 100), (1, 900), (50, 100)]).len(),
+            1
+        );
     }
 
     #[test]

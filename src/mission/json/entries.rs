@@ -38,9 +38,18 @@ pub(crate) struct EntryRow<'a> {
 #[serde(untagged)]
 enum DetailRow<'a> {
     None {},
-    Rates { from_hz: f64, to_hz: f64 },
-    Senders { from: Vec<&'a str>, to: Vec<&'a str> },
-    Values { from: &'a str, to: &'a str },
+    Rates {
+        from_hz: f64,
+        to_hz: f64,
+    },
+    Senders {
+        from: Vec<&'a str>,
+        to: Vec<&'a str>,
+    },
+    Values {
+        from: &'a str,
+        to: &'a str,
+    },
 }
 
 /// The rows of a ledger, in order.
@@ -140,7 +149,9 @@ pub(crate) fn read(rows: &[RawEntry], elements: &Elements) -> Option<Vec<Entry>>
 }
 
 fn entry(row: &RawEntry, elements: &Elements) -> Option<Entry> {
-    let degree = Degree::ALL.into_iter().find(|d| row.degree.as_deref() == Some(d.word()));
+    let degree = Degree::ALL
+        .into_iter()
+        .find(|d| row.degree.as_deref() == Some(d.word()));
     Some(Entry {
         kind: Kind::ALL.into_iter().find(|k| k.word() == row.kind)?,
         what: element(row, elements)?,
@@ -164,8 +175,18 @@ fn element(row: &RawEntry, elements: &Elements) -> Option<Element> {
     let place = |edges: &[Edge], node_first: bool| {
         let node = node(row.node.as_deref()?, elements)?;
         let topic = topic(row.topic.as_deref()?, elements)?;
-        let key = |e: &Edge| if node_first { (e.node, e.topic) } else { (e.topic, e.node) };
-        let wanted = if node_first { (node, topic) } else { (topic, node) };
+        let key = |e: &Edge| {
+            if node_first {
+                (e.node, e.topic)
+            } else {
+                (e.topic, e.node)
+            }
+        };
+        let wanted = if node_first {
+            (node, topic)
+        } else {
+            (topic, node)
+        };
         let place = edges.binary_search_by_key(&wanted, key).ok()?;
         u32::try_from(place).ok()
     };
@@ -179,12 +200,16 @@ fn element(row: &RawEntry, elements: &Elements) -> Option<Element> {
 }
 
 fn node(name: &str, elements: &Elements) -> Option<NodeId> {
-    let place = elements.nodes.binary_search_by(|n| n.name.as_str().cmp(name));
+    let place = elements
+        .nodes
+        .binary_search_by(|n| n.name.as_str().cmp(name));
     u32::try_from(place.ok()?).ok()
 }
 
 fn topic(name: &str, elements: &Elements) -> Option<u32> {
-    let place = elements.topics.binary_search_by(|t| t.name.as_str().cmp(name));
+    let place = elements
+        .topics
+        .binary_search_by(|t| t.name.as_str().cmp(name));
     u32::try_from(place.ok()?).ok()
 }
 

@@ -43,7 +43,7 @@ impl Names {
                 evidence: Evidence::NONE,
                 first: None,
                 last: None,
-            runs: Vec::new(),
+                runs: Vec::new(),
                 qos: None,
             })
     }

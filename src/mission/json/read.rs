@@ -36,7 +36,12 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     let mut mission = build(raw, &spans);
     if let Some(rows) = ledger {
         let entries = super::entries::read(&rows, &mission.elements);
-        let nothing = || bad(0, "an entry of its ledger is about nothing in its windows".to_owned());
+        let nothing = || {
+            bad(
+                0,
+                "an entry of its ledger is about nothing in its windows".to_owned(),
+            )
+        };
         mission.ledger.entries = entries.ok_or_else(nothing)?;
         mission.explain();
     }
@@ -106,7 +111,7 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
                 messages: window.messages.unwrap_or_else(counts),
                 graph: places.graph(window),
                 changes: Vec::new(),
-            entries: Vec::new(),
+                entries: Vec::new(),
             }
         })
         .collect();

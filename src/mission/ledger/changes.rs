@@ -118,9 +118,13 @@ fn ids<'s, T>(
 
 /// What entries tell of a window beside what is there: rates, hand-overs, restarts, values.
 fn values(ledger: &Ledger, news: Span) -> impl Iterator<Item = (Change, EntryId)> + '_ {
-    let inside = (0..)
-        .zip(&ledger.entries)
-        .filter(move |(_, e)| news.contains(e.until.filter(|_| e.kind == Kind::Restarted).unwrap_or(e.time)));
+    let inside = (0..).zip(&ledger.entries).filter(move |(_, e)| {
+        news.contains(
+            e.until
+                .filter(|_| e.kind == Kind::Restarted)
+                .unwrap_or(e.time),
+        )
+    });
     inside.filter_map(|(id, entry)| Some((change(entry)?, id)))
 }
 
@@ -177,7 +181,9 @@ pub(crate) fn of_changes(
     }
     let (entries, new) = sorted(list, elements);
     let mut new = new.into_iter();
-    let places = windows.iter().map(|w| new.by_ref().take(w.1.len()).collect());
+    let places = windows
+        .iter()
+        .map(|w| new.by_ref().take(w.1.len()).collect());
     let places = places.collect();
     (entries, places)
 }
@@ -211,9 +217,12 @@ fn entry(change: &Change, (before, span): (Span, Span), elements: &Elements) -> 
             let what = Element::Topic(*topic);
             (Kind::HandedOver, what, None, Detail::Senders { from, to })
         }
-        Change::Restarted { node, time } => {
-            (Kind::Restarted, Element::Node(*node), Some(*time), Detail::None)
-        }
+        Change::Restarted { node, time } => (
+            Kind::Restarted,
+            Element::Node(*node),
+            Some(*time),
+            Detail::None,
+        ),
         Change::Value {
             kind,
             what,
@@ -255,16 +264,17 @@ fn attach(list: &mut [Entry], first: usize, elements: &Elements) {
         }
     }
     let mut topics = BTreeMap::new();
-    for at in first..list.len() {
-        let (kind, what) = (list[at].kind, list[at].what);
-        let (Some(node), Some(topic)) = elements.ends(what) else {
+    for (at, entry) in list.iter_mut().enumerate().skip(first) {
+        let (Some(node), Some(topic)) = elements.ends(entry.what) else {
             continue;
         };
-        if let Kind::Appeared | Kind::Vanished = kind {
-            let begins = kind == Kind::Appeared;
+        if let Kind::Appeared | Kind::Vanished = entry.kind {
+            let begins = entry.kind == Kind::Appeared;
             let whole = nodes.get(&(node, begins)).copied();
-            list[at].part_of = whole;
-            topics.entry((topic, begins)).or_insert(whole.unwrap_or(id(at)));
+            entry.part_of = whole;
+            topics
+                .entry((topic, begins))
+                .or_insert(whole.unwrap_or(id(at)));
         }
     }
     for entry in &mut list[first..] {

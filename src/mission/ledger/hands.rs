@@ -71,7 +71,7 @@ fn sendings(told: &Told<'_>, voices: &[&Voice]) -> Vec<Sending> {
         }
         all.extend(own);
     }
-    all.sort_by(|a, b| (a.first, a.node).cmp(&(b.first, b.node)));
+    all.sort_by_key(|s| (s.first, s.node));
     all
 }
 
@@ -79,7 +79,10 @@ fn sendings(told: &Told<'_>, voices: &[&Voice]) -> Vec<Sending> {
 fn replaced(all: &[Sending]) -> Vec<(Sending, Sending)> {
     let mut found = Vec::new();
     for old in all.iter().filter(|s| s.count >= FEWEST) {
-        let own = || all.iter().filter(|s| s.role == old.role && s.last > old.last);
+        let own = || {
+            all.iter()
+                .filter(|s| s.role == old.role && s.last > old.last)
+        };
         let back = own().map(|s| s.first).min();
         if back.is_some_and(|back| back.since(old.last) <= BACK_NS) {
             continue;
@@ -88,7 +91,11 @@ fn replaced(all: &[Sending]) -> Vec<(Sending, Sending)> {
         let begins = others().find(|s| {
             let late = s.first.since(old.last);
             let soon = late <= AFTER_NS || back.is_none();
-            late >= -BEFORE_NS && soon && s.first > old.first && s.last > old.last && s.count >= FEWEST
+            late >= -BEFORE_NS
+                && soon
+                && s.first > old.first
+                && s.last > old.last
+                && s.count >= FEWEST
         });
         let Some(new) = begins.filter(|new| back.is_none_or(|back| new.first < back)) else {
             continue;
@@ -98,7 +105,9 @@ fn replaced(all: &[Sending]) -> Vec<(Sending, Sending)> {
             s.role != new.role && s.last > old.last && s.first < old.last.plus(-BEFORE_NS)
         });
         let went_on = others().any(|s| {
-            s.role == new.role && s.first < old.last.plus(-BEFORE_NS) && s.last.plus(BACK_NS) > old.last
+            s.role == new.role
+                && s.first < old.last.plus(-BEFORE_NS)
+                && s.last.plus(BACK_NS) > old.last
         });
         if !carried && !went_on {
             found.push((old.clone(), new.clone()));
@@ -151,7 +160,9 @@ fn shares(told: &Told<'_>, drafts: &mut Drafts, topic: TopicId, voices: &[&Voice
     cuts.dedup();
     let mut before: Option<(NodeId, BTreeSet<NodeId>, Stamp)> = None;
     for pair in cuts.windows(2) {
-        let inside = paces.iter().filter(|p| p.first <= pair[0] && pair[1] <= p.last);
+        let inside = paces
+            .iter()
+            .filter(|p| p.first <= pair[0] && pair[1] <= p.last);
         let senders: Vec<&Pace> = inside.collect();
         let whole: f64 = senders.iter().map(|p| p.hz).sum();
         let main = senders.iter().find(|p| p.hz > whole / 2.0);

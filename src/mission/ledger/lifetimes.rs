@@ -33,11 +33,23 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
     }
     let edges = told.elements.publishes.iter().zip(&told.lives.publishes);
     for (id, (edge, known)) in (0..).zip(edges) {
-        tell_edge(told, drafts, &mut wholes, Element::Publish(id), (edge, known));
+        tell_edge(
+            told,
+            drafts,
+            &mut wholes,
+            Element::Publish(id),
+            (edge, known),
+        );
     }
     let edges = told.elements.subscribes.iter().zip(&told.lives.subscribes);
     for (id, (edge, known)) in (0..).zip(edges) {
-        tell_edge(told, drafts, &mut wholes, Element::Subscribe(id), (edge, known));
+        tell_edge(
+            told,
+            drafts,
+            &mut wholes,
+            Element::Subscribe(id),
+            (edge, known),
+        );
     }
     for (id, known) in (0..).zip(&told.lives.topics) {
         for (turn, at) in turns(known) {
@@ -100,8 +112,16 @@ fn tell_role(told: &Told<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &
         let mut entry = told.entry(Kind::Restarted, Element::Node(heir), at);
         entry.until = Some(again.time);
         let id = drafts.add(entry);
-        wholes.nodes.entry((node, Turn::Ends)).or_default().push((at, id));
-        wholes.nodes.entry((heir, Turn::Begins)).or_default().push((again, id));
+        wholes
+            .nodes
+            .entry((node, Turn::Ends))
+            .or_default()
+            .push((at, id));
+        wholes
+            .nodes
+            .entry((heir, Turn::Begins))
+            .or_default()
+            .push((again, id));
         if heir != node {
             for (kind, node, at) in [(Kind::Stopped, node, at), (Kind::Started, heir, again)] {
                 let mut part = told.entry(kind, Element::Node(node), at);
@@ -131,6 +151,9 @@ fn tell_edge(
         entry.part_of = near.map(|(_, id)| id);
         let id = drafts.add(entry);
         let whole = near.map_or(id, |(_, id)| id);
-        wholes.topics.entry((edge.topic, turn, at.time)).or_insert(whole);
+        wholes
+            .topics
+            .entry((edge.topic, turn, at.time))
+            .or_insert(whole);
     }
 }

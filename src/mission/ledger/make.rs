@@ -47,9 +47,14 @@ pub(crate) fn sorted(mut list: Vec<Entry>, elements: &Elements) -> (Vec<Entry>, 
     let mut order: Vec<usize> = (0..list.len()).collect();
     let key = |at: &usize| {
         let entry = &list[*at];
-        (entry.time, entry.kind, elements.ends(entry.what), entry.what)
+        (
+            entry.time,
+            entry.kind,
+            elements.ends(entry.what),
+            entry.what,
+        )
     };
-    order.sort_by(|a, b| key(a).cmp(&key(b)));
+    order.sort_by_key(key);
     let mut new: Vec<EntryId> = vec![0; list.len()];
     for (place, old) in (0..).zip(&order) {
         new[*old] = place;
@@ -151,7 +156,11 @@ fn lifecycles(told: &Told<'_>, drafts: &mut Drafts) {
         if from == change.state {
             continue;
         }
-        let mut entry = told.entry(Kind::Lifecycle, Element::Node(change.node), exact(change.time));
+        let mut entry = told.entry(
+            Kind::Lifecycle,
+            Element::Node(change.node),
+            exact(change.time),
+        );
         entry.degree = Degree::Stated;
         entry.evidence = Evidence::of("lifecycle");
         entry.detail = Detail::Values {

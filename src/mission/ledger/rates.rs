@@ -42,9 +42,7 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
 
 /// Whether a steady rate becomes another one.
 fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
-    let holds = |s: &Stretch| {
-        s.is_even && s.count >= FEWEST && s.last.since(s.first) >= HOLDS_NS
-    };
+    let holds = |s: &Stretch| s.is_even && s.count >= FEWEST && s.last.since(s.first) >= HOLDS_NS;
     let differs = (after.hz() - before.hz()).abs() > share * before.hz().min(after.hz());
     let meets = after.is_joined || after.first.since(before.last) <= PAUSE_NS;
     holds(before) && holds(after) && differs && meets

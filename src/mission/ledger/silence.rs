@@ -63,7 +63,10 @@ fn spans(known: &Known) -> Vec<Span> {
 }
 
 fn entry(told: &Told<'_>, what: Element, (from, to): Silence, voices: &[&Voice]) -> super::Entry {
-    let last = voices.iter().flat_map(|v| &v.stretches).filter(|s| s.last == from);
+    let last = voices
+        .iter()
+        .flat_map(|v| &v.stretches)
+        .filter(|s| s.last == from);
     let period = last.map(|s| s.period).max().unwrap_or(0);
     let mut entry = told.entry(
         Kind::Silent,
