@@ -70,6 +70,7 @@ pub const SOURCES: &[Source] = &[
         about: "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)",
         reads: &[(lifecycle::SHAPE, lifecycle::read)],
         lasting: true,
+        own: true,
         ..NOTHING
     },
     Source {
@@ -90,6 +91,7 @@ pub const SOURCES: &[Source] = &[
         about: "`rcl_interfaces/msg/ParameterEvent`",
         reads: &[(parameter_events::SHAPE, parameter_events::read)],
         lasting: true,
+        own: true,
         ..NOTHING
     },
     Source {
@@ -110,6 +112,7 @@ pub const SOURCES: &[Source] = &[
             (rosout_ros2::SHAPE, rosout_ros2::read),
         ],
         conclude: &[rosout::conclude, rosout_ros2::conclude],
+        own: true,
         ..NOTHING
     },
     Source {
@@ -118,6 +121,7 @@ pub const SOURCES: &[Source] = &[
         reads: &[(metrics::SHAPE, metrics::read)],
         conclude: &[metrics::conclude],
         lasting: true,
+        own: true,
         ..NOTHING
     },
     Source {

@@ -5,13 +5,14 @@
 
 mod build;
 pub mod diff;
+pub mod lives;
 pub mod sending;
 pub mod window;
 
 use std::sync::Arc;
 
 use crate::base::name::{NodeName, TopicName};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 
 pub use build::{Built, Options, build};
@@ -36,6 +37,8 @@ pub struct Node {
     pub first: Option<Stamp>,
     /// Its last sign of life.
     pub last: Option<Stamp>,
+    /// When it is there, in order, half-open; empty where only windows are known.
+    pub runs: Vec<Span>,
 }
 
 /// A topic, over the whole mission.
@@ -53,6 +56,8 @@ pub struct Topic {
     pub last: Option<Stamp>,
     /// The quality of service offered, in short words, if known: `reliable transient_local depth 1`.
     pub qos: Option<Arc<str>>,
+    /// When it is there, in order, half-open; empty where only windows are known.
+    pub runs: Vec<Span>,
 }
 
 /// A publication or a subscription, over the whole mission.
@@ -68,6 +73,8 @@ pub struct Edge {
     pub first: Option<Stamp>,
     /// Its last.
     pub last: Option<Stamp>,
+    /// When it is there, in order, half-open; empty where only windows are known.
+    pub runs: Vec<Span>,
 }
 
 /// Everything that ever is in the mission: nodes and topics sorted by name, publications by (node, topic),
@@ -202,6 +209,39 @@ impl Element {
 }
 
 impl Elements {
+    /// The node and the topic of an element: both of an edge, one of the others.
+    pub fn ends(&self, element: Element) -> (Option<NodeId>, Option<TopicId>) {
+        let ends = |edge: Option<&Edge>| (edge.map(|e| e.node), edge.map(|e| e.topic));
+        match element {
+            Element::Node(id) => (Some(id), None),
+            Element::Topic(id) => (None, Some(id)),
+            Element::Publish(id) => ends(self.publishes.get(id as usize)),
+            Element::Subscribe(id) => ends(self.subscribes.get(id as usize)),
+        }
+    }
+
+    /// What proves an element.
+    pub fn evidence(&self, element: Element) -> Evidence {
+        match element {
+            Element::Node(id) => self.nodes.get(id as usize).map(|n| n.evidence),
+            Element::Topic(id) => self.topics.get(id as usize).map(|t| t.evidence),
+            Element::Publish(id) => self.publishes.get(id as usize).map(|e| e.evidence),
+            Element::Subscribe(id) => self.subscribes.get(id as usize).map(|e| e.evidence),
+        }
+        .unwrap_or(Evidence::NONE)
+    }
+
+    /// When an element is there, in order, half-open; empty where only windows are known.
+    pub fn runs(&self, element: Element) -> &[Span] {
+        let runs = match element {
+            Element::Node(id) => self.nodes.get(id as usize).map(|n| &n.runs),
+            Element::Topic(id) => self.topics.get(id as usize).map(|t| &t.runs),
+            Element::Publish(id) => self.publishes.get(id as usize).map(|e| &e.runs),
+            Element::Subscribe(id) => self.subscribes.get(id as usize).map(|e| &e.runs),
+        };
+        runs.map_or(&[], Vec::as_slice)
+    }
+
     /// The first and the last sign of life of an element, where known.
     pub fn life(&self, element: Element) -> (Option<Stamp>, Option<Stamp>) {
         match element {

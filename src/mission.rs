@@ -15,10 +15,11 @@ use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
+use crate::graph::lives::Lives;
 use crate::graph::{Elements, Graph, NodeId};
 
 pub use activity::Activity;
-pub use ledger::Ledger;
+pub use ledger::{EntryId, Ledger};
 
 /// One window with its graph.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +36,8 @@ pub struct Window {
     pub graph: Graph,
     /// What changed against the window before; empty in the first.
     pub changes: Vec<Change>,
+    /// The place in the ledger of the entry that each of the changes belongs to.
+    pub entries: Vec<EntryId>,
 }
 
 /// A mission as a sequence of graphs.
@@ -89,8 +92,29 @@ pub struct Place {
 }
 
 impl Mission {
-    /// Finds what changed from each window to the next, anew. A rate must change by more than the share `threshold`;
-    /// `restarts` are nodes that began anew under the same name, and when, sorted by time.
+    /// Tells what happened by the lives of all elements, and what changed from each window to the next because of it. A
+    /// rate must change by more than the share `rate_change`.
+    pub(crate) fn tell(&mut self, lives: &Lives, rate_change: f64) {
+        self.ledger.entries = ledger::make(&ledger::Told {
+            elements: &self.elements,
+            lives,
+            rate_change,
+        });
+        self.explain();
+    }
+
+    /// Finds what changed from each window to the next, by the ledger.
+    pub(crate) fn explain(&mut self) {
+        let windows = self.windows.iter().map(|w| (w.span, &w.graph));
+        let told = ledger::explain(windows, &self.elements, &self.ledger);
+        for (window, (changes, entries)) in self.windows.iter_mut().zip(told) {
+            (window.changes, window.entries) = (changes, entries);
+        }
+    }
+
+    /// Finds what changed from each window to the next, and makes the ledger of it: for missions of which nothing but
+    /// windows is known. A rate must change by more than the share `threshold`; `restarts` are nodes that began anew
+    /// under the same name, and when, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
         let mut changes = Changes::new(&self.elements, threshold);
         for window in &mut self.windows {
@@ -100,6 +124,16 @@ impl Mission {
                 .filter(|(_, at)| window.span.contains(*at))
                 .collect();
             window.changes = changes.next(window.span, &window.graph, &inside);
+        }
+        let windows: Vec<_> = self
+            .windows
+            .iter()
+            .map(|w| (w.span, &w.changes[..]))
+            .collect();
+        let (entries, places) = ledger::of_changes(&windows, &self.elements);
+        self.ledger.entries = entries;
+        for (window, places) in self.windows.iter_mut().zip(places) {
+            window.entries = places;
         }
     }
 

@@ -29,7 +29,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["publishers", "source"],
         &["collector"],
     ]),
-    ("graph", &[&["build", "diff", "sending", "window"]]),
+    ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
     ("mission", &[&["activity", "ledger"], &["events", "json", "phases"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "filter", "names", "runs", "union"],

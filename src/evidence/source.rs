@@ -39,6 +39,8 @@ pub struct Source {
     pub(crate) reads: &'static [(Shape, Read)],
     /// Whether what it claims holds until it is taken back, though nobody repeats it.
     pub(crate) lasting: bool,
+    /// Whether a node says it of itself, so that it was there when it did.
+    pub(crate) own: bool,
     /// What the announcement of a connection says.
     pub(crate) announced: Option<fn(&mut SourceContext<'_>)>,
     /// What follows from the whole mission; run in the order of the rows.
@@ -54,6 +56,7 @@ pub(crate) const NOTHING: Source = Source {
     about: "",
     reads: &[],
     lasting: false,
+    own: false,
     announced: None,
     conclude: &[],
 };

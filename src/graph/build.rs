@@ -7,21 +7,23 @@ pub(crate) mod rates;
 pub(crate) mod restarts;
 pub(crate) mod roles;
 pub(crate) mod settle;
+pub(crate) mod tempo;
 pub(crate) mod values;
 pub(crate) mod windows;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
-use self::assemble::{Traffic, assemble};
-use self::liveness::{Extent, Liveness};
+use self::assemble::{Sight, Traffic, assemble};
+use self::liveness::{Extent, Liveness, Pulse};
 use self::proofs::prove;
 use self::rates::{Rates, rates};
 use self::restarts::{Restarts, restarts};
-use self::settle::{Frame, settle};
+use self::settle::settle;
 use self::values::Values;
 use self::windows::Windows;
-use super::{Elements, Graph, NodeId};
+use super::lives::Lives;
+use super::{Elements, Graph};
 use crate::base::error::Result;
 use crate::base::notice::Notices;
 use crate::base::time::{Span, Stamp};
@@ -29,7 +31,7 @@ use crate::evidence::claim::Name;
 use crate::evidence::collector::{Collected, spool_error};
 use crate::evidence::proof::{Key, Proof, Validity};
 use crate::evidence::topology::Topology;
-use crate::evidence::{Degree, Evidence};
+use crate::evidence::{Evidence, SOURCES};
 
 /// How graphs are built.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -51,8 +53,8 @@ pub struct Built {
     pub graphs: Vec<Graph>,
     /// Messages per window.
     pub messages: Vec<u64>,
-    /// Nodes that began anew under the same name, and when they were first seen again; sorted by time.
-    pub restarts: Vec<(NodeId, Stamp)>,
+    /// When everything lived, and how it sent.
+    pub lives: Lives,
     /// What went wrong without stopping us.
     pub notices: Notices,
 }
@@ -99,16 +101,8 @@ impl<'a> Builder<'a> {
         self.count(collected)?;
         self.restarts = restarts(collected, &self.proofs)?;
         self.track(collected)?;
-        settle(
-            &mut self.tracks,
-            &self.proofs,
-            &Frame {
-                windows: self.windows,
-                mission: self.mission,
-                grace: options.grace,
-            },
-        );
-        let mut built = self.assemble(collected);
+        settle(&mut self.tracks, &self.proofs, &self.restarts, self.mission);
+        let mut built = self.assemble(collected, options.grace);
         built
             .notices
             .extend(options.topology.notices.iter().cloned());
@@ -130,18 +124,18 @@ impl<'a> Builder<'a> {
 
     /// Puts the signs of every proof on the track of its element.
     fn track(&mut self, collected: &mut Collected) -> io::Result<()> {
+        let sent = sent(&self.proofs);
         for proof in &self.proofs {
             let node = match proof.what {
                 Key::Node(node) | Key::Publish(node, _) | Key::Subscribe(_, node) => Some(node),
                 Key::Topic(_) => None,
             };
             let restarts = node.and_then(|node| self.restarts.get(&node));
-            let deaths: Vec<Stamp> = restarts.into_iter().flatten().map(|r| r.death).collect();
+            let restarts = restarts.map_or(&[][..], Vec::as_slice);
+            let deaths: Vec<Stamp> = restarts.iter().map(|r| r.death).collect();
             let track = self.tracks.entry(proof.what).or_default();
             track.evidence = track.evidence.and(Evidence::row(proof.source));
-            if proof.degree != Degree::Measured {
-                track.quiet = track.quiet.min(proof.degree);
-            }
+            track.degree = track.degree.min(proof.degree);
             match &proof.when {
                 Validity::Messages(at) => {
                     let stream = &collected.streams[*at];
@@ -149,7 +143,12 @@ impl<'a> Builder<'a> {
                         continue;
                     };
                     let place = streams.iter().position(|s| s == at).unwrap_or(0);
-                    follow(track, rates, place, stream.latched, self.mission.1);
+                    let what = Followed {
+                        known: node.is_none() && sent.contains(at),
+                        beats: stream.connection.topic.as_str() != "/rosout",
+                        restarts,
+                    };
+                    follow(track, rates, place, &what);
                     if !deaths.is_empty() {
                         let times = collected.messages.times(stream.times)?;
                         track.bound_all(&times, &deaths);
@@ -159,23 +158,22 @@ impl<'a> Builder<'a> {
                     let stream = &collected.streams[*at];
                     if let Some((streams, rates)) = self.rates.get(&stream.topic)
                         && let Some(place) = streams.iter().position(|s| s == at)
-                        && let Some(trace) = rates.traces[place]
+                        && let Some((first, _)) = rates.traces[place]
                     {
-                        track.begin_all(&[trace.first], &[], proof.degree, &self.windows);
+                        track.bound_all(&[first], &[]);
                     }
                 }
-                Validity::Signs { signs, ends, held } => {
-                    let mut ends = ends.clone();
-                    ends.extend(&deaths);
-                    ends.sort_unstable();
-                    track.sign_all(signs, &ends, proof.degree, &self.windows);
-                    track.held |= held;
+                Validity::Signs { signs, ends, .. } => {
+                    let ends = together(ends, &deaths);
+                    track.sign_all(signs, &ends);
+                    if SOURCES.get(proof.source).is_some_and(|s| s.own) {
+                        track.heard = track.heard.max(signs.last().copied());
+                        track.speaks = true;
+                    }
                 }
                 Validity::Begins { signs, ends } => {
-                    let mut ends = ends.clone();
-                    ends.extend(&deaths);
-                    ends.sort_unstable();
-                    track.begin_all(signs, &ends, proof.degree, &self.windows);
+                    let ends = together(ends, &deaths);
+                    track.bound_all(signs, &ends);
                 }
                 Validity::Like(_) => {}
                 Validity::Whole => track.extent = track.extent.max(Extent::Whole),
@@ -192,46 +190,68 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    fn assemble(self, collected: &Collected) -> Built {
-        let mut built = assemble(
-            &self.tracks,
-            &self.rates,
-            &self.values,
-            &self.windows,
-            collected,
-        );
-        for (node, restarts) in &self.restarts {
-            let name = collected.facts.text(*node);
-            let id = built
-                .elements
-                .nodes
-                .binary_search_by(|n| n.name.as_str().cmp(&name));
-            if let Ok(id) = id.map(|id| NodeId::try_from(id).unwrap_or(NodeId::MAX)) {
-                built
-                    .restarts
-                    .extend(restarts.iter().map(|r| (id, r.birth)));
-            }
-        }
-        built.restarts.sort_by_key(|(node, time)| (*time, *node));
-        built
+    fn assemble(self, collected: &Collected, grace: usize) -> Built {
+        let sight = Sight {
+            windows: &self.windows,
+            grace,
+            mission: self.mission,
+        };
+        assemble(&self.tracks, &self.rates, &self.values, &sight, collected)
     }
 }
 
-/// Puts the messages of one stream on a track.
-fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end: Stamp) {
-    let Some(spoke) = rates.traces.get(place).copied().flatten() else {
+/// The streams whose messages are somebody's: they prove a publication.
+fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
+    let sent = proofs.iter().filter_map(|proof| match proof {
+        Proof {
+            what: Key::Publish(..),
+            when: Validity::Messages(at),
+            ..
+        } => Some(*at),
+        _ => None,
+    });
+    sent.collect()
+}
+
+/// Two lists of times as one, sorted.
+fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
+    let mut all = [a, b].concat();
+    all.sort_unstable();
+    all
+}
+
+/// A latched topic with more messages than this is published anew all the time.
+const LATCHED: u64 = 20;
+
+/// What is known of a stream that is followed.
+struct Followed<'a> {
+    /// Whether it is a topic's, whose senders are known: it lives as long as its publications.
+    known: bool,
+    /// Whether its rhythm tells that its sender is there; nobody logs for that.
+    beats: bool,
+    restarts: &'a [restarts::Restart],
+}
+
+/// Puts the messages of one stream on a track: of a publication, or of a topic.
+fn follow(track: &mut Liveness, rates: &Rates, place: usize, what: &Followed<'_>) {
+    let sender = rates.of.get(place).and_then(|of| rates.senders.get(*of));
+    let spoke = rates.traces.get(place).copied().flatten();
+    let (Some((first, last)), Some(sender)) = (spoke, sender) else {
         track.extent = track.extent.max(Extent::Whole);
         return;
     };
-    track.signs.extend([spoke.first, spoke.last]);
-    track.ceased |= spoke.ceased(end);
-    if latched {
-        track.held = true;
-        track.latched = track
-            .latched
-            .map_or(Some(spoke.first), |l| Some(l.min(spoke.first)));
+    let count: u64 = sender.stretches.iter().map(|s| s.count).sum();
+    let latched = sender.latched && count <= LATCHED;
+    track.senders.0 += 1;
+    track.senders.1 += u32::from(latched);
+    if what.known {
+        track.seen.extend([first, last]);
+        return;
     }
-    for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
-        track.mark(tally.window, Degree::Measured);
-    }
+    track.signs.extend([first, last]);
+    track.heard = track.heard.max(Some(last));
+    let pulse = Pulse::of(&sender.stretches, what.restarts);
+    track
+        .pulses
+        .extend(pulse.filter(|_| what.beats && !latched));
 }

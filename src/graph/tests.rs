@@ -68,19 +68,34 @@ fn states(built: &Built, node: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn a_node_lives_from_its_first_message_to_its_last() {
+fn a_node_lives_until_its_rhythm_breaks() {
     let built = graphs(
         &[
-            ("/a", Some("/x"), false, &[12, 35]),
+            ("/a", Some("/x"), false, &[12, 14, 16, 18, 20, 22]),
             ("/b", Some("/y"), false, &[0, 49]),
         ],
         10,
     );
-    assert_eq!(
-        states(&built, "/x"),
-        ["-", "active", "silent", "active", "-"]
+    assert_eq!(states(&built, "/x"), ["-", "active", "active", "-", "-"]);
+    assert_eq!(built.messages, [1, 4, 2, 0, 1]);
+    let life = built.lives.nodes[1].lives[0];
+    let ended = life.ended.unwrap();
+    assert_eq!((ended.time.0, ended.latest.0), (22 * SECOND, 24 * SECOND));
+    assert_eq!(life.began.unwrap().time.0, 12 * SECOND);
+}
+
+#[test]
+fn no_evidence_is_not_absence() {
+    let built = graphs(
+        &[
+            ("/a", Some("/x"), false, &[12, 35]),
+            ("/b", Some("/y"), false, &[0, 99]),
+        ],
+        10,
     );
-    assert_eq!(built.messages, [1, 1, 0, 1, 1]);
+    assert_eq!(states(&built, "/x")[1..], ["active"; 9]);
+    assert_eq!(states(&built, "/y"), ["active"; 10]);
+    assert!(built.lives.nodes[1].lives[0].ended.is_none());
 }
 
 #[test]
@@ -92,7 +107,7 @@ fn a_latched_message_holds_its_node_to_the_end() {
         ],
         10,
     );
-    assert_eq!(states(&built, "/x"), ["active", "latched", "latched"]);
+    assert_eq!(states(&built, "/x"), ["latched", "latched", "latched"]);
 }
 
 #[test]
@@ -125,7 +140,7 @@ fn elements_are_in_the_order_of_their_names() {
 #[test]
 fn grace_keeps_a_silent_node_for_some_windows() {
     let talks: [Talk<'_>; 2] = [
-        ("/a", Some("/x"), false, &[5]),
+        ("/a", Some("/x"), false, &[5, 6, 7, 8, 9]),
         ("/b", Some("/y"), false, &[0, 49]),
     ];
     let options = Options {
@@ -133,7 +148,7 @@ fn grace_keeps_a_silent_node_for_some_windows() {
         ..Options::default()
     };
     let all = built(&talks, 10, &options);
-    assert_eq!(states(&all, "/x"), ["active", "silent", "silent", "-", "-"]);
+    assert_eq!(states(&all, "/x"), ["active", "active", "active", "-", "-"]);
 }
 
 #[test]
@@ -161,7 +176,8 @@ fn a_latched_message_sent_again_after_a_silence_is_a_restart() {
     );
     assert_eq!(states(&all, "/x"), ["active", "-", "-", "active"]);
     let times: Vec<_> = all
-        .restarts
+        .lives
+        .returns()
         .iter()
         .map(|(_, time)| time.0 / SECOND)
         .collect();
@@ -181,7 +197,7 @@ fn roles_fold_anonymous_nodes_into_one() {
     let all = built(&talks, 10, &options);
     let names: Vec<_> = all.elements.nodes.iter().map(|n| n.name.as_str()).collect();
     assert_eq!(names, ["/probe", "/rosout"]);
-    assert_eq!(states(&all, "/probe"), ["active", "silent", "active"]);
+    assert_eq!(states(&all, "/probe"), ["active"; 3]);
     let plain = graphs(&talks, 10);
     assert_eq!(&*plain.elements.nodes[0].role, "/probe");
     assert_eq!(plain.elements.nodes.len(), 3);
@@ -211,7 +227,7 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
         ..Options::default()
     };
     let talks: [Talk<'_>; 2] = [
-        ("/a", Some("/x"), false, &[0, 5]),
+        ("/a", Some("/x"), false, &[0, 1, 2, 3, 4, 5]),
         ("/b", Some("/y"), false, &[0, 29]),
     ];
     let all = built(&talks, 10, &options);

@@ -1,5 +1,6 @@
 //! A mission as JSON, written as a stream and read back.
 
+pub(crate) mod entries;
 pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod raw;

@@ -2,11 +2,22 @@
 //!
 //! Windows only say when we look. Whatever tells a change (chips, captions, marks, tables, pages, the log) reads this.
 
+mod changes;
+mod hands;
+mod lifetimes;
+mod make;
+mod rates;
+mod silence;
+
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Element, NodeId};
+
+pub(crate) use changes::{explain, of_changes};
+pub(crate) use make::{Told, make, sorted};
 
 /// An entry's place in [`Ledger::entries`].
 pub type EntryId = u32;
@@ -178,6 +189,17 @@ impl Ledger {
     /// The headlines whose time lies in `span`, in order.
     pub fn headlines(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
         self.inside(span).filter(|(_, e)| e.is_headline())
+    }
+
+    /// The places of all entries' parts, in order, by the places of those entries.
+    pub fn all_parts(&self) -> BTreeMap<EntryId, Vec<EntryId>> {
+        let mut parts: BTreeMap<EntryId, Vec<EntryId>> = BTreeMap::new();
+        for (id, entry) in (0..).zip(&self.entries) {
+            if let Some(whole) = entry.part_of {
+                parts.entry(whole).or_default().push(id);
+            }
+        }
+        parts
     }
 
     /// The parts of an entry, in order.

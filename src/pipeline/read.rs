@@ -106,7 +106,9 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
     let mut mission = read_json(&text, path)?;
     drop(text);
-    mission.find_changes(reading.rate_change, &[]);
+    if mission.ledger.entries.is_empty() {
+        mission.find_changes(reading.rate_change, &[]);
+    }
     mission.activity = Activity::of_windows(&mission);
     if mission.ledger.phases.is_empty() {
         mission.ledger.phases = phases(&mission.elements, &mission.activity);
@@ -235,6 +237,7 @@ fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Resu
             messages: inside,
             graph,
             changes: Vec::new(),
+            entries: Vec::new(),
         })
         .collect();
     let mut mission = Mission {
@@ -250,7 +253,7 @@ fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Resu
         layout: None,
         notices,
     };
-    mission.find_changes(reading.rate_change, &built.restarts);
+    mission.tell(&built.lives, reading.rate_change);
     Ok(mission)
 }
 

@@ -25,6 +25,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         messages: 0,
         graph: graph(words, &elements),
         changes: Vec::new(),
+        entries: Vec::new(),
     });
     let windows: Vec<Window> = windows.collect();
     let period = Period::from_nanos(SECOND).unwrap();
@@ -125,6 +126,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
                 evidence: Evidence::NONE,
                 first: None,
                 last: None,
+                runs: Vec::new(),
             })
             .collect()
     };
@@ -139,6 +141,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
                 evidence: Evidence::NONE,
                 first: None,
                 last: None,
+                runs: Vec::new(),
             })
             .collect(),
         topics: topics
@@ -149,6 +152,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
                 evidence: Evidence::NONE,
                 first: None,
                 last: None,
+                runs: Vec::new(),
                 qos: None,
             })
             .collect(),

@@ -1,23 +1,34 @@
 //! The elements with their ids, and the graph of each window.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::Built;
-use super::liveness::Liveness;
+use super::liveness::{Lifetime, Liveness};
 use super::rates::{Rates, Sums};
 use super::roles::role;
 use super::values::Values;
 use super::windows::Windows;
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
 use crate::evidence::collector::Collected;
 use crate::evidence::proof::{Key, Reliability};
+use crate::graph::lives::{Known, Life, Stretch, Transition, Voice, all_silent, silences};
 use crate::graph::{
     Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, State, Topic, TopicState,
 };
 
 /// What happened on each topic: its streams, and their messages per window.
 pub(crate) type Traffic = BTreeMap<Name, (Vec<usize>, Rates)>;
+
+/// Who looks when.
+#[derive(Clone, Copy)]
+pub(crate) struct Sight<'a> {
+    pub(crate) windows: &'a Windows<'a>,
+    /// Windows of silence before somebody who never speaks again counts as gone.
+    pub(crate) grace: usize,
+    /// The first and the last moment of the mission.
+    pub(crate) mission: (Stamp, Stamp),
+}
 
 /// Windows shorter than this have no rates.
 const SHORTEST_NS: i64 = 1_000_000;
@@ -27,16 +38,17 @@ pub(crate) fn assemble(
     tracks: &BTreeMap<Key, Liveness>,
     traffic: &Traffic,
     values: &Values,
-    windows: &Windows<'_>,
+    sight: &Sight<'_>,
     collected: &Collected,
 ) -> Built {
+    let many = sight.windows.len();
     let mut all = Assembly {
         built: Built {
-            graphs: vec![Graph::default(); windows.len()],
-            messages: vec![0; windows.len()],
+            graphs: vec![Graph::default(); many],
+            messages: vec![0; many],
             ..Built::default()
         },
-        windows,
+        sight,
         collected,
         values,
         traffic,
@@ -53,13 +65,13 @@ pub(crate) fn assemble(
             Key::Subscribe(topic, node) => all.subscribe(topic, node, track),
         }
     }
-    all.let_go();
+    all.voices();
     all.built
 }
 
 struct Assembly<'a> {
     built: Built,
-    windows: &'a Windows<'a>,
+    sight: &'a Sight<'a>,
     collected: &'a Collected,
     values: &'a Values,
     traffic: &'a Traffic,
@@ -70,28 +82,58 @@ struct Assembly<'a> {
 }
 
 impl Assembly<'_> {
-    /// A latched message does not outlive its publishers: once all that are known are gone, and nobody known listens,
-    /// the topic is gone too.
-    fn let_go(&mut self) {
-        let Built {
-            elements, graphs, ..
-        } = &mut self.built;
-        let sent_on: BTreeSet<u32> = elements.publishes.iter().map(|e| e.topic).collect();
-        for graph in graphs {
-            let publishes = graph
-                .publishes
-                .iter()
-                .map(|s| elements.publishes[s.id as usize].topic);
-            let subscribes = graph
-                .subscribes
-                .iter()
-                .map(|s| elements.subscribes[s.id as usize].topic);
-            let linked: BTreeSet<u32> = publishes.chain(subscribes).collect();
-            graph.topics.retain(|topic| {
-                let is_held = topic.state == State::Latched && sent_on.contains(&topic.id);
-                !is_held || linked.contains(&topic.id)
-            });
+    /// Tells what every sender sent, and when nodes changed their states.
+    fn voices(&mut self) {
+        for (topic, (_, rates)) in self.traffic {
+            let Some(id) = self.topics.get(topic) else {
+                continue;
+            };
+            for sender in rates.senders.iter().filter(|s| !s.stretches.is_empty()) {
+                self.built.lives.voices.push(Voice {
+                    topic: *id,
+                    node: sender.node.and_then(|node| self.nodes.get(&node)).copied(),
+                    is_latched: sender.latched,
+                    stretches: sender.stretches.clone(),
+                });
+            }
         }
+        for (node, id) in &self.nodes {
+            let states = self
+                .values
+                .transitions(*node)
+                .map(|(time, state)| Transition {
+                    node: *id,
+                    time: *time,
+                    state: std::sync::Arc::clone(state),
+                });
+            self.built.lives.transitions.extend(states);
+        }
+        let order = |t: &Transition| (t.time, t.node);
+        self.built.lives.transitions.sort_by_key(order);
+    }
+
+    /// How the known sender of an edge sends on its topic.
+    fn stretches(&self, node: Option<Name>, topic: Name) -> &[Stretch] {
+        let senders = self.traffic.get(&topic).map(|(_, rates)| &rates.senders);
+        let sender = senders.and_then(|all| all.iter().find(|s| s.node == node));
+        sender.map_or(&[], |s| &s.stretches)
+    }
+
+    /// When all are silent who send on a topic.
+    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+        let Some((_, rates)) = self.traffic.get(&topic) else {
+            return Vec::new();
+        };
+        let of: Vec<&[Stretch]> = rates.senders.iter().map(|s| &s.stretches[..]).collect();
+        all_silent(&of, lives)
+    }
+
+    /// When all is silent that a node sends.
+    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+        let senders = self.traffic.values().flat_map(|(_, rates)| &rates.senders);
+        let own = senders.filter(|s| s.node == Some(node) && !s.latched);
+        let of: Vec<&[Stretch]> = own.map(|s| &s.stretches[..]).collect();
+        all_silent(&of, lives)
     }
 
     /// Adds up the messages of each publisher.
@@ -132,17 +174,26 @@ impl Assembly<'_> {
             evidence: track.evidence,
             first,
             last,
+            runs: spans(track),
         });
         let sent = self.sent.get(&name);
-        for (window, span) in self.windows.0.iter().enumerate() {
-            let Some((state, degree)) = track.state(window, *span) else {
+        let silent = self.node_silences(name, &spans(track));
+        self.built.lives.nodes.push(known(track, self.sight));
+        for (window, span) in self.sight.windows.0.iter().enumerate() {
+            if !self.sight.sees(track, *span) {
                 continue;
+            }
+            let state = match () {
+                () if track.is_declared() => State::Declared,
+                () if track.is_latched() && !track.speaks => State::Latched,
+                () if is_silent(&silent, *span) => State::Silent,
+                () => State::Active,
             };
             let count = sent.map(|topics| topics.values().filter_map(|w| w.get(&window)).sum());
             self.built.graphs[window].nodes.push(NodeState {
                 id,
                 state,
-                degree,
+                degree: track.degree,
                 hz: count.and_then(|n| per_second(n, *span)),
                 lifecycle: self.values.lifecycle(name, *span),
             });
@@ -170,16 +221,25 @@ impl Assembly<'_> {
             first,
             last,
             qos: self.values.quality(name),
+            runs: spans(track),
         });
         let tallies = traffic.map_or(&[][..], |(_, rates)| &rates.tallies);
         let mut tallies = tallies.iter().peekable();
-        for (window, span) in self.windows.0.iter().enumerate() {
+        let silent = self.topic_silences(name, &spans(track));
+        self.built.lives.topics.push(known(track, self.sight));
+        for (window, span) in self.sight.windows.0.iter().enumerate() {
             let tally = tallies.next_if(|t| t.window == window);
-            if let Some((state, degree)) = track.state(window, *span) {
+            if self.sight.sees(track, *span) {
+                let state = match tally {
+                    _ if track.is_declared() => State::Declared,
+                    _ if track.is_latched() => State::Latched,
+                    None if track.senders.0 == 0 || is_silent(&silent, *span) => State::Silent,
+                    _ => State::Active,
+                };
                 self.built.graphs[window].topics.push(TopicState {
                     id,
                     state,
-                    degree,
+                    degree: track.degree,
                     count: tally.map_or(0, |t| t.count),
                     bytes: bytes(tally, traffic.is_some()),
                     hz: per_second(tally.map_or(0, |t| t.count), *span),
@@ -195,20 +255,48 @@ impl Assembly<'_> {
         let edge = self.edge(node, topic, track);
         self.built.elements.publishes.push(edge);
         let sent = self.sent.get(&node).and_then(|topics| topics.get(&topic));
-        for (window, span) in self.windows.0.iter().enumerate() {
+        let silent = silences(self.stretches(Some(node), topic), &spans(track));
+        self.built.lives.publishes.push(known(track, self.sight));
+        for (window, span) in self.sight.windows.0.iter().enumerate() {
+            if !self.sight.sees(track, *span) {
+                continue;
+            }
             let count = sent.map(|windows| windows.get(&window).copied().unwrap_or(0));
-            let state = edge_state(id, track, window, *span, count);
-            self.built.graphs[window].publishes.extend(state);
+            let state = match count {
+                _ if track.is_declared() => State::Declared,
+                _ if track.is_latched() => State::Latched,
+                None | Some(0) if track.senders.0 == 0 || is_silent(&silent, *span) => {
+                    State::Silent
+                }
+                _ => State::Active,
+            };
+            let state = edge_state(id, track, state, *span, count);
+            self.built.graphs[window].publishes.push(state);
         }
     }
 
+    /// A subscription is as lively as its topic.
     fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
         let id = next(self.built.elements.subscribes.len());
         let edge = self.edge(node, topic, track);
+        let of = edge.topic;
         self.built.elements.subscribes.push(edge);
-        for (window, span) in self.windows.0.iter().enumerate() {
-            let state = edge_state(id, track, window, *span, None);
-            self.built.graphs[window].subscribes.extend(state);
+        self.built.lives.subscribes.push(known(track, self.sight));
+        for (window, span) in self.sight.windows.0.iter().enumerate() {
+            if !self.sight.sees(track, *span) {
+                continue;
+            }
+            let graph = &mut self.built.graphs[window];
+            let topics = &graph.topics;
+            let place = topics.binary_search_by_key(&of, |t| t.id);
+            let state = match place.map(|at| topics[at].state) {
+                _ if track.is_declared() => State::Declared,
+                Ok(state) => state,
+                Err(_) => State::Silent,
+            };
+            graph
+                .subscribes
+                .push(edge_state(id, track, state, *span, None));
         }
     }
 
@@ -220,25 +308,77 @@ impl Assembly<'_> {
             evidence: track.evidence,
             first,
             last,
+            runs: spans(track),
         }
     }
+}
+
+impl Sight<'_> {
+    /// Whether an element is seen in a window.
+    fn sees(&self, track: &Liveness, span: Span) -> bool {
+        let last = track.lives.len().saturating_sub(1);
+        track.lives.iter().enumerate().any(|(at, life)| {
+            let to = if at == last && self.grace > 0 {
+                self.windows.last_moment(life.to, self.grace)
+            } else {
+                life.to
+            };
+            life.from < span.end && span.start <= to
+        })
+    }
+}
+
+/// When an element is there, half-open.
+fn spans(track: &Liveness) -> Vec<Span> {
+    let span = |life: &Lifetime| Span {
+        start: life.from,
+        end: life.to.plus(1),
+    };
+    track.lives.iter().map(span).collect()
+}
+
+/// What is known of an element's lives.
+fn known(track: &Liveness, sight: &Sight<'_>) -> Known {
+    let within = |bound: crate::graph::lives::Bound| crate::graph::lives::Bound {
+        earliest: bound.earliest.max(sight.mission.0),
+        latest: bound.latest.min(sight.mission.1),
+        ..bound
+    };
+    let lives = spans(track).into_iter().zip(&track.lives);
+    Known {
+        degree: track.degree,
+        lives: lives
+            .map(|(span, life)| Life {
+                span,
+                began: life.began.map(within),
+                ended: life.ended.map(within),
+            })
+            .collect(),
+    }
+}
+
+/// Whether a window lies in a silence.
+fn is_silent(silences: &[(Stamp, Option<Stamp>)], span: Span) -> bool {
+    let covers = |(from, to): &(Stamp, Option<Stamp>)| {
+        *from < span.start && to.is_none_or(|to| span.end <= to)
+    };
+    silences.iter().any(covers)
 }
 
 fn edge_state(
     id: EdgeId,
     track: &Liveness,
-    window: usize,
+    state: State,
     span: Span,
     count: Option<u64>,
-) -> Option<EdgeState> {
-    let (state, degree) = track.state(window, span)?;
-    Some(EdgeState {
+) -> EdgeState {
+    EdgeState {
         id,
         state,
-        degree,
+        degree: track.degree,
         count,
         hz: count.and_then(|n| per_second(n, span)),
-    })
+    }
 }
 
 fn bytes(tally: Option<&Sums>, recorded: bool) -> Option<u64> {

@@ -1,14 +1,28 @@
 //! When something is alive: from its first sign to its last, held on by latched messages, ended by proofs of an end.
 
-use std::collections::BTreeMap;
-
-use super::windows::Windows;
-use crate::base::time::{Span, Stamp};
+use super::restarts::Restart;
+use crate::base::time::Stamp;
 use crate::evidence::{Degree, Evidence};
-use crate::graph::State;
+use crate::graph::lives::{Bound, Stretch};
 
-/// A node has registered its topics this long after its first sign.
+/// A node has registered its topics this long after its first sign, in nanoseconds.
 const REGISTRATION_NS: i64 = 1_000_000_000;
+/// From a node's start to the first of its messages in the bag: a recorder looks for new topics once a second, and a
+/// node needs as long to come up. Measured on real missions: 0.8 to 1.3 s, at most 2.4 s.
+const DISCOVERY_NS: i64 = 2_500_000_000;
+/// A recorder has found the topics that are there when it starts so soon, in nanoseconds; their messages come a period
+/// later at the latest.
+const FOUND_NS: i64 = 2_000_000_000;
+/// What a node first sends this long after its start, it advertised at its start.
+const ADVERTISED_NS: i64 = 5_000_000_000;
+/// A rhythm is broken by a silence of so many periods, one or two messages are lost now and then.
+const BREAK: i64 = 5;
+/// And of so many nanoseconds: a recorder that is stopped writes its topics up to a second apart.
+const BREAK_NS: i64 = 2_000_000_000;
+/// Fewer messages than this are no rhythm.
+const FEWEST: u64 = 5;
+/// A rhythm with pauses is broken by a silence this many times as long as the longest of them.
+const UNUSUAL: i64 = 3;
 
 /// How far a life reaches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -25,31 +39,75 @@ pub(crate) enum Extent {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lifetime {
     pub(crate) from: Stamp,
-    /// The last sign; from here on it is only held.
-    pub(crate) spoke: Stamp,
     pub(crate) to: Stamp,
+    pub(crate) began: Option<Bound>,
+    pub(crate) ended: Option<Bound>,
+}
+
+/// A rhythm in what an element sends: how it sent last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Pulse {
+    first: Stamp,
+    last: Stamp,
+    /// Between two messages, in nanoseconds.
+    period: i64,
+    /// The longest pause between two stretches of sending; 0 for none.
+    pause: i64,
+    is_even: bool,
+}
+
+impl Pulse {
+    /// The rhythm of a sender, if it has one.
+    pub(crate) fn of(stretches: &[Stretch], restarts: &[Restart]) -> Option<Self> {
+        let last = stretches.last()?;
+        let away = |p: &[Stretch]| {
+            restarts
+                .iter()
+                .any(|r| p[0].last <= r.birth && r.death <= p[1].first)
+        };
+        let pauses = stretches.windows(2).filter(|p| !away(p));
+        let pauses = pauses.map(|p| p[1].first.since(p[0].last));
+        (last.count >= FEWEST).then(|| Self {
+            first: stretches[0].first,
+            last: last.last,
+            period: last.period,
+            pause: pauses.max().unwrap_or(0),
+            is_even: last.is_even,
+        })
+    }
+
+    /// The longest silence that says nothing.
+    fn patience(&self) -> i64 {
+        let pauses = if self.is_even { 1 } else { UNUSUAL };
+        self.period
+            .saturating_mul(if self.is_even { BREAK } else { BREAK * UNUSUAL })
+            .max(self.pause.saturating_mul(pauses))
+            .max(BREAK_NS)
+    }
 }
 
 /// What is known about the life of one element.
 #[derive(Clone, Debug)]
 pub(crate) struct Liveness {
     pub(crate) evidence: Evidence,
-    /// How well it is known where no message proves it.
-    pub(crate) quiet: Degree,
+    /// How well it is known at its best.
+    pub(crate) degree: Degree,
     /// Signs that bound lives: sorted later.
     pub(crate) signs: Vec<Stamp>,
+    /// Signs that bound nothing: of a topic those of its edges, which live by themselves.
+    pub(crate) seen: Vec<Stamp>,
     /// Those of the signs by which somebody states what holds already.
     pub(crate) stated: Vec<Stamp>,
     /// Proofs of an end.
     pub(crate) ends: Vec<Stamp>,
-    /// Whether it lives on after its last sign.
-    pub(crate) held: bool,
-    /// Whether messages came in a rhythm that broke off before the mission's end.
-    pub(crate) ceased: bool,
-    /// Since when a latched message stands for it.
-    pub(crate) latched: Option<Stamp>,
-    /// Windows with signs, and how strong the best one is.
-    pub(crate) active: BTreeMap<usize, Degree>,
+    /// The last sign of its own: a message that it sent, or something that it says of itself.
+    pub(crate) heard: Option<Stamp>,
+    /// The rhythms in what it sends.
+    pub(crate) pulses: Vec<Pulse>,
+    /// How many senders' messages are proofs of it, and how many of those are latched.
+    pub(crate) senders: (u32, u32),
+    /// Whether it is known by more than latched messages.
+    pub(crate) speaks: bool,
     /// Whether it is there for the whole mission.
     pub(crate) extent: Extent,
     pub(crate) lives: Vec<Lifetime>,
@@ -59,14 +117,15 @@ impl Default for Liveness {
     fn default() -> Self {
         Self {
             evidence: Evidence::NONE,
-            quiet: Degree::Declared,
+            degree: Degree::Declared,
             signs: Vec::new(),
+            seen: Vec::new(),
             stated: Vec::new(),
             ends: Vec::new(),
-            held: false,
-            ceased: false,
-            latched: None,
-            active: BTreeMap::new(),
+            heard: None,
+            pulses: Vec::new(),
+            senders: (0, 0),
+            speaks: false,
             extent: Extent::Signs,
             lives: Vec::new(),
         }
@@ -74,43 +133,15 @@ impl Default for Liveness {
 }
 
 impl Liveness {
-    /// Marks a window as one with a sign.
-    pub(crate) fn mark(&mut self, window: usize, degree: Degree) {
-        let best = self.active.entry(window).or_insert(degree);
-        *best = degree.min(*best);
-    }
-
-    /// Adds signs, sorted, that mark their windows and state what holds already; of those with no end between them only
-    /// the outer two are kept.
-    pub(crate) fn sign_all(
-        &mut self,
-        signs: &[Stamp],
-        ends: &[Stamp],
-        degree: Degree,
-        windows: &Windows<'_>,
-    ) {
+    /// Adds signs, sorted, that state what holds already; of those with no end between them only the outer two are
+    /// kept.
+    pub(crate) fn sign_all(&mut self, signs: &[Stamp], ends: &[Stamp]) {
         let before = self.signs.len();
-        self.begin_all(signs, ends, degree, windows);
+        self.bound_all(signs, ends);
         self.stated.extend(&self.signs[before..]);
     }
 
-    /// The same for signs that are beginnings.
-    pub(crate) fn begin_all(
-        &mut self,
-        signs: &[Stamp],
-        ends: &[Stamp],
-        degree: Degree,
-        windows: &Windows<'_>,
-    ) {
-        for time in signs {
-            for window in windows.over(*time, *time) {
-                self.mark(window, degree);
-            }
-        }
-        self.bound_all(signs, ends);
-    }
-
-    /// Adds signs, sorted, that mark nothing; of those with no end between them only the outer two are kept.
+    /// Adds signs, sorted, that are beginnings; of those with no end between them only the outer two are kept.
     pub(crate) fn bound_all(&mut self, signs: &[Stamp], ends: &[Stamp]) {
         let before = |time: &Stamp| ends.partition_point(|end| end < time);
         for run in signs.chunk_by(|a, b| before(a) == before(b)) {
@@ -123,40 +154,100 @@ impl Liveness {
     /// Takes on what another element proves about this one: an edge proves its node and its topic.
     pub(crate) fn learn(&mut self, other: &Self) {
         self.evidence = self.evidence.and(other.evidence);
-        self.quiet = self.quiet.min(other.quiet);
+        self.degree = self.degree.min(other.degree);
         self.signs.extend(&other.signs);
-        self.held |= other.held;
-        self.ceased |= other.ceased;
+        self.heard = self.heard.max(other.heard);
+        self.pulses.extend(&other.pulses);
+        self.senders.0 += other.senders.0;
+        self.senders.1 += other.senders.1;
+        self.speaks |= other.speaks;
         self.extent = self.extent.max(other.extent.min(Extent::Whole));
-        self.latched = match (self.latched, other.latched) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        };
-        for (window, degree) in &other.active {
-            self.mark(*window, *degree);
+    }
+
+    /// Works out the lives from the signs alone. What nothing tells the end of goes on: no evidence is not absence.
+    pub(crate) fn live(&mut self, mission: (Stamp, Stamp)) {
+        self.signs.sort_unstable();
+        self.ends.sort_unstable();
+        self.ends.dedup();
+        if self.is_whole() {
+            self.lives = vec![whole(mission)];
+            return;
+        }
+        self.lives = lives(&self.signs, &self.ends);
+        let end = self.end(mission.1);
+        if let Some(life) = self.lives.last_mut().filter(|life| life.ended.is_none()) {
+            life.ended = end.filter(|end| end.time >= life.from);
+            life.to = life.ended.map_or(mission.1, |end| end.time);
+        }
+        if let Some(life) = self.lives.first_mut() {
+            let rhythm = self
+                .pulses
+                .iter()
+                .filter(|p| p.first.since(life.from) <= DISCOVERY_NS);
+            let period = rhythm.map(|p| p.period).min();
+            life.begin(mission.0, period);
         }
     }
 
-    /// Works out the lives from the signs alone; `linger` is the last moment of somebody whose last sign is known.
-    pub(crate) fn live(&mut self, mission: (Stamp, Stamp), linger: impl Fn(Stamp) -> Stamp) {
-        self.signs.sort_unstable();
-        self.ends.sort_unstable();
-        self.lives = lives(&self.signs, &self.ends);
-        if let Some(life) = self.lives.last_mut() {
-            let ended = self.ends.last().is_some_and(|end| *end >= life.spoke);
-            life.to = match (ended, self.held && !self.ceased) {
-                (true, _) => life.to,
-                (false, true) => mission.1,
-                (false, false) => linger(life.spoke),
-            };
+    /// Tells where the truth about a restart lies: the node was there for a period after its last message, and again
+    /// before its first.
+    pub(crate) fn restart(&mut self, restart: &Restart) {
+        let period = self.pulses.iter().map(|p| p.period).min().unwrap_or(0);
+        for life in &mut self.lives {
+            if let Some(ended) = life.ended.as_mut().filter(|e| e.time == restart.death) {
+                let latest = restart.death.plus(period.max(SHUTDOWN_NS));
+                ended.latest = latest.min(restart.birth);
+            }
+            if let Some(began) = life.began.as_mut().filter(|b| b.time == restart.birth) {
+                let earliest = restart.birth.plus(-DISCOVERY_NS - period);
+                began.earliest = earliest.max(restart.death);
+            }
         }
-        if self.is_whole() {
-            self.lives = vec![Lifetime {
-                from: mission.0,
-                spoke: mission.1,
-                to: mission.1,
-            }];
+    }
+
+    /// Takes on what an edge proves about its topic. Its senders are told apart on the topic itself.
+    pub(crate) fn know(&mut self, edge: &Self) {
+        self.evidence = self.evidence.and(edge.evidence);
+        self.degree = self.degree.min(edge.degree);
+        if edge.is_whole() {
+            self.extent = self.extent.max(Extent::Whole);
         }
+        self.seen.extend(edge.signs.iter().chain(&edge.seen));
+    }
+
+    /// Joins the lives of a topic with those of its edges, which may overlap.
+    pub(crate) fn live_with(&mut self, edges: Vec<Lifetime>) {
+        let mut all = std::mem::take(&mut self.lives);
+        all.extend(edges);
+        all.sort_by_key(|life| (life.from, life.to));
+        for life in all {
+            match self.lives.last_mut() {
+                Some(last) if life.from <= last.to.plus(1) => {
+                    if life.to > last.to {
+                        (last.to, last.ended) = (life.to, life.ended);
+                    } else if life.to == last.to && life.ended.is_none() {
+                        last.ended = None;
+                    }
+                }
+                _ => self.lives.push(life),
+            }
+        }
+    }
+
+    /// Where a rhythm broke off for good, if one did.
+    fn end(&self, mission: Stamp) -> Option<Bound> {
+        let heard = self.heard?;
+        let silence = mission.since(heard);
+        let broken = self.pulses.iter().filter(|p| {
+            // A rhythm that was over long before the last sign tells nothing of the silence after it.
+            heard.since(p.last) <= p.patience() && silence > p.patience()
+        });
+        let fastest = broken.min_by_key(|p| p.period)?;
+        Some(Bound {
+            time: heard,
+            earliest: fastest.last.min(heard),
+            latest: heard.plus(fastest.period.max(SHUTDOWN_NS)).min(mission),
+        })
     }
 
     /// Works out the lives of an edge inside those of its node: whoever has advertised or subscribed a topic does so
@@ -180,40 +271,39 @@ impl Liveness {
             let from = self.signs.partition_point(|s| *s < around.from);
             let to = self.signs.partition_point(|s| *s <= around.to);
             let mut inside = lives(&self.signs[from..to], &self.ends);
-            if let Some(first) = inside.first_mut()
-                && self.stated.binary_search(&first.from).is_ok()
-            {
+            if let Some(first) = inside.first_mut() {
                 let next = self.ends.partition_point(|end| *end < first.from);
                 let absent = next.checked_sub(1).map(|at| self.ends[at].plus(1));
-                let since = around
-                    .from
-                    .plus(REGISTRATION_NS)
-                    .max(absent.unwrap_or(Stamp::MIN));
-                first.from = since.min(first.from);
+                let absent = absent.filter(|at| *at > around.from);
+                let stated = self.stated.binary_search(&first.from).is_ok();
+                first.begin_within(around, absent, stated);
             }
-            if let Some(last) = inside.last_mut() {
-                let ended = self.ends.iter().find(|end| **end >= last.spoke);
-                last.to = ended.map_or(around.to, |end| (*end).min(around.to));
+            if let Some(last) = inside.last_mut().filter(|l| l.ended.is_none()) {
+                (last.to, last.ended) = (around.to, around.ended);
             }
             self.lives.extend(inside);
         }
     }
 
-    /// How alive it is in a window, and how well that is known; `None` if it is not there.
-    pub(crate) fn state(&self, window: usize, span: Span) -> Option<(State, Degree)> {
-        if let Some(degree) = self.active.get(&window) {
-            return Some((State::Active, *degree));
+    /// When the last of some edges ended, of which this is one and the others ended at `last`; `None` if nothing tells
+    /// that it did.
+    pub(crate) fn closed(&self, last: Stamp) -> Option<Stamp> {
+        if self.signs.is_empty() {
+            return (!self.is_whole()).then_some(last);
         }
-        let alive = |life: &&Lifetime| life.from < span.end && span.start <= life.to;
-        let life = self.lives.iter().find(alive)?;
-        let state = if self.signs.is_empty() && self.is_whole() && self.quiet == Degree::Declared {
-            State::Declared
-        } else if life.spoke < span.start && self.latched.is_some_and(|since| since < span.end) {
-            State::Latched
-        } else {
-            State::Silent
-        };
-        Some((state, self.quiet))
+        let end = self.ends.iter().max()?;
+        let open = self.signs.iter().any(|sign| sign > end);
+        (!open).then_some(last.max(*end))
+    }
+
+    /// Whether messages prove it, all of them latched.
+    pub(crate) fn is_latched(&self) -> bool {
+        self.senders.0 > 0 && self.senders.0 == self.senders.1
+    }
+
+    /// Whether it is known from a header or a file only.
+    pub(crate) fn is_declared(&self) -> bool {
+        self.signs.is_empty() && self.is_whole() && self.degree == Degree::Declared
     }
 
     /// Whether it is there for the whole mission.
@@ -227,34 +317,113 @@ impl Liveness {
 
     /// The first and last sign.
     pub(crate) fn bounds(&self) -> (Option<Stamp>, Option<Stamp>) {
-        (self.signs.first().copied(), self.signs.last().copied())
+        let all = || self.signs.iter().chain(&self.seen).copied();
+        (all().min(), all().max())
     }
 }
 
-/// Lives between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it.
+/// A node that is told to end may send for as long as this.
+const SHUTDOWN_NS: i64 = 500_000_000;
+
+/// There all the time.
+pub(crate) fn whole(mission: (Stamp, Stamp)) -> Lifetime {
+    Lifetime {
+        from: mission.0,
+        to: mission.1,
+        began: None,
+        ended: None,
+    }
+}
+
+impl Lifetime {
+    fn at(sign: Stamp) -> Self {
+        Self {
+            from: sign,
+            to: sign,
+            began: Some(Bound {
+                time: sign,
+                earliest: Stamp::MIN,
+                latest: sign,
+            }),
+            ended: None,
+        }
+    }
+
+    /// Ends it by a proof.
+    fn close(&mut self, end: Stamp) {
+        let last = self.to;
+        self.to = end.max(last);
+        self.ended = Some(Bound {
+            time: self.to,
+            earliest: last,
+            latest: self.to,
+        });
+    }
+
+    /// Sets the beginning of a first life, after nothing: with a rhythm it was not there long before its first sign.
+    fn begin(&mut self, mission: Stamp, period: Option<i64>) {
+        let late = period.unwrap_or(0);
+        if self.from.since(mission) <= FOUND_NS.saturating_add(late) {
+            (self.from, self.began) = (mission, None);
+        } else if let Some(began) = &mut self.began {
+            let sooner = DISCOVERY_NS.saturating_add(late);
+            began.earliest = period.map_or(mission, |_| self.from.plus(-sooner));
+        }
+    }
+
+    /// Sets the beginning of an edge's first life inside its node's; `absent` is the first moment at which it may be
+    /// there, if that is known.
+    fn begin_within(&mut self, around: &Self, absent: Option<Stamp>, stated: bool) {
+        let registered = around.from.plus(REGISTRATION_NS);
+        match absent {
+            Some(absent) => {
+                if stated {
+                    self.from = absent.max(registered).min(self.from);
+                }
+                if let Some(began) = &mut self.began {
+                    began.earliest = absent;
+                }
+            }
+            None if stated || self.from.since(around.from) <= ADVERTISED_NS => {
+                (self.from, self.began) = (around.from, around.began);
+            }
+            None => {
+                if let Some(began) = &mut self.began {
+                    began.earliest = around.from;
+                }
+            }
+        }
+    }
+}
+
+/// Lives between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it. The truth about
+/// an end lies between it and the sign before, about a beginning between it and the end before.
 fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
     let mut lives: Vec<Lifetime> = Vec::new();
     let mut ends = ends.iter().copied().peekable();
-    let mut open = false;
+    let (mut open, mut gone) = (false, Stamp::MIN);
     for sign in signs {
         while let Some(end) = ends.next_if(|end| end < sign) {
             if let Some(life) = lives.last_mut().filter(|_| open) {
-                life.to = end;
+                life.close(end);
             }
-            open = false;
+            (open, gone) = (false, end);
         }
         match lives.last_mut() {
-            Some(life) if open => (life.spoke, life.to) = (*sign, *sign),
-            _ => lives.push(Lifetime {
-                from: *sign,
-                spoke: *sign,
-                to: *sign,
-            }),
+            Some(life) if open => life.to = *sign,
+            _ => {
+                let mut life = Lifetime::at(*sign);
+                life.began = life.began.map(|b| Bound {
+                    earliest: gone,
+                    ..b
+                });
+                lives.push(life);
+            }
         }
         open = true;
     }
     if let (Some(life), Some(end)) = (lives.last_mut(), ends.next()) {
-        life.to = life.to.max(end);
+        life.close(end);
     }
     lives
 }

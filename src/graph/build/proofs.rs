@@ -123,7 +123,7 @@ fn told(known: &mut Findings<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
         (None, None) => Validity::Whole,
         (from, to) => Validity::Signs {
             signs: vec![at(from, mission.0), at(to, mission.1)],
-            ends: Vec::new(),
+            ends: to.map(|to| at(Some(to), mission.1)).into_iter().collect(),
             held: false,
         },
     };

@@ -1,12 +1,16 @@
-//! How often: messages of each topic and of each of its streams per window, their bytes, periods and gaps.
+//! How often: messages of each topic and of each of its streams per window, their bytes, periods and gaps; and how each
+//! of its senders sent over the whole mission.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::io;
 
+use super::tempo::stretches;
 use super::windows::Windows;
 use crate::base::time::Stamp;
+use crate::evidence::claim::Name;
 use crate::evidence::collector::Collected;
-use crate::evidence::rhythm::Rhythm;
+use crate::evidence::proof::Reliability;
+use crate::graph::lives::Stretch;
 
 /// What one topic did in one window.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,33 +29,21 @@ pub(crate) struct Sums {
 pub(crate) struct Rates {
     /// Windows with messages, in order.
     pub(crate) tallies: Vec<Sums>,
-    /// When each stream had messages; `None` if never.
-    pub(crate) traces: Vec<Option<Trace>>,
+    /// The first and the last message of each stream; `None` if it has none.
+    pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
+    /// What each sender sent: those that are known, sorted, after the unknown ones together.
+    pub(crate) senders: Vec<Sender>,
+    /// The place of each stream's sender among those.
+    pub(crate) of: Vec<usize>,
 }
 
-/// When a stream had messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Trace {
-    pub(crate) first: Stamp,
-    pub(crate) last: Stamp,
-    rhythm: Rhythm,
-}
-
-impl Trace {
-    fn extend(trace: &mut Option<Self>, time: Stamp) {
-        let all = trace.get_or_insert(Self {
-            first: time,
-            last: time,
-            rhythm: Rhythm::default(),
-        });
-        all.rhythm.hear(time);
-        all.last = time;
-    }
-
-    /// Whether it had a rhythm that broke off before `end`.
-    pub(crate) fn ceased(&self, end: Stamp) -> bool {
-        self.rhythm.broke_off(end)
-    }
+/// What one sender sent on one topic, over all its streams: a split recording has one per part.
+#[derive(Debug)]
+pub(crate) struct Sender {
+    /// `None` for all who are not known.
+    pub(crate) node: Option<Name>,
+    pub(crate) latched: bool,
+    pub(crate) stretches: Vec<Stretch>,
 }
 
 /// A window that messages still fall into.
@@ -83,14 +75,19 @@ pub(crate) fn rates(
     let mut all = Rates {
         tallies: Vec::new(),
         traces: vec![None; streams.len()],
+        senders: Vec::new(),
+        of: Vec::new(),
     };
+    let (of, mut heard) = senders(collected, streams);
     let mut open: VecDeque<Open> = VecDeque::new();
     let mut next = 0;
     collected.messages.merge(&ids, |timed| {
         if believed.is_some_and(|span| !span.contains(timed.time)) {
             return;
         }
-        Trace::extend(&mut all.traces[timed.series], timed.time);
+        let trace = &mut all.traces[timed.series];
+        *trace = Some((trace.map_or(timed.time, |t| t.0), timed.time));
+        heard[of[timed.series]].hear(timed.time);
         while open
             .front()
             .is_some_and(|o| windows.end(o.window) <= timed.time)
@@ -110,7 +107,84 @@ pub(crate) fn rates(
     })?;
     all.tallies
         .extend(open.into_iter().filter_map(|o| o.close(sized)));
+    all.of = of;
+    all.senders = heard.into_iter().map(Heard::into_sender).collect();
     Ok(all)
+}
+
+/// What is heard of one sender.
+struct Heard {
+    node: Option<Name>,
+    latched: bool,
+    times: Vec<Stamp>,
+    /// Of so many messages one is kept, unless it comes late.
+    every: usize,
+    passed: usize,
+}
+
+/// The most times kept per sender (32 MB); of more, every second goes.
+const MOST_TIMES: usize = 1 << 22;
+/// A message after so much silence is kept in any case, and the one before it.
+const LATE_NS: i64 = 500_000_000;
+
+impl Heard {
+    fn hear(&mut self, time: Stamp) {
+        let late = self
+            .times
+            .last()
+            .is_none_or(|last| time.since(*last) > LATE_NS);
+        self.passed += 1;
+        if !late && self.passed < self.every {
+            return;
+        }
+        self.passed = 0;
+        self.times.push(time);
+        if self.times.len() > MOST_TIMES {
+            self.every *= 2;
+            let mut kept = false;
+            self.times.retain(|_| {
+                kept = !kept;
+                kept
+            });
+        }
+    }
+
+    fn into_sender(self) -> Sender {
+        let mut stretches = stretches(&self.times);
+        for stretch in &mut stretches {
+            stretch.count = (stretch.count - 1) * self.every as u64 + 1;
+            stretch.period /= i64::try_from(self.every).unwrap_or(i64::MAX);
+        }
+        Sender {
+            node: self.node,
+            latched: self.latched,
+            stretches,
+        }
+    }
+}
+
+/// The sender of each stream, and what is heard of each sender: nothing yet.
+fn senders(collected: &Collected, streams: &[usize]) -> (Vec<usize>, Vec<Heard>) {
+    let of = |at: &usize| {
+        let stream = &collected.streams[*at];
+        stream
+            .speaker
+            .filter(|_| stream.trust != Reliability::First)
+    };
+    let mut latched: BTreeMap<Option<Name>, bool> = BTreeMap::new();
+    for at in streams {
+        *latched.entry(of(at)).or_insert(true) &= collected.streams[*at].latched;
+    }
+    let place = |at: &usize| latched.range(..of(at)).count();
+    let places = streams.iter().map(place).collect();
+    let heard = latched.iter().map(|(node, latched)| Heard {
+        node: *node,
+        latched: *latched,
+        times: Vec::new(),
+        every: 1,
+        passed: 0,
+    });
+    (places, heard.collect())
 }
 
 impl Open {

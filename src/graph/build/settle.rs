@@ -3,32 +3,41 @@
 use std::collections::BTreeMap;
 
 use super::liveness::{Lifetime, Liveness};
-use super::windows::Windows;
+use super::restarts::Restarts;
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::proof::{Key, Proof, Validity};
 
-/// What lives are measured against.
-#[derive(Clone, Copy)]
-pub(crate) struct Frame<'a> {
-    pub(crate) windows: Windows<'a>,
-    /// The first and the last moment.
-    pub(crate) mission: (Stamp, Stamp),
-    /// Windows of silence before somebody who never speaks again counts as gone.
-    pub(crate) grace: usize,
-}
-
-/// Works out all lives.
-pub(crate) fn settle(tracks: &mut BTreeMap<Key, Liveness>, proofs: &[Proof], frame: &Frame<'_>) {
+/// Works out all lives; `mission` is its first and its last moment.
+pub(crate) fn settle(
+    tracks: &mut BTreeMap<Key, Liveness>,
+    proofs: &[Proof],
+    restarts: &Restarts,
+    mission: (Stamp, Stamp),
+) {
+    let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
     for (what, track) in edges(tracks) {
         let (node, topic) = ends(what);
+        let last = closed.entry(node).or_insert(Some(Stamp::MIN));
+        *last = last.and_then(|last| track.closed(last));
         tracks.entry(Key::Node(node)).or_default().learn(&track);
-        tracks.entry(Key::Topic(topic)).or_default().learn(&track);
+        tracks.entry(Key::Topic(topic)).or_default().know(&track);
     }
-    let linger = |last| frame.windows.last_moment(last, frame.grace);
+    // Whose last connection was closed, and who was not heard of again, is gone.
+    for (node, end) in closed {
+        let end = end.filter(|end| *end > Stamp::MIN);
+        if let (Some(end), Some(track)) = (end, tracks.get_mut(&Key::Node(node)))
+            && track.signs.iter().all(|sign| *sign <= end)
+        {
+            track.ends.push(end);
+        }
+    }
     for (what, track) in tracks.iter_mut() {
-        if matches!(what, Key::Node(_)) {
-            track.live(frame.mission, linger);
+        if let Key::Node(node) = what {
+            track.live(mission);
+            for restart in restarts.get(node).into_iter().flatten() {
+                track.restart(restart);
+            }
         }
     }
     let mut of_topics: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
@@ -47,9 +56,8 @@ pub(crate) fn settle(tracks: &mut BTreeMap<Key, Liveness>, proofs: &[Proof], fra
     for (what, track) in tracks.iter_mut() {
         if let Key::Topic(topic) = what {
             let edges = of_topics.remove(topic).unwrap_or_default();
-            track.ceased = false;
-            track.live(frame.mission, linger);
-            track.lives.extend(edges);
+            track.live(mission);
+            track.live_with(edges);
         }
     }
     live_like(tracks, proofs, true);

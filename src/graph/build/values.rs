@@ -54,6 +54,11 @@ impl Values {
             .map(|(_, state)| Arc::clone(state))
     }
 
+    /// When a node entered which state, in order.
+    pub(crate) fn transitions(&self, node: Name) -> impl Iterator<Item = &(Stamp, Arc<str>)> {
+        self.states.get(&node).into_iter().flatten()
+    }
+
     /// The types that somebody states of a topic.
     pub(crate) fn types(&self, topic: Name) -> impl Iterator<Item = Arc<str>> + '_ {
         self.types.get(&topic).into_iter().flatten().cloned()

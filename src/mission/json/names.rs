@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::raw::{RawEdge, RawNode, RawTopic, RawWindow};
 use crate::base::name::{NodeName, TopicName};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::{Edge, Elements, Graph, Node, NodeState, Topic, TopicState};
 
@@ -29,6 +29,7 @@ impl Names {
             evidence: Evidence::NONE,
             first: None,
             last: None,
+            runs: Vec::new(),
         })
     }
 
@@ -42,6 +43,7 @@ impl Names {
                 evidence: Evidence::NONE,
                 first: None,
                 last: None,
+                runs: Vec::new(),
                 qos: None,
             })
     }
@@ -54,6 +56,7 @@ impl Names {
             }
             node.evidence = node.evidence.and(raw.rest.evidence());
             widen(&mut node.first, &mut node.last, raw.rest.life());
+            keep(&mut node.runs, raw.rest.runs());
         }
         for raw in &window.topics {
             let topic = self.topic(&raw.name);
@@ -65,6 +68,7 @@ impl Names {
             topic.evidence = topic.evidence.and(raw.rest.evidence());
             topic.qos = raw.qos.as_deref().map(Arc::from).or(topic.qos.take());
             widen(&mut topic.first, &mut topic.last, raw.rest.life());
+            keep(&mut topic.runs, raw.rest.runs());
         }
         for raw in &window.publishes {
             self.ends(raw);
@@ -128,9 +132,18 @@ fn edge(edges: &mut BTreeMap<(Arc<str>, Arc<str>), Edge>, key: (&str, &str), raw
             evidence: Evidence::NONE,
             first: None,
             last: None,
+            runs: Vec::new(),
         });
     edge.evidence = edge.evidence.and(raw.rest.evidence());
     widen(&mut edge.first, &mut edge.last, raw.rest.life());
+    keep(&mut edge.runs, raw.rest.runs());
+}
+
+/// Every window tells all runs.
+fn keep(runs: &mut Vec<Span>, told: Vec<Span>) {
+    if runs.is_empty() {
+        *runs = told;
+    }
 }
 
 fn widen(

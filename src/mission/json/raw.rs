@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use crate::base::time::Stamp;
+use super::entries::RawEntry;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{EdgeState, State};
 
@@ -17,6 +18,7 @@ pub(crate) struct Raw {
     pub(crate) period_ns: Option<i64>,
     pub(crate) step_ns: Option<i64>,
     pub(crate) windows: Vec<RawWindow>,
+    pub(crate) ledger: Option<Vec<RawEntry>>,
     pub(crate) layout: Option<RawLayout>,
     #[serde(default)]
     pub(crate) notices: Vec<RawNotice>,
@@ -91,6 +93,8 @@ pub(crate) struct RawState {
     pub(crate) evidence: Vec<String>,
     pub(crate) first_ns: Option<i64>,
     pub(crate) last_ns: Option<i64>,
+    #[serde(default)]
+    pub(crate) runs: Vec<[i64; 2]>,
     pub(crate) count: Option<u64>,
     pub(crate) hz: Option<f64>,
 }
@@ -148,6 +152,14 @@ impl RawState {
 
     pub(crate) fn life(&self) -> (Option<Stamp>, Option<Stamp>) {
         (self.first_ns.map(Stamp), self.last_ns.map(Stamp))
+    }
+
+    pub(crate) fn runs(&self) -> Vec<Span> {
+        let run = |[start, end]: &[i64; 2]| Span {
+            start: Stamp(*start),
+            end: Stamp(*end.max(start)),
+        };
+        self.runs.iter().map(run).collect()
     }
 
     pub(crate) fn edge(&self, id: u32) -> EdgeState {

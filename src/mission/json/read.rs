@@ -1,13 +1,13 @@
 //! Reads an evolution back: our own JSON, or a graph over time that another tool wrote with our keys.
 //!
 //! Required are `schema`, the windows' times and the elements' names; what else is missing is unknown, unknown keys are
-//! ignored, and changes are left to be computed anew.
+//! ignored. What changed is found by the ledger; a mission without one is left for [`Mission::find_changes`].
 
 use std::path::Path;
 
 use super::names::Names;
 use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice};
-use super::write::SCHEMA;
+use super::write::{OLD_SCHEMA, SCHEMA};
 use crate::bag::{Report, Tier};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Rect;
@@ -27,12 +27,25 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
         reason,
         hint: "an evolution is what `bagreel render BAG -o x.json` writes".to_owned(),
     };
-    let raw: Raw = serde_json::from_str(text).map_err(|e| bad(e.line(), e.to_string()))?;
-    if raw.schema != SCHEMA {
+    let mut raw: Raw = serde_json::from_str(text).map_err(|e| bad(e.line(), e.to_string()))?;
+    if raw.schema != SCHEMA && raw.schema != OLD_SCHEMA {
         return Err(bad(0, format!("schema `{}` is not `{SCHEMA}`", raw.schema)));
     }
     let spans = spans(&raw).map_err(|reason| bad(0, reason))?;
-    Ok(build(raw, &spans))
+    let ledger = raw.ledger.take();
+    let mut mission = build(raw, &spans);
+    if let Some(rows) = ledger {
+        let entries = super::entries::read(&rows, &mission.elements);
+        let nothing = || {
+            bad(
+                0,
+                "an entry of its ledger is about nothing in its windows".to_owned(),
+            )
+        };
+        mission.ledger.entries = entries.ok_or_else(nothing)?;
+        mission.explain();
+    }
+    Ok(mission)
 }
 
 /// The windows' times, checked.
@@ -98,6 +111,7 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
                 messages: window.messages.unwrap_or_else(counts),
                 graph: places.graph(window),
                 changes: Vec::new(),
+                entries: Vec::new(),
             }
         })
         .collect();

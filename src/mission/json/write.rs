@@ -1,20 +1,23 @@
-//! Writes an evolution as JSON, schema `bagreel.evolution/1`, window by window without a second copy in memory.
+//! Writes an evolution as JSON, schema `bagreel.evolution/2`, window by window without a second copy in memory.
 
 use std::io::Write;
 
 use serde::Serialize;
 use serde::ser::{SerializeMap as _, SerializeSeq as _, Serializer};
 
+use super::entries::entries;
 use super::lines::Lines;
 use crate::bag::Report;
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::diff::Change;
 use crate::graph::{Edge, EdgeState, Element, Elements, NodeState, TopicState};
-use crate::mission::{Mission, Place, Places, Window};
+use crate::mission::{EntryId, Mission, Place, Places, Window};
 
 /// The schema that is written, and read.
-pub(crate) const SCHEMA: &str = "bagreel.evolution/1";
+pub(crate) const SCHEMA: &str = "bagreel.evolution/2";
+/// The schema without a ledger, which is still read.
+pub(crate) const OLD_SCHEMA: &str = "bagreel.evolution/1";
 
 /// Writes the whole mission as JSON, ending in a new line. Lists are sorted by name, times are nanoseconds since 1970,
 /// what is not known is `null`.
@@ -41,6 +44,7 @@ impl Serialize for Mission {
             window,
             elements: &self.elements,
         });
+        map.serialize_entry("ledger", &List(entries(&self.ledger, &self.elements)))?;
         map.serialize_entry("windows", &List(windows))?;
         if let Some(places) = &self.layout {
             map.serialize_entry("layout", &LayoutRow::new(places))?;
@@ -58,7 +62,7 @@ impl Serialize for Mission {
 }
 
 /// A list made while it is written.
-struct List<I>(I);
+pub(crate) struct List<I>(pub(crate) I);
 
 impl<I: Iterator<Item: Serialize> + Clone> Serialize for List<I> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -177,13 +181,28 @@ impl Serialize for WindowOf<'_> {
         )?;
         map.serialize_entry(
             "changes",
-            &List(window.changes.iter().map(|c| ChangeRow::new(c, elements))),
+            &List(
+                window
+                    .changes
+                    .iter()
+                    .zip(&window.entries)
+                    .map(|(c, entry)| ChangeRow::new(c, *entry, elements)),
+            ),
         )?;
         map.end()
     }
 }
 
-fn words(evidence: Evidence) -> Vec<&'static str> {
+/// When an element is there, as pairs of nanoseconds.
+struct Runs<'a>(&'a [Span]);
+
+impl Serialize for Runs<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().map(|run| [run.start.0, run.end.0]))
+    }
+}
+
+pub(crate) fn words(evidence: Evidence) -> Vec<&'static str> {
     evidence.words().collect()
 }
 
@@ -200,6 +219,7 @@ struct NodeRow<'a> {
     evidence: Vec<&'static str>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
+    runs: Runs<'a>,
     hz: Option<f64>,
     lifecycle: Option<&'a str>,
 }
@@ -215,6 +235,7 @@ impl<'a> NodeRow<'a> {
             evidence: words(node.evidence),
             first_ns: nanos(node.first),
             last_ns: nanos(node.last),
+            runs: Runs(&node.runs),
             hz: state.hz,
             lifecycle: state.lifecycle.as_deref(),
         }
@@ -236,6 +257,7 @@ struct TopicRow<'a> {
     qos: Option<&'a str>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
+    runs: Runs<'a>,
 }
 
 impl<'a> TopicRow<'a> {
@@ -255,6 +277,7 @@ impl<'a> TopicRow<'a> {
             qos: topic.qos.as_deref(),
             first_ns: nanos(topic.first),
             last_ns: nanos(topic.last),
+            runs: Runs(&topic.runs),
         }
     }
 }
@@ -284,6 +307,7 @@ struct EdgeRow<'a> {
     hz: Option<f64>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
+    runs: Runs<'a>,
 }
 
 impl<'a> EdgeRow<'a> {
@@ -296,6 +320,7 @@ impl<'a> EdgeRow<'a> {
             hz: state.hz,
             first_ns: nanos(edge.first),
             last_ns: nanos(edge.last),
+            runs: Runs(&edge.runs),
         }
     }
 }
@@ -331,7 +356,7 @@ impl<'a> SubscribeRow<'a> {
 
 /// An element by its name, or an edge by its two.
 #[derive(Serialize)]
-struct Named<'a> {
+pub(crate) struct Named<'a> {
     what: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     name: Option<&'a str>,
@@ -342,7 +367,7 @@ struct Named<'a> {
 }
 
 impl<'a> Named<'a> {
-    fn new(what: Element, elements: &'a Elements) -> Self {
+    pub(crate) fn new(what: Element, elements: &'a Elements) -> Self {
         let alone = |name: &'a str| Self {
             what: what.word(),
             name: Some(name),
@@ -370,6 +395,7 @@ impl<'a> Named<'a> {
 #[derive(Serialize)]
 struct ChangeRow<'a> {
     kind: &'static str,
+    entry: EntryId,
     #[serde(flatten)]
     named: Named<'a>,
     #[serde(flatten)]
@@ -397,7 +423,7 @@ enum ChangeValues<'a> {
 }
 
 impl<'a> ChangeRow<'a> {
-    fn new(change: &Change, elements: &'a Elements) -> Self {
+    fn new(change: &Change, entry: EntryId, elements: &'a Elements) -> Self {
         let names = |nodes: &[u32]| {
             nodes
                 .iter()
@@ -440,6 +466,7 @@ impl<'a> ChangeRow<'a> {
         };
         Self {
             kind: change.word(),
+            entry,
             named: Named::new(what, elements),
             rest,
         }

@@ -1,0 +1,256 @@
+//! Stretches of even sending, from the times of one sender's messages: gaps end them, and so do changes of rate.
+
+use crate::base::time::Stamp;
+use crate::graph::lives::Stretch;
+
+/// Fewer intervals than this tell no rate.
+pub(crate) const FEWEST: usize = 5;
+/// A gap is this many times as long as the usual interval on both of its sides; one or two lost messages are none.
+const GAP: i64 = 5;
+/// And at least this long: shorter pauses are the scheduler's.
+const GAP_NS: i64 = 1_000_000_000;
+/// How many intervals on each side of a gap tell what is usual.
+const AROUND: usize = 9;
+/// The most pieces of a run in which changes of rate are looked for; longer ones are summed up first.
+const PIECES: usize = 2048;
+/// Of one sender's messages at most this many rates are told apart, each time doubling the work.
+const DEPTH: usize = 8;
+/// A change of rate must be larger than chance makes in one of so many tries: 3 standard deviations of a normal
+/// distribution are half a squared 3 in log likelihood; positions that could be chosen double that.
+const GAIN: f64 = 9.0;
+/// Medians that differ by less are one rate (the least that `--rate-change` can usefully tell).
+const SAME: f64 = 1.1;
+/// How far the quarters of even intervals may lie apart.
+const EVEN: f64 = 1.8;
+/// A sender with more gaps than this has no rhythm; the rest of its messages is one stretch.
+const MOST: usize = 4096;
+
+/// Takes sorted times apart.
+pub(crate) fn stretches(times: &[Stamp]) -> Vec<Stretch> {
+    let mut all = Vec::new();
+    let mut from = 0;
+    for to in gaps(times) {
+        split(&times[from..to], DEPTH, false, &mut all);
+        from = to;
+    }
+    if from < times.len() {
+        split(&times[from..], DEPTH, false, &mut all);
+    }
+    merged(all, times)
+}
+
+/// The places of the first messages after gaps.
+fn gaps(times: &[Stamp]) -> Vec<usize> {
+    let mut found = Vec::new();
+    for at in 1..times.len() {
+        let long = times[at].since(times[at - 1]);
+        if long <= GAP_NS || found.len() >= MOST {
+            continue;
+        }
+        let before = usual(&times[at.saturating_sub(AROUND + 1)..at]);
+        let after = usual(&times[at..times.len().min(at + AROUND + 1)]);
+        let longest = match (before, after) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        if longest.is_some_and(|usual| long > usual.saturating_mul(GAP)) {
+            found.push(at);
+        }
+    }
+    found
+}
+
+/// The lower median of a few intervals.
+fn usual(times: &[Stamp]) -> Option<i64> {
+    let mut intervals: Vec<i64> = times.windows(2).map(|t| t[1].since(t[0])).collect();
+    intervals.sort_unstable();
+    intervals.get(intervals.len().checked_sub(1)? / 2).copied()
+}
+
+/// Splits a run without gaps where its rate changes most, as long as that is no chance.
+fn split(times: &[Stamp], depth: usize, is_joined: bool, all: &mut Vec<Stretch>) {
+    let Some(cut) = (depth > 0).then(|| cut(times)).flatten() else {
+        all.extend(stretch(times, is_joined));
+        return;
+    };
+    split(&times[..=cut], depth - 1, is_joined, all);
+    split(&times[cut..], depth - 1, true, all);
+}
+
+/// The message at which the rate changes most; `None` if it does not.
+fn cut(times: &[Stamp]) -> Option<usize> {
+    let intervals = times.len().checked_sub(1)?;
+    if intervals < 2 * FEWEST {
+        return None;
+    }
+    let step = intervals.div_ceil(PIECES);
+    let coarse = best(times, step, FEWEST.div_ceil(step) * step..=intervals)?;
+    if step == 1 {
+        return Some(coarse);
+    }
+    let (from, to) = (
+        coarse.saturating_sub(step),
+        (coarse + step).min(intervals - FEWEST),
+    );
+    // Around the coarse place the exact one: where the sum of both sides' deviations turns.
+    best(times, 1, from.max(FEWEST)..=to).or(Some(coarse))
+}
+
+/// The best of the places in `range`, every `step` messages, by the likelihood of intervals that have one mean each
+/// side, in units of how much the intervals scatter.
+fn best(times: &[Stamp], step: usize, range: std::ops::RangeInclusive<usize>) -> Option<usize> {
+    let n = times.len() - 1;
+    let whole = times[n].since(times[0]) as f64;
+    let scatter = scatter(times, step);
+    let cost = |count: f64, nanos: f64| count * libm::log(nanos.max(1.0) / count);
+    let (mut found, mut most) = (None, GAIN * scatter);
+    for at in range.step_by(step) {
+        if at < FEWEST || n - at < FEWEST {
+            continue;
+        }
+        let left = times[at].since(times[0]) as f64;
+        let gain =
+            cost(n as f64, whole) - cost(at as f64, left) - cost((n - at) as f64, whole - left);
+        if gain > most {
+            (found, most) = (Some(at), gain);
+        }
+    }
+    found
+}
+
+/// The squared variation of neighbouring intervals (of sums of `step` of them), per interval; of random arrivals 1.
+fn scatter(times: &[Stamp], step: usize) -> f64 {
+    let sums: Vec<f64> = times
+        .iter()
+        .step_by(step)
+        .zip(times.iter().step_by(step).skip(1))
+        .map(|(a, b)| b.since(*a) as f64)
+        .collect();
+    let mut ratios: Vec<f64> = sums
+        .windows(2)
+        .map(|p| libm::fabs(p[1] - p[0]) / (p[0] + p[1]).max(1.0))
+        .collect();
+    if ratios.is_empty() {
+        return 1.0;
+    }
+    let middle = ratios.len() / 2;
+    let (_, median, _) = ratios.select_nth_unstable_by(middle, f64::total_cmp);
+    // Of random arrivals the middle ratio is 1/2, and what sums of `step` lose in scatter is what they sum up.
+    let relative = *median * 2.0;
+    (relative * relative * step as f64).clamp(0.01, 4.0)
+}
+
+/// What a run of messages at one rate is.
+fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
+    let (first, last) = (*times.first()?, *times.last()?);
+    let mut intervals: Vec<i64> = times.windows(2).map(|t| t[1].since(t[0])).collect();
+    let n = intervals.len();
+    let mut quantile = |part: usize| {
+        if n == 0 {
+            return 0;
+        }
+        *intervals.select_nth_unstable((n * part / 4).min(n - 1)).1
+    };
+    let (lower, period, upper) = (quantile(1), quantile(2), quantile(3));
+    Some(Stretch {
+        first,
+        last,
+        count: times.len() as u64,
+        period,
+        is_even: n >= FEWEST && upper as f64 <= EVEN * lower.max(1) as f64,
+        is_joined,
+    })
+}
+
+/// Joins neighbours whose rates are the same by the median after all.
+fn merged(all: Vec<Stretch>, times: &[Stamp]) -> Vec<Stretch> {
+    let mut kept: Vec<Stretch> = Vec::new();
+    for next in all {
+        match kept.last_mut() {
+            Some(last) if next.is_joined && is_same(last, &next) => {
+                let from = times.partition_point(|t| *t < last.first);
+                let to = times.partition_point(|t| *t <= next.last);
+                if let Some(both) = stretch(&times[from..to], last.is_joined) {
+                    *last = both;
+                }
+            }
+            _ => kept.push(next),
+        }
+    }
+    kept
+}
+
+fn is_same(a: &Stretch, b: &Stretch) -> bool {
+    let ratio = a.period.max(1) as f64 / b.period.max(1) as f64;
+    (1.0 / SAME..=SAME).contains(&ratio)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Times from (how many, milliseconds apart), with a little jitter.
+    fn times(runs: &[(usize, i64)]) -> Vec<Stamp> {
+        let (mut at, mut all) = (0, vec![Stamp(0)]);
+        let mut noise = 7_i64;
+        for (many, apart) in runs {
+            for _ in 0..*many {
+                noise = (noise * 48_271) % 2_147_483_647;
+                at += apart * 1_000_000 + apart * 1_000_000 / 50 * (noise % 7 - 3);
+                all.push(Stamp(at));
+            }
+        }
+        all
+    }
+
+    fn told(runs: &[(usize, i64)]) -> Vec<(u64, i64, bool)> {
+        let all = stretches(&times(runs));
+        all.iter()
+            .map(|s| (s.count, s.period / 1_000_000, s.is_joined))
+            .collect()
+    }
+
+    #[test]
+    fn a_steady_sender_sends_one_stretch() {
+        assert_eq!(told(&[(300, 100)]).len(), 1);
+        assert_eq!(told(&[(100_000, 10)]).len(), 1);
+    }
+
+    #[test]
+    fn a_rate_that_changes_is_cut_where_it_does() {
+        let found = told(&[(300, 33), (60, 200)]);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((300..=302).contains(&found[0].0) && found[1].2, "{found:?}");
+        let slow = told(&[(40, 1000), (12, 5000), (60, 1000)]);
+        assert_eq!(slow.len(), 3, "{slow:?}");
+        let long = told(&[(50_000, 10), (30_000, 20)]);
+        assert_eq!(long.len(), 2, "{long:?}");
+        assert!((49_990..=50_012).contains(&long[0].0), "{long:?}");
+    }
+
+    #[test]
+    fn a_pause_is_a_gap_and_a_lost_message_is_none() {
+        let found = told(&[(50, 100), (1, 30_000), (50, 100)]);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(!found[1].2);
+        assert_eq!(
+            told(&[(50, 100), (1, 300), (50, 100), (1, 900), (50, 100)]).len(),
+            1
+        );
+    }
+
+    #[test]
+    fn what_comes_at_random_is_not_even() {
+        let mut at = 0;
+        let mut noise = 12_345_i64;
+        let times: Vec<Stamp> = (0..200)
+            .map(|_| {
+                noise = (noise * 48_271) % 2_147_483_647;
+                at += 1_000_000 * (noise % 997 + 1);
+                Stamp(at)
+            })
+            .collect();
+        let found = stretches(&times);
+        assert!(found.iter().all(|s| !s.is_even), "{found:?}");
+    }
+}

@@ -1,0 +1,193 @@
+//! Whose topics changed hands: one sender stops and another begins, or the larger share of a topic's messages moves.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::make::{Drafts, Told};
+use super::{Detail, Kind};
+use crate::base::time::Stamp;
+use crate::graph::lives::{Bound, Voice};
+use crate::graph::{Element, NodeId, TopicId};
+
+/// The new sender begins at most so long before the old one stops.
+const BEFORE_NS: i64 = 5_000_000_000;
+/// And so long after; any time later if the old one never sends again.
+const AFTER_NS: i64 = 60_000_000_000;
+/// The old one does not come back sooner.
+const BACK_NS: i64 = 5_000_000_000;
+/// Fewer messages than this are no sending: somebody who speaks once takes over nothing.
+const FEWEST: u64 = 3;
+
+/// An interval of sending of one role, without a gap.
+#[derive(Clone, Debug)]
+struct Sending {
+    role: Arc<str>,
+    node: NodeId,
+    first: Stamp,
+    last: Stamp,
+    count: u64,
+}
+
+/// Tells of all hand-overs.
+pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
+    let mut of: BTreeMap<TopicId, Vec<&Voice>> = BTreeMap::new();
+    for voice in &told.lives.voices {
+        of.entry(voice.topic).or_default().push(voice);
+    }
+    for (topic, voices) in of {
+        if told.is_by_the_way(topic) || voices.iter().any(|v| v.node.is_none() || v.is_latched) {
+            continue;
+        }
+        let all = sendings(told, &voices);
+        let roles: BTreeSet<&Arc<str>> = all.iter().map(|s| &s.role).collect();
+        if roles.len() > 1 {
+            for (old, new) in replaced(&all) {
+                hand(told, drafts, topic, &old, &new);
+            }
+            shares(told, drafts, topic, &voices);
+        }
+    }
+}
+
+/// When each role sends, sorted by its first message.
+fn sendings(told: &Told<'_>, voices: &[&Voice]) -> Vec<Sending> {
+    let mut all: Vec<Sending> = Vec::new();
+    for voice in voices {
+        let Some(node) = voice.node else { continue };
+        let mut own: Vec<Sending> = Vec::new();
+        for stretch in &voice.stretches {
+            match own.last_mut() {
+                Some(last) if stretch.is_joined => {
+                    (last.last, last.count) = (stretch.last, last.count + stretch.count);
+                }
+                _ => own.push(Sending {
+                    role: Arc::clone(&told.elements.nodes[node as usize].role),
+                    node,
+                    first: stretch.first,
+                    last: stretch.last,
+                    count: stretch.count,
+                }),
+            }
+        }
+        all.extend(own);
+    }
+    all.sort_by_key(|s| (s.first, s.node));
+    all
+}
+
+/// Every end of sending that another role's beginning makes good.
+fn replaced(all: &[Sending]) -> Vec<(Sending, Sending)> {
+    let mut found = Vec::new();
+    for old in all.iter().filter(|s| s.count >= FEWEST) {
+        let own = || {
+            all.iter()
+                .filter(|s| s.role == old.role && s.last > old.last)
+        };
+        let back = own().map(|s| s.first).min();
+        if back.is_some_and(|back| back.since(old.last) <= BACK_NS) {
+            continue;
+        }
+        let others = || all.iter().filter(|s| s.role != old.role);
+        let begins = others().find(|s| {
+            let late = s.first.since(old.last);
+            let soon = late <= AFTER_NS || back.is_none();
+            late >= -BEFORE_NS
+                && soon
+                && s.first > old.first
+                && s.last > old.last
+                && s.count >= FEWEST
+        });
+        let Some(new) = begins.filter(|new| back.is_none_or(|back| new.first < back)) else {
+            continue;
+        };
+        // Somebody who sent before and goes on takes nothing over, and leaves nothing to be taken.
+        let carried = others().any(|s| {
+            s.role != new.role && s.last > old.last && s.first < old.last.plus(-BEFORE_NS)
+        });
+        let went_on = others().any(|s| {
+            s.role == new.role
+                && s.first < old.last.plus(-BEFORE_NS)
+                && s.last.plus(BACK_NS) > old.last
+        });
+        if !carried && !went_on {
+            found.push((old.clone(), new.clone()));
+        }
+    }
+    found
+}
+
+fn hand(told: &Told<'_>, drafts: &mut Drafts, topic: TopicId, old: &Sending, new: &Sending) {
+    let at = Bound {
+        time: new.first,
+        earliest: old.last.min(new.first),
+        latest: old.last.max(new.first),
+    };
+    let mut entry = told.entry(Kind::HandedOver, Element::Topic(topic), at);
+    entry.detail = Detail::Senders {
+        from: vec![old.node],
+        to: vec![new.node],
+    };
+    drafts.add(entry);
+}
+
+/// A share that holds for less is none.
+const HOLDS_NS: i64 = 5_000_000_000;
+
+/// How often somebody sends from when to when.
+struct Pace {
+    node: NodeId,
+    first: Stamp,
+    last: Stamp,
+    hz: f64,
+}
+
+/// Tells where most messages of a topic come from another sender than before, while both go on.
+fn shares(told: &Told<'_>, drafts: &mut Drafts, topic: TopicId, voices: &[&Voice]) {
+    let paces: Vec<Pace> = voices
+        .iter()
+        .filter_map(|v| Some((v.node?, v)))
+        .flat_map(|(node, v)| {
+            v.stretches.iter().map(move |s| Pace {
+                node,
+                first: s.first,
+                last: s.last,
+                hz: s.hz(),
+            })
+        })
+        .collect();
+    let mut cuts: Vec<Stamp> = paces.iter().flat_map(|p| [p.first, p.last]).collect();
+    cuts.sort_unstable();
+    cuts.dedup();
+    let mut before: Option<(NodeId, BTreeSet<NodeId>, Stamp)> = None;
+    for pair in cuts.windows(2) {
+        let inside = paces
+            .iter()
+            .filter(|p| p.first <= pair[0] && pair[1] <= p.last);
+        let senders: Vec<&Pace> = inside.collect();
+        let whole: f64 = senders.iter().map(|p| p.hz).sum();
+        let main = senders.iter().find(|p| p.hz > whole / 2.0);
+        let Some(main) = main.filter(|_| pair[1].since(pair[0]) >= HOLDS_NS) else {
+            continue;
+        };
+        let nodes: BTreeSet<NodeId> = senders.iter().map(|p| p.node).collect();
+        if let Some((old, then, until)) = &before
+            && *old != main.node
+            && nodes.contains(old)
+            && then.contains(&main.node)
+            && pair[0].since(*until) <= HOLDS_NS
+        {
+            let at = Bound {
+                time: pair[0],
+                earliest: *until,
+                latest: pair[0],
+            };
+            let mut entry = told.entry(Kind::HandedOver, Element::Topic(topic), at);
+            entry.detail = Detail::Senders {
+                from: vec![*old],
+                to: vec![main.node],
+            };
+            drafts.add(entry);
+        }
+        before = Some((main.node, nodes, pair[1]));
+    }
+}

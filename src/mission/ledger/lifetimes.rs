@@ -1,0 +1,159 @@
+//! What began, ended and came back: nodes and roles, with their edges and topics as parts.
+
+use std::collections::BTreeMap;
+
+use super::make::{Drafts, Told};
+use super::{EntryId, Kind};
+use crate::base::time::Stamp;
+use crate::graph::lives::{Bound, Known};
+use crate::graph::{Edge, Element, NodeId, TopicId};
+
+/// An edge that begins or ends so soon after its node does so because of it.
+const WITH_ITS_NODE_NS: i64 = 5_000_000_000;
+
+/// Whether something begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Turn {
+    Begins,
+    Ends,
+}
+
+/// The entries that tell of turns, by whose they are.
+#[derive(Default)]
+struct Wholes {
+    nodes: BTreeMap<(NodeId, Turn), Vec<(Bound, EntryId)>>,
+    topics: BTreeMap<(TopicId, Turn, Stamp), EntryId>,
+}
+
+/// Tells of all lives.
+pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
+    let mut wholes = Wholes::default();
+    for turns in turns_by_role(told).values() {
+        tell_role(told, drafts, &mut wholes, turns);
+    }
+    let edges = told.elements.publishes.iter().zip(&told.lives.publishes);
+    for (id, (edge, known)) in (0..).zip(edges) {
+        tell_edge(
+            told,
+            drafts,
+            &mut wholes,
+            Element::Publish(id),
+            (edge, known),
+        );
+    }
+    let edges = told.elements.subscribes.iter().zip(&told.lives.subscribes);
+    for (id, (edge, known)) in (0..).zip(edges) {
+        tell_edge(
+            told,
+            drafts,
+            &mut wholes,
+            Element::Subscribe(id),
+            (edge, known),
+        );
+    }
+    for (id, known) in (0..).zip(&told.lives.topics) {
+        for (turn, at) in turns(known) {
+            let mut entry = told.entry(kind(turn), Element::Topic(id), at);
+            entry.part_of = wholes.topics.get(&(id, turn, at.time)).copied();
+            drafts.add(entry);
+        }
+    }
+}
+
+/// The beginnings and ends of an element, in order.
+fn turns(known: &Known) -> impl Iterator<Item = (Turn, Bound)> + '_ {
+    known.lives.iter().flat_map(|life| {
+        let began = life.began.map(|at| (Turn::Begins, at));
+        let ended = life.ended.map(|at| (Turn::Ends, at));
+        began.into_iter().chain(ended)
+    })
+}
+
+fn kind(turn: Turn) -> Kind {
+    match turn {
+        Turn::Begins => Kind::Appeared,
+        Turn::Ends => Kind::Vanished,
+    }
+}
+
+/// The turns of a role, sorted by time.
+type Turns = Vec<(Stamp, Turn, NodeId, Bound)>;
+
+/// The turns of all nodes: of each anonymous role together; any other node is a role of its own.
+fn turns_by_role<'a>(told: &Told<'a>) -> BTreeMap<&'a str, Turns> {
+    let mut all: BTreeMap<&str, Turns> = BTreeMap::new();
+    for (id, (node, known)) in (0..).zip(told.elements.nodes.iter().zip(&told.lives.nodes)) {
+        let of = all.entry(&*node.role).or_default();
+        of.extend(turns(known).map(|(turn, at)| (at.time, turn, id, at)));
+    }
+    for turns in all.values_mut() {
+        turns.sort_by_key(|(time, turn, node, _)| (*time, std::cmp::Reverse(*turn), *node));
+    }
+    all
+}
+
+/// Tells of one role: an end that a beginning follows is a restart.
+fn tell_role(told: &Told<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &Turns) {
+    let mut rest = turns.as_slice();
+    while let Some((&(_, turn, node, at), after)) = rest.split_first() {
+        let back = after
+            .first()
+            .filter(|next| turn == Turn::Ends && next.1 == Turn::Begins);
+        let Some(&(_, _, heir, again)) = back else {
+            let kind = match turn {
+                Turn::Begins => Kind::Started,
+                Turn::Ends => Kind::Stopped,
+            };
+            let id = drafts.add(told.entry(kind, Element::Node(node), at));
+            wholes.nodes.entry((node, turn)).or_default().push((at, id));
+            rest = after;
+            continue;
+        };
+        let mut entry = told.entry(Kind::Restarted, Element::Node(heir), at);
+        entry.until = Some(again.time);
+        let id = drafts.add(entry);
+        wholes
+            .nodes
+            .entry((node, Turn::Ends))
+            .or_default()
+            .push((at, id));
+        wholes
+            .nodes
+            .entry((heir, Turn::Begins))
+            .or_default()
+            .push((again, id));
+        if heir != node {
+            for (kind, node, at) in [(Kind::Stopped, node, at), (Kind::Started, heir, again)] {
+                let mut part = told.entry(kind, Element::Node(node), at);
+                part.part_of = Some(id);
+                drafts.add(part);
+            }
+        }
+        rest = &after[1..];
+    }
+}
+
+/// Tells of an edge: as a part of what its node does at that time, or alone.
+fn tell_edge(
+    told: &Told<'_>,
+    drafts: &mut Drafts,
+    wholes: &mut Wholes,
+    what: Element,
+    (edge, known): (&Edge, &Known),
+) {
+    for (turn, at) in turns(known) {
+        let of_node = wholes.nodes.get(&(edge.node, turn)).into_iter().flatten();
+        let near = of_node
+            .map(|(node, id)| (at.time.since(node.time), *id))
+            .filter(|(late, _)| (-WITH_ITS_NODE_NS..=WITH_ITS_NODE_NS).contains(late))
+            .min_by_key(|(late, _)| late.abs());
+        let mut entry = told.entry(kind(turn), what, at);
+        entry.part_of = near.map(|(_, id)| id);
+        let id = drafts.add(entry);
+        let whole = near.map_or(id, |(_, id)| id);
+        wholes
+            .topics
+            .entry((edge.topic, turn, at.time))
+            .or_insert(whole);
+    }
+}

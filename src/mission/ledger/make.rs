@@ -1,0 +1,181 @@
+//! Makes the entries of a mission from its lives: each kind in a file of its own, then sorted and joined.
+
+use super::{Detail, Entry, EntryId, Kind, hands, lifetimes, rates, silence};
+use crate::base::name::{is_player, is_quiet, is_recorder};
+use crate::base::time::Stamp;
+use crate::evidence::{Degree, Evidence};
+use crate::graph::lives::{Bound, Known, Lives};
+use crate::graph::{Element, Elements, Node};
+
+/// What the entries are made from.
+#[derive(Clone, Copy)]
+pub(crate) struct Told<'a> {
+    pub(crate) elements: &'a Elements,
+    pub(crate) lives: &'a Lives,
+    /// The share by which a rate must change, 0...
+    pub(crate) rate_change: f64,
+}
+
+/// Entries not yet sorted; a part names the place of its whole.
+#[derive(Default)]
+pub(crate) struct Drafts {
+    pub(crate) list: Vec<Entry>,
+}
+
+impl Drafts {
+    /// Adds an entry; answers its place.
+    pub(crate) fn add(&mut self, entry: Entry) -> EntryId {
+        self.list.push(entry);
+        EntryId::try_from(self.list.len() - 1).unwrap_or(EntryId::MAX)
+    }
+}
+
+/// Every entry of a mission, sorted.
+pub(crate) fn make(told: &Told<'_>) -> Vec<Entry> {
+    let mut drafts = Drafts::default();
+    lifetimes::tell(told, &mut drafts);
+    silence::tell(told, &mut drafts);
+    hands::tell(told, &mut drafts);
+    rates::tell(told, &mut drafts);
+    lifecycles(told, &mut drafts);
+    sorted(drafts.list, told.elements).0
+}
+
+/// Sorts by time, kind and name, gives parts the new places of their wholes and wholes their weight; answers also the
+/// new place of each.
+pub(crate) fn sorted(mut list: Vec<Entry>, elements: &Elements) -> (Vec<Entry>, Vec<EntryId>) {
+    let mut order: Vec<usize> = (0..list.len()).collect();
+    let key = |at: &usize| {
+        let entry = &list[*at];
+        (
+            entry.time,
+            entry.kind,
+            elements.ends(entry.what),
+            entry.what,
+        )
+    };
+    order.sort_by_key(key);
+    let mut new: Vec<EntryId> = vec![0; list.len()];
+    for (place, old) in (0..).zip(&order) {
+        new[*old] = place;
+    }
+    let mut weights = vec![1_u32; list.len()];
+    for entry in &mut list {
+        if let Some(whole) = entry.part_of {
+            weights[whole as usize] = weights[whole as usize].saturating_add(1);
+            entry.part_of = Some(new[whole as usize]);
+        }
+    }
+    for (entry, weight) in list.iter_mut().zip(weights) {
+        entry.weight = weight;
+    }
+    let mut list: Vec<Option<Entry>> = list.into_iter().map(Some).collect();
+    let list = order.iter().filter_map(|at| list[*at].take()).collect();
+    (list, new)
+}
+
+impl Told<'_> {
+    /// An entry about an element at a moment.
+    pub(crate) fn entry(&self, kind: Kind, what: Element, at: Bound) -> Entry {
+        Entry {
+            kind,
+            what,
+            time: at.time,
+            earliest: at.earliest.min(at.time),
+            latest: at.latest.max(at.time),
+            until: None,
+            detail: Detail::None,
+            degree: self.known(what).map_or(Degree::Declared, |k| k.degree),
+            evidence: self.elements.evidence(what),
+            part_of: None,
+            quiet: self.is_quiet(what),
+            weight: 1,
+        }
+    }
+
+    /// The lives of an element.
+    pub(crate) fn known(&self, what: Element) -> Option<&Known> {
+        match what {
+            Element::Node(id) => self.lives.nodes.get(id as usize),
+            Element::Topic(id) => self.lives.topics.get(id as usize),
+            Element::Publish(id) => self.lives.publishes.get(id as usize),
+            Element::Subscribe(id) => self.lives.subscribes.get(id as usize),
+        }
+    }
+
+    /// Whether an element is housekeeping or the recorder's.
+    pub(crate) fn is_quiet(&self, what: Element) -> bool {
+        is_housekeeping(self.elements, what)
+    }
+
+    /// Whether a topic's rates and senders mean nothing by themselves: housekeeping, and what actions send when asked.
+    pub(crate) fn is_by_the_way(&self, topic: u32) -> bool {
+        let name = self.elements.topics[topic as usize].name.as_str();
+        is_quiet(name)
+            || name.ends_with("/feedback")
+            || self.elements.topics[topic as usize]
+                .types
+                .iter()
+                .any(|t| SHARED.contains(&t.rsplit('/').next().unwrap_or(t)))
+    }
+}
+
+/// Types that many nodes write to in turn, so that a new writer takes over nothing.
+const SHARED: [&str; 8] = [
+    "Log",
+    "ParameterEvent",
+    "TFMessage",
+    "DiagnosticArray",
+    "Status",
+    "Clock",
+    "tfMessage",
+    "TopicStatistics",
+];
+
+/// Whether an element is housekeeping or the recorder's.
+pub(crate) fn is_housekeeping(elements: &Elements, what: Element) -> bool {
+    let (node, topic) = elements.ends(what);
+    node.is_some_and(|id| is_tool(&elements.nodes[id as usize]))
+        || topic.is_some_and(|id| is_quiet(elements.topics[id as usize].name.as_str()))
+}
+
+/// Whether a node records or plays bags, by its name or by what it logs, or is the log's own.
+fn is_tool(node: &Node) -> bool {
+    let name = node.name.as_str();
+    let records = node.evidence.words().any(|word| word == "recorder");
+    records || is_recorder(name) || is_player(name) || is_quiet(name)
+}
+
+/// When nodes changed their lifecycle states.
+fn lifecycles(told: &Told<'_>, drafts: &mut Drafts) {
+    let mut states: std::collections::BTreeMap<u32, std::sync::Arc<str>> =
+        std::collections::BTreeMap::new();
+    for change in &told.lives.transitions {
+        let before = states.insert(change.node, change.state.clone());
+        let from = before.unwrap_or_default();
+        if from == change.state {
+            continue;
+        }
+        let mut entry = told.entry(
+            Kind::Lifecycle,
+            Element::Node(change.node),
+            exact(change.time),
+        );
+        entry.degree = Degree::Stated;
+        entry.evidence = Evidence::of("lifecycle");
+        entry.detail = Detail::Values {
+            from,
+            to: change.state.clone(),
+        };
+        drafts.add(entry);
+    }
+}
+
+/// A moment that is known exactly.
+pub(crate) fn exact(time: Stamp) -> Bound {
+    Bound {
+        time,
+        earliest: time,
+        latest: time,
+    }
+}

@@ -1,0 +1,118 @@
+//! Who paused while nothing says that it was gone: nodes, and topics whose senders all paused.
+
+use std::collections::BTreeMap;
+
+use super::make::{Drafts, Told};
+use super::{EntryId, Kind};
+use crate::base::time::{Span, Stamp};
+use crate::graph::lives::{Bound, Known, Stretch, Voice, all_silent};
+use crate::graph::{Element, NodeId, TopicId};
+
+/// From when to when somebody was silent; `None` if to the end.
+type Silence = (Stamp, Option<Stamp>);
+
+/// Tells of all silences.
+pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
+    let pauses = Pauses::new(&told.lives.voices);
+    let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EntryId)>> = BTreeMap::new();
+    for (node, voices) in by(told, |v| v.node.filter(|_| !v.is_latched)) {
+        let what = Element::Node(node);
+        for silence in silences(told, what, &voices, &pauses) {
+            let id = drafts.add(entry(told, what, silence, &voices));
+            of_nodes.entry(node).or_default().push((silence, id));
+        }
+    }
+    for (topic, voices) in by(told, |v| Some(v.topic).filter(|_| !v.is_latched)) {
+        if told.is_by_the_way(topic) {
+            continue;
+        }
+        for silence in silences(told, Element::Topic(topic), &voices, &pauses) {
+            let mut entry = entry(told, Element::Topic(topic), silence, &voices);
+            let nodes = voices.iter().filter_map(|v| of_nodes.get(&v.node?));
+            let whole = nodes.flatten().find(|(of, _)| meet(*of, silence));
+            entry.part_of = whole.map(|(_, id)| *id);
+            drafts.add(entry);
+        }
+    }
+}
+
+/// The voices of each node, or of each topic.
+fn by<'a>(
+    told: &Told<'a>,
+    key: impl Fn(&Voice) -> Option<u32>,
+) -> BTreeMap<TopicId, Vec<&'a Voice>> {
+    let mut of: BTreeMap<u32, Vec<&Voice>> = BTreeMap::new();
+    for voice in &told.lives.voices {
+        if let Some(key) = key(voice) {
+            of.entry(key).or_default().push(voice);
+        }
+    }
+    of
+}
+
+fn silences(told: &Told<'_>, what: Element, voices: &[&Voice], pauses: &Pauses) -> Vec<Silence> {
+    let spans = told.known(what).map(spans).unwrap_or_default();
+    let stretches: Vec<&[Stretch]> = voices.iter().map(|v| &v.stretches[..]).collect();
+    let mut all = all_silent(&stretches, &spans);
+    all.retain(|silence| !pauses.hold(*silence));
+    all
+}
+
+fn spans(known: &Known) -> Vec<Span> {
+    known.lives.iter().map(|life| life.span).collect()
+}
+
+fn entry(told: &Told<'_>, what: Element, (from, to): Silence, voices: &[&Voice]) -> super::Entry {
+    let last = voices
+        .iter()
+        .flat_map(|v| &v.stretches)
+        .filter(|s| s.last == from);
+    let period = last.map(|s| s.period).max().unwrap_or(0);
+    let mut entry = told.entry(
+        Kind::Silent,
+        what,
+        Bound {
+            time: from,
+            earliest: from,
+            latest: from.plus(period),
+        },
+    );
+    entry.until = to;
+    entry
+}
+
+/// Whether two silences share time.
+fn meet(a: Silence, b: Silence) -> bool {
+    let before = |a: Silence, b: Silence| a.1.is_some_and(|end| end <= b.0);
+    !before(a, b) && !before(b, a)
+}
+
+/// When nobody at all was heard: the recording paused, not the robot.
+struct Pauses(Vec<(Stamp, Stamp)>);
+
+impl Pauses {
+    fn new(voices: &[Voice]) -> Self {
+        let sending = voices.iter().flat_map(|v| &v.stretches);
+        let mut sending: Vec<_> = sending.map(|s| (s.first, s.last)).collect();
+        sending.sort_unstable();
+        let mut pauses = Vec::new();
+        let mut until = sending.first().map_or(Stamp::MAX, |s| s.0);
+        for (first, last) in sending {
+            if first > until {
+                pauses.push((until, first));
+            }
+            until = until.max(last);
+        }
+        Self(pauses)
+    }
+
+    /// Whether most of a silence lies in a pause of the recording.
+    fn hold(&self, (from, to): Silence) -> bool {
+        let Some(to) = to else {
+            return false;
+        };
+        let inside = |(a, b): &(Stamp, Stamp)| (*b.min(&to)).since(*a.max(&from)).max(0);
+        let paused: i64 = self.0.iter().map(inside).sum();
+        paused > to.since(from) / 2
+    }
+}
