@@ -53,7 +53,10 @@ impl Kind {
     pub fn parse(word: &str) -> Result<Self> {
         let found = Self::ALL.iter().find(|(name, _)| *name == word);
         found.map(|(_, kind)| *kind).ok_or_else(|| {
-            Error::usage(format!("`{word}` is not a figure"), "figures: lives, map, steps")
+            Error::usage(
+                format!("`{word}` is not a figure"),
+                "figures: lives, map, steps",
+            )
         })
     }
 

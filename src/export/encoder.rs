@@ -182,6 +182,8 @@ pub struct Format {
     pub is_limited: bool,
     /// Whether, without `{n}`, several windows become a film strip unless one asks for another.
     pub is_strip: bool,
+    /// Whether a `--figure` takes the place of what it shows.
+    pub is_figure: bool,
     /// What else it needs, checked before anything is read.
     pub check: Option<fn(&Target) -> Result<()>>,
     /// How an output begins.
@@ -195,6 +197,7 @@ pub(crate) const PICTURE: Format = Format {
     is_drawn: true,
     is_limited: false,
     is_strip: false,
+    is_figure: false,
     check: None,
     start: nothing,
 };
@@ -208,6 +211,7 @@ pub(crate) const ANIMATION: Format = Format {
 /// What formats of single images have in common.
 pub(crate) const IMAGE: Format = Format {
     is_strip: true,
+    is_figure: true,
     ..PICTURE
 };
 

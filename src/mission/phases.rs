@@ -13,8 +13,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use self::partition::partition;
-use self::presence::{Presence, is_topics, presences};
 pub(crate) use self::presence::knows_publishers;
+use self::presence::{Presence, is_topics, presences};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Elements, TopicId};
 use crate::mission::activity::{Activity, Cell};
@@ -57,6 +57,20 @@ pub fn phases(elements: &Elements, activity: &Activity) -> Vec<Phase> {
     let (spans, found, ramps) = ramp::joined(&spans, &found, activity.span().nanos());
     let unit = if is_topics(&present) { "topic" } else { "node" };
     told(&spans, &found, &ramps, unit)
+}
+
+/// Phases that somebody else cut, such as the user: what each changes, by majority.
+pub(crate) fn of_spans(elements: &Elements, activity: &Activity, spans: &[Span]) -> Vec<Phase> {
+    let present = presences(elements, activity);
+    let found: Vec<Configuration> = spans
+        .iter()
+        .map(|span| {
+            let (from, to) = cells_of(activity, *span);
+            configuration(elements, activity, &present, from, to)
+        })
+        .collect();
+    let unit = if is_topics(&present) { "topic" } else { "node" };
+    told(spans, &found, &vec![false; spans.len()], unit)
 }
 
 /// The majority graph of a phase that was found, or of any other stretch of time, by the cells whose middle lies in it.

@@ -77,7 +77,11 @@ pub(crate) fn axis(canvas: &mut Canvas<'_>, axis: &Axis, y: f64, has_unit: bool)
     let step = STEPS.into_iter().find(fits).unwrap_or(STEPS[21]) * 1_000_000_000;
     let middle = y + 0.9 + canvas.cap(Type::Small) / 2.0 + 0.35;
     if has_unit {
-        let unit = if whole >= 3_600_000_000_000 { "h:min:s" } else { "min:s" };
+        let unit = if whole >= 3_600_000_000_000 {
+            "h:min:s"
+        } else {
+            "min:s"
+        };
         canvas.text_end(axis.left - 0.9, middle, Type::Small, ink::QUIET, unit);
     }
     let mut at = 0_i64;
@@ -154,7 +158,9 @@ fn staircase(
     for (phase, title) in source.phases.iter().zip(titles).rev() {
         let wide = canvas.width(title, Type::Small) + 0.7;
         let left = axis.x(phase.span.start).min(axis.right - wide);
-        let under = placed.iter().filter(|(other, ..)| left + wide + 1.2 > *other);
+        let under = placed
+            .iter()
+            .filter(|(other, ..)| left + wide + 1.2 > *other);
         let row = under.map(|(.., row)| row + 1).max().unwrap_or(0);
         placed.push((left, wide, row));
     }
@@ -167,7 +173,11 @@ fn staircase(
     for ((phase, title), (left, _, row)) in source.phases.iter().zip(titles).zip(&placed) {
         let middle = y + 0.5 + line * (*row as f64 + 0.5);
         let x = axis.x(phase.span.start).max(axis.left + 0.1);
-        canvas.line(Point::new(x, y), Point::new(x, middle + line / 2.0), &leader);
+        canvas.line(
+            Point::new(x, y),
+            Point::new(x, middle + line / 2.0),
+            &leader,
+        );
         canvas.text(left + 0.7, middle, Type::Small, ink::TEXT, title);
     }
     Some(y + 0.5 + line * rows as f64)

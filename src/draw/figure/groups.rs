@@ -68,7 +68,11 @@ fn together(source: &Source<'_>, group: &Group, tracks: &[Track]) -> Track {
     let whole = source.span();
     let life = |span: Span| Life {
         span,
-        begins: members().any(|t| t.lives.iter().any(|l| l.begins && l.span.start == span.start)),
+        begins: members().any(|t| {
+            t.lives
+                .iter()
+                .any(|l| l.begins && l.span.start == span.start)
+        }),
         ends: members().any(|t| t.lives.iter().any(|l| l.ends && l.span.end == span.end)),
         is_inferred: false,
     };
@@ -82,7 +86,10 @@ fn together(source: &Source<'_>, group: &Group, tracks: &[Track]) -> Track {
         nodes: members().flat_map(|t| &t.nodes).copied().collect(),
         topic: None,
         lives: merged(lives, 0).into_iter().map(life).collect(),
-        bars: merged(sends, whole.nanos() / 83).into_iter().map(bar).collect(),
+        bars: merged(sends, whole.nanos() / 83)
+            .into_iter()
+            .map(bar)
+            .collect(),
         hz: members().filter_map(|t| t.hz).reduce(|a, b| a + b),
     }
 }

@@ -62,7 +62,10 @@ fn returns(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
         Incident {
             at: to,
             track: at,
-            text: format!("{name} {what} after {}", words::duration(away / SECOND * SECOND)),
+            text: format!(
+                "{name} {what} after {}",
+                words::duration(away / SECOND * SECOND)
+            ),
             weight: 2.0 + away as f64 / whole.nanos().max(1) as f64,
         }
     };
@@ -89,7 +92,12 @@ fn rates(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
     if let Some(topic) = track.topic {
         let sent = source.topic_sent(topic);
         for stretch in source.topic_sending(topic) {
-            all.extend(stepped(source, at, (stretch, &sent), last_part(&track.name)));
+            all.extend(stepped(
+                source,
+                at,
+                (stretch, &sent),
+                last_part(&track.name),
+            ));
         }
     }
     for edge in source.publications(&track.nodes) {
@@ -97,7 +105,11 @@ fn rates(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
         let Some(of) = source.mission.elements.publishes.get(edge as usize) else {
             continue;
         };
-        let what = format!("{}: {}", last_part(&track.name), relative(source.topic(of.topic), &track.name));
+        let what = format!(
+            "{}: {}",
+            last_part(&track.name),
+            relative(source.topic(of.topic), &track.name)
+        );
         for stretch in source.sending(edge) {
             all.extend(stepped(source, at, (stretch, &sent), &what));
         }
@@ -161,12 +173,17 @@ pub(crate) fn handovers(source: &Source<'_>, tracks: &[Track]) -> (Vec<Handover>
                 pairs.entry((from, to)).or_default().insert(*topic);
             }
         }
-        all.extend(pairs.into_iter().map(|((from, to), ids)| Handover {
-            at: phase.span.start,
-            from,
-            to,
-            topics: ids.iter().map(|t| last_part(source.topic(*t)).to_owned()).collect(),
-            ids: ids.into_iter().collect(),
+        all.extend(pairs.into_iter().map(|((from, to), ids)| {
+            Handover {
+                at: phase.span.start,
+                from,
+                to,
+                topics: ids
+                    .iter()
+                    .map(|t| last_part(source.topic(*t)).to_owned())
+                    .collect(),
+                ids: ids.into_iter().collect(),
+            }
         }));
     }
     let left = all.len().saturating_sub(MOST.1);

@@ -30,10 +30,18 @@ pub(crate) fn items(lives: &Lives<'_>) -> Vec<Item> {
             "sends (height: share of the row’s most)",
         ),
         (silent, (3.2, thin), "silent"),
-        (all_lives().any(|l| l.is_inferred), (3.2, dashed), "alive by inference"),
+        (
+            all_lives().any(|l| l.is_inferred),
+            (3.2, dashed),
+            "alive by inference",
+        ),
         (all_lives().any(|l| l.begins), (0.6, tick), "starts"),
         (all_lives().any(|l| l.ends), (1.2, end), "ends"),
-        (!lives.handovers.is_empty(), (3.2, arrow), "topic changes hands"),
+        (
+            !lives.handovers.is_empty(),
+            (3.2, arrow),
+            "topic changes hands",
+        ),
     ];
     let drawn = all.into_iter().filter(|(is, ..)| *is);
     let item = |(_, sign, words): (bool, Sign, &str)| {

@@ -37,7 +37,7 @@ fn cheapest(octaves: &[f64], all: &[f64], price: f64) -> Vec<usize> {
             .map(|k| if costs[k] <= jump { k } else { best })
             .collect();
         costs = (0..all.len())
-            .map(|k| costs[from[k]].min(jump) + (octave - all[k]).abs())
+            .map(|k| costs[k].min(jump) + (octave - all[k]).abs())
             .collect();
         back.push(from);
     }
@@ -82,7 +82,10 @@ mod tests {
 
     #[test]
     fn jitter_is_flat_and_a_drop_is_a_step() {
-        assert_eq!(rounded(&[30.0, 29.0, 30.0, 31.0, 30.0]).iter().min(), rounded(&[30.0, 29.0, 30.0, 31.0, 30.0]).iter().max());
+        assert_eq!(
+            rounded(&[30.0, 29.0, 30.0, 31.0, 30.0]).iter().min(),
+            rounded(&[30.0, 29.0, 30.0, 31.0, 30.0]).iter().max()
+        );
         let drop = rounded(&[32.0, 32.0, 32.0, 32.0, 4.0, 4.0, 4.0, 4.0]);
         assert_eq!(drop, [32, 32, 32, 32, 4, 4, 4, 4]);
     }

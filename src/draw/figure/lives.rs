@@ -24,8 +24,6 @@ const CROSS: f64 = 0.5;
 const LETTER: f64 = 1.08;
 /// How far letters and arrows keep from each other in millimetres.
 const APART: f64 = 2.3;
-/// The width of the column of rates.
-const RATES: f64 = 5.2;
 /// From this width on a column says who sends and receives what, this wide.
 pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
 
@@ -84,7 +82,11 @@ impl<'a> Lives<'a> {
 
     /// The height of band, rows and axis in millimetres.
     pub(crate) fn height(&self, canvas: &Canvas<'_>) -> f64 {
-        let band = if self.source.phases.is_empty() { 0.0 } else { band::HEIGHT + 0.9 };
+        let band = if self.source.phases.is_empty() {
+            0.0
+        } else {
+            band::HEIGHT + 0.9
+        };
         band + self.rows.len() as f64 * canvas.sizes.pitch() + 0.4 + canvas.sizes.line() + 1.2
     }
 
@@ -105,7 +107,12 @@ impl<'a> Lives<'a> {
     pub(crate) fn draw(&self, canvas: &mut Canvas<'_>, place: &Place) -> f64 {
         let pitch = canvas.sizes.pitch();
         let phases = self.source.phases;
-        let top = place.top + if phases.is_empty() { 0.0 } else { band::HEIGHT + 0.9 };
+        let top = place.top
+            + if phases.is_empty() {
+                0.0
+            } else {
+                band::HEIGHT + 0.9
+            };
         let bottom = top + self.rows.len() as f64 * pitch + 0.4;
         canvas.begin("phases");
         self.columns(canvas, place, bottom);
@@ -153,10 +160,20 @@ impl<'a> Lives<'a> {
                 canvas.line(from, Point::new(x, bottom), &dashed);
             }
             band::band(canvas, &place.axis, place.top, phases);
-            canvas.text_end(place.axis.left - 0.9, middle, Type::Small, ink::QUIET, "phase");
+            canvas.text_end(
+                place.axis.left - 0.9,
+                middle,
+                Type::Small,
+                ink::QUIET,
+                "phase",
+            );
         }
         // Without a band the heads stand in the row of the first namespace, or above it.
-        let head = if phases.is_empty() { place.top - canvas.sizes.line() / 2.0 } else { middle };
+        let head = if phases.is_empty() {
+            place.top - canvas.sizes.line() / 2.0
+        } else {
+            middle
+        };
         if let Some(right) = place.rates {
             canvas.text_end(right, head, Type::Small, ink::QUIET, "Hz");
         }
@@ -229,7 +246,10 @@ impl<'a> Lives<'a> {
             };
             let (low, high) = (from.min(to), from.max(to));
             let mut x = place.axis.x(handover.at);
-            while taken.iter().any(|(o, a, b)| (o - x).abs() < 1.0 && low < *b && *a < high) {
+            while taken
+                .iter()
+                .any(|(o, a, b)| (o - x).abs() < 1.0 && low < *b && *a < high)
+            {
                 x += 1.0;
             }
             let side = if to > from { -1.0 } else { 1.0 };
@@ -238,7 +258,10 @@ impl<'a> Lives<'a> {
             canvas.disc(Point::new(x, from), 0.55, ink::CHANGED, &Stroke::default());
             canvas.head(Point::new(x, from), tip, 1.3, ink::CHANGED);
             taken.push((x, low, high));
-            let pair = (handover.from.min(handover.to), handover.from.max(handover.to));
+            let pair = (
+                handover.from.min(handover.to),
+                handover.from.max(handover.to),
+            );
             if !told.contains(&pair) {
                 told.push(pair);
                 let text = words::some_of(&handover.topics, 1);
@@ -290,12 +313,18 @@ fn letter(
 /// The letter of an incident: a, b, c, …
 pub(crate) fn sign(k: usize) -> String {
     let letters = "abcdefghijklmnopqrstuvwxyz";
-    letters.chars().nth(k).map_or_else(String::new, String::from)
+    letters
+        .chars()
+        .nth(k)
+        .map_or_else(String::new, String::from)
 }
 
 fn rate(canvas: &mut Canvas<'_>, place: &Place, y: f64, hz: Option<f64>) {
     let Some(right) = place.rates else { return };
-    let text = hz.map_or("–".to_owned(), |hz| words::number(words::significant(hz, 2)));
+    // Two digits from 1 Hz on, one below: more is not known, and not needed.
+    let digits = |hz: f64| if hz < 0.95 { 1 } else { 2 };
+    let shown = |hz: f64| words::number(words::significant(hz, digits(hz)));
+    let text = hz.map_or("–".to_owned(), shown);
     canvas.text_end(right, y, Type::Small, ink::QUIET, &text);
 }
 
@@ -318,7 +347,11 @@ fn lines(canvas: &mut Canvas<'_>, place: &Place, y: f64, track: &Track) {
 }
 
 fn thin(canvas: &mut Canvas<'_>, place: &Place, y: f64, life: &Life) {
-    let dash = if life.is_inferred { vec![0.55, 0.5] } else { Vec::new() };
+    let dash = if life.is_inferred {
+        vec![0.55, 0.5]
+    } else {
+        Vec::new()
+    };
     let stroke = Stroke {
         color: ink::LINE,
         width: 0.28,
@@ -356,14 +389,21 @@ fn talk(canvas: &mut Canvas<'_>, source: &Source<'_>, track: &Track, place: (f64
     let name = &track.name;
     if let Some(topic) = track.topic {
         let elements = &source.mission.elements;
-        let kind = elements.topics.get(topic as usize).map(|t| t.types.join(", "));
+        let kind = elements
+            .topics
+            .get(topic as usize)
+            .map(|t| t.types.join(", "));
         let text = canvas.cut(&kind.unwrap_or_default(), Type::Small, width);
         canvas.text(x, y, Type::Small, ink::QUIET, &text);
         return;
     }
     let (sends, receives) = (sent_by(source, track), received_by(source, track));
     let list = |topics: &[&str], most: usize| {
-        let told: Vec<&str> = topics.iter().take(most).map(|t| relative(t, name)).collect();
+        let told: Vec<&str> = topics
+            .iter()
+            .take(most)
+            .map(|t| relative(t, name))
+            .collect();
         match topics.len() - told.len() {
             0 => told.join(", "),
             more => format!("{} +{more}", told.join(", ")),
@@ -378,7 +418,11 @@ fn talk(canvas: &mut Canvas<'_>, source: &Source<'_>, track: &Track, place: (f64
     loop {
         let (left, right) = (said(&sends, "→", a), said(&receives, "←", b));
         let wide = canvas.width(&left, Type::Small);
-        let gap = if left.is_empty() || right.is_empty() { 0.0 } else { between };
+        let gap = if left.is_empty() || right.is_empty() {
+            0.0
+        } else {
+            between
+        };
         let whole = wide + gap + canvas.width(&right, Type::Small);
         if whole <= width || (a <= 1 && b <= 1) {
             let left = canvas.cut(&left, Type::Small, width);
@@ -400,8 +444,14 @@ fn sent_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
     for edge in source.publications(&track.nodes) {
         let count: f64 = source.sent(edge).iter().sum();
         let seconds: i64 = source.sending(edge).iter().map(|s| s.nanos()).sum();
-        let hz = if seconds > 0 { count / (seconds as f64 / 1e9) } else { 0.0 };
-        if let Some(of) = source.mission.elements.publishes.get(edge as usize) {
+        let hz = if seconds > 0 {
+            count / (seconds as f64 / 1e9)
+        } else {
+            0.0
+        };
+        if let Some(of) = source.mission.elements.publishes.get(edge as usize)
+            && !source.is_hub(of.topic)
+        {
             rated.push((hz, source.topic(of.topic)));
         }
     }
@@ -417,7 +467,9 @@ fn sent_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
 
 fn received_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
     let all = &source.mission.elements.subscribes;
-    let own = all.iter().filter(|e| track.nodes.contains(&e.node) && source.shows(e.topic));
+    let own = all.iter().filter(|e| {
+        track.nodes.contains(&e.node) && source.shows(e.topic) && !source.is_hub(e.topic)
+    });
     let mut names: Vec<&str> = own.map(|e| source.topic(e.topic)).collect();
     names.sort_unstable();
     names.dedup();

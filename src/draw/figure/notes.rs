@@ -39,7 +39,11 @@ pub(crate) fn flow(canvas: &mut Canvas<'_>, width: f64, y: f64, items: &[Item]) 
             pen.put(canvas, run);
         }
     }
-    if items.is_empty() { y } else { pen.y + line / 2.0 }
+    if items.is_empty() {
+        y
+    } else {
+        pen.y + line / 2.0
+    }
 }
 
 /// A sentence of ordinary words.

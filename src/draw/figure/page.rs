@@ -14,6 +14,9 @@ use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::draw::text::Fonts;
 
+/// The shortest time axis in millimetres on which anything can be seen.
+const SHORTEST_AXIS: f64 = 15.0;
+
 /// What a page is made of.
 pub(crate) struct Sheet<'a> {
     pub(crate) source: &'a Source<'a>,
@@ -59,7 +62,10 @@ impl<'a> Sheet<'a> {
             scene = self.lives_page(&first).filter(fits);
         }
         if scene.is_none() && !by_topics && matches!(self.options.rows, None | Some(Rows::Groups)) {
-            let groups = Lives::of(self.source, super::groups::tracks(self.source, &first.tracks));
+            let groups = Lives::of(
+                self.source,
+                super::groups::tracks(self.source, &first.tracks),
+            );
             scene = self.lives_page(&groups).filter(fits);
             if scene.is_some() && !is_grouped {
                 let many = words::count(first.tracks.len(), "node");
@@ -84,16 +90,34 @@ impl<'a> Sheet<'a> {
         }
         y = flow(&mut canvas, width, y, &incident_items(lives));
         if !self.options.is_bare {
-            y = flow(&mut canvas, width, y, &lives_notes(lives, place.talk.is_some()));
+            y = flow(
+                &mut canvas,
+                width,
+                y,
+                &lives_notes(lives, place.talk.is_some()),
+            );
             y = flow(&mut canvas, width, y + 0.15, &legend::items(lives));
         }
-        let what = if lives.is_of_topics() { "Life lines of topics" } else { "Life lines" };
+        let what = if lives.is_of_topics() {
+            "Life lines of topics"
+        } else {
+            "Life lines"
+        };
         Some(canvas.into_scene(Size::new(width, y + 0.3), self.title(what)))
     }
 
     /// Why it does not fit, and which namespace would.
     fn too_high(&self, lives: &Lives<'_>) -> Error {
         let canvas = self.canvas();
+        let width = self.options.width_mm;
+        if lives_place(lives, &canvas, width).is_none() {
+            let names = lives.names_width(&canvas, WIDE.0);
+            let enough = libm::ceil(names + SHORTEST_AXIS + 6.0);
+            return Error::usage(
+                format!("{width} mm leave no room for time beside the names"),
+                format!("`--width {enough}mm` would do"),
+            );
+        }
         let high = lives.height(&canvas);
         let most = ((MOST_HEIGHT - 30.0) / self.sizes.pitch()) as usize;
         let mut spaces: Vec<(&str, usize)> = Vec::new();
@@ -106,7 +130,11 @@ impl<'a> Sheet<'a> {
         }
         let fitting = spaces.iter().filter(|(_, many)| *many <= most);
         let best = fitting.max_by_key(|(name, many)| (*many, std::cmp::Reverse(*name)));
-        let flag = if lives.is_of_topics() { "--topic-filter" } else { "--ns-filter" };
+        let flag = if lives.is_of_topics() {
+            "--topic-filter"
+        } else {
+            "--ns-filter"
+        };
         let hint = best.map_or_else(
             || format!("at most {most} rows fit; narrow it with `{flag}`"),
             |(name, many)| format!("`{flag} '{name}/.*'` leaves {many} rows; at most {most} fit"),
@@ -142,8 +170,12 @@ fn lives_place(lives: &Lives<'_>, canvas: &Canvas<'_>, width: f64) -> Option<Pla
     let talk = if width >= WIDE.0 { WIDE.1 + 1.8 } else { 0.0 };
     let right = width - talk - 5.2;
     let left = names.max(canvas.width("min:s", Type::Small) + 1.5);
-    let top = if lives.source.phases.is_empty() { canvas.sizes.line() } else { 0.0 };
-    (right - left > 15.0).then_some(Place {
+    let top = if lives.source.phases.is_empty() {
+        canvas.sizes.line()
+    } else {
+        0.0
+    };
+    (right - left >= SHORTEST_AXIS).then_some(Place {
         top,
         left: 0.0,
         axis: Axis {
@@ -174,13 +206,19 @@ fn lives_notes(lives: &Lives<'_>, is_told: bool) -> Vec<Item> {
     let mut items = Vec::new();
     for row in lives.rows.iter().filter(|_| !is_told) {
         if let Row::Folded(all, space) = row {
-            let names: Vec<&str> = all.iter().map(|at| last_part(&lives.tracks[*at].name)).collect();
+            let names: Vec<&str> = all
+                .iter()
+                .map(|at| last_part(&lives.tracks[*at].name))
+                .collect();
             let text = format!("Throughout in {space}: {}.", names.join(", "));
             items.push(sentence(ink::QUIET, text));
         }
     }
     if lives.unmarked > 0 {
-        let text = format!("{} not marked.", words::count(lives.unmarked, "smaller change"));
+        let text = format!(
+            "{} not marked.",
+            words::count(lives.unmarked, "smaller change")
+        );
         items.push(sentence(ink::QUIET, text));
     }
     items

@@ -123,7 +123,12 @@ fn in_order(tracks: &[Track], whole: Span, mut own: Vec<usize>) -> Vec<usize> {
         }
         last = Some(start);
     }
-    let end = |at: usize| tracks[at].end().since(whole.start) / grid;
+    let end = |at: usize| {
+        let ends = tracks[at].lives.last().is_some_and(|l| l.ends);
+        ends.then(|| tracks[at].end().since(whole.start) / grid)
+    };
+    // Who never ends comes first.
+    let end = |at: usize| end(at).unwrap_or(i64::MAX);
     for burst in &mut bursts {
         burst.sort_by(|a, b| {
             let late = end(*b).cmp(&end(*a));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::base::name::is_quiet;
+use crate::base::name::{is_quiet, last_part};
 use crate::base::time::Span;
 use crate::graph::{EdgeId, NodeId, State, TopicId};
 use crate::mission::Mission;
@@ -73,6 +73,12 @@ impl<'a> Source<'a> {
         self.topics.get(topic as usize) == Some(&true)
     }
 
+    /// Whether everybody is on this topic, so that arrows and lists of it say nothing: transforms, diagnostics, bonds.
+    pub(crate) fn is_hub(&self, topic: TopicId) -> bool {
+        let last = last_part(self.topic(topic));
+        matches!(last, "tf" | "tf_static" | "bond") || last.starts_with("diagnostics")
+    }
+
     pub(crate) fn topic(&self, id: TopicId) -> &str {
         let topic = self.mission.elements.topics.get(id as usize);
         topic.map_or("", |t| t.name.as_str())
@@ -80,7 +86,10 @@ impl<'a> Source<'a> {
 
     /// The topics that are shown.
     pub(crate) fn shown_topics(&self) -> impl Iterator<Item = TopicId> + '_ {
-        (0..).zip(&self.topics).filter(|(_, is)| **is).map(|(id, _)| id)
+        (0..)
+            .zip(&self.topics)
+            .filter(|(_, is)| **is)
+            .map(|(id, _)| id)
     }
 
     /// The publications of some nodes on shown topics.

@@ -20,7 +20,10 @@ pub(crate) fn caption(source: &Source<'_>, options: &Options, remarks: &[String]
     if let Some(bag) = source.mission.bags.first() {
         let length = words::duration(source.span().nanos());
         let name = escaped(&words::visible(&bag.name));
-        parts.push(format!("Bag \\texttt{{{name}}}, {length}; bagreel {}.", env!("CARGO_PKG_VERSION")));
+        parts.push(format!(
+            "Bag \\texttt{{{name}}}, {length}; bagreel {}.",
+            env!("CARGO_PKG_VERSION")
+        ));
     }
     if options.is_bare {
         parts.push(legend(options.kind).to_owned());
@@ -33,7 +36,9 @@ fn what(kind: Kind) -> &'static str {
     match kind {
         Kind::Lives => "What was alive when, how busily it sent, and what changed.",
         Kind::Map => "Who talks to whom, and in which phases.",
-        Kind::Steps => "The reconfigurations one after the other: what began, what ended, what changed hands.",
+        Kind::Steps => {
+            "The reconfigurations one after the other: what began, what ended, what changed hands."
+        }
     }
 }
 
@@ -101,7 +106,10 @@ mod tests {
 
     #[test]
     fn names_are_no_commands() {
-        assert_eq!(escaped("/a_b%{x}\\input"), "/a\\_b\\%\\{x\\}\\textbackslash{}input");
+        assert_eq!(
+            escaped("/a_b%{x}\\input"),
+            "/a\\_b\\%\\{x\\}\\textbackslash{}input"
+        );
         assert_eq!(escaped("(+4 −3)"), "(+4 $-$3)");
     }
 }

@@ -89,13 +89,24 @@ fn node(source: &Source<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
             *sum += count;
         }
     }
-    let hz = each.iter().filter_map(|(edge, spans)| rate(&source.sent(*edge), spans));
+    let hz = each
+        .iter()
+        .filter_map(|(edge, spans)| rate(&source.sent(*edge), spans));
+    let lives = lives(source, nodes, &sends);
+    let mut bars = bars(source, &sends, &sent);
+    if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
+        && !life.ends
+        && life.span.end.since(bar.span.end) <= silence(whole)
+    {
+        // The recording ended between two messages.
+        bar.span.end = life.span.end;
+    }
     Track {
         name: Arc::clone(role),
         nodes: nodes.to_vec(),
         topic: None,
-        lives: lives(source, nodes, &sends),
-        bars: bars(source, &sends, &sent),
+        lives,
+        bars,
         hz: hz.reduce(|a, b| a + b),
     }
 }
@@ -168,7 +179,10 @@ fn lives(source: &Source<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<Life> {
             start: start.unwrap_or(run.start),
             end: end.unwrap_or(run.end),
         };
-        let inside = cells.iter().zip(&known).filter(|(c, _)| run.contains(c.span.start));
+        let inside = cells
+            .iter()
+            .zip(&known)
+            .filter(|(c, _)| run.contains(c.span.start));
         let (mut all, mut inferred) = (0, 0);
         for (_, degree) in inside {
             all += 1;
@@ -202,7 +216,11 @@ pub(crate) fn steps(source: &Source<'_>, stretch: Span, sent: &[f64]) -> Vec<Bar
     let seconds = |k: usize| overlap(cells[k].span, stretch).max(1) as f64 / 1e9;
     let count: f64 = sent.iter().sum();
     let reach = libm::ceil(ENOUGH / (count / cells.len().max(1) as f64).max(1e-6));
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the cells")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most the cells"
+    )]
     let reach = (reach.clamp(1.0, cells.len().max(1) as f64) as usize - 1) / 2;
     let rates: Vec<f64> = (0..cells.len())
         .map(|k| {
