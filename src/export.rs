@@ -29,7 +29,7 @@ use crate::base::error::{Error, Result};
 
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
-pub use encoder::{Encoder, Format, Frame, Needs, Start, Written};
+pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Start, Written};
 use sequence::Sequence;
 use target::Target;
 
@@ -51,7 +51,7 @@ pub const FORMATS: &[Format] = &[
         word: "svg",
         what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
         start: start_svg,
-        is_figure: true,
+        whole: OneDrawing::Asked,
         ..PICTURE
     },
     Format {
@@ -82,14 +82,14 @@ pub const FORMATS: &[Format] = &[
         word: "pdf",
         what: "a page per window as vectors, or the `--strip`",
         start: pdf::start,
-        is_figure: true,
+        whole: OneDrawing::Asked,
         ..PICTURE
     },
     Format {
         word: "tex",
         what: "the lines that put a `--figure` into LaTeX, with a caption",
         start: tex::start,
-        is_figure: true,
+        whole: OneDrawing::Asked,
         ..PICTURE
     },
     Format {
@@ -206,7 +206,7 @@ pub fn check(outputs: &[Output], inputs: &[PathBuf]) -> Result<()> {
 
 /// Whether a sequence of this many windows needs a strip for these outputs even if none was asked for.
 pub fn needs_strip(outputs: &[Output], windows: usize) -> bool {
-    let strip = |o: &Output| o.format.is_strip && !o.target.is_numbered();
+    let strip = |o: &Output| o.format.whole == OneDrawing::Always && !o.target.is_numbered();
     windows > 1 && outputs.iter().any(strip)
 }
 

@@ -16,7 +16,7 @@ use crate::draw::strip::{Source, Strip, strip};
 use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::Sequence;
-use crate::export::{self, Output, Written};
+use crate::export::{self, OneDrawing, Output, Written};
 use crate::mission::Mission;
 use crate::view::{View, filtered};
 
@@ -51,6 +51,7 @@ impl Render {
             sequence: options::Options::default(),
             outputs,
             captions: None,
+            phases: Phases::Found,
             is_filtered: false,
         })
     }
@@ -103,7 +104,9 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         mission.notices.add(notice);
     }
     // What is not drawn, or drawn as a figure, needs no places.
-    let is_graph = |o: &Output| o.format.is_drawn && !(figure.is_some() && o.format.is_figure);
+    let is_graph = |o: &Output| {
+        o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
+    };
     let is_drawn = job.outputs.iter().any(is_graph);
     let Composed {
         view,

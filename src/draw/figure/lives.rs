@@ -13,7 +13,7 @@ use super::rows::{Row, folded_label, rows};
 use super::source::Source;
 use super::tracks::{Bar, Life, Track, of_nodes, of_topics};
 use crate::base::geometry::{Point, Rect};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::draw::scene::Stroke;
 
@@ -443,7 +443,7 @@ fn sent_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
     let mut rated: Vec<(f64, &str)> = Vec::new();
     for edge in source.publications(&track.nodes) {
         let count: f64 = source.sent(edge).iter().sum();
-        let seconds: i64 = source.sending(edge).iter().map(|s| s.nanos()).sum();
+        let seconds: i64 = source.sending(edge).iter().map(Span::nanos).sum();
         let hz = if seconds > 0 {
             count / (seconds as f64 / 1e9)
         } else {

@@ -93,7 +93,7 @@ impl Place {
         }
         let breaks = text.match_indices(' ').map(|(at, _)| at + 1);
         let fits = |at: &usize| canvas.width(text[..*at].trim_end(), of) <= room;
-        let at = breaks.clone().filter(fits).last();
+        let at = breaks.clone().rfind(fits);
         // A first word that is too long for the rest of the line goes to the next one; one that is too long for any
         // line stands out.
         let at = at.or_else(|| (self.x > 0.0).then_some(0));

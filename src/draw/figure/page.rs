@@ -119,6 +119,11 @@ impl<'a> Sheet<'a> {
             );
         }
         let high = lives.height(&canvas);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "72 rows or so"
+        )]
         let most = ((MOST_HEIGHT - 30.0) / self.sizes.pitch()) as usize;
         let mut spaces: Vec<(&str, usize)> = Vec::new();
         for track in &lives.tracks {
