@@ -215,10 +215,12 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         },
         sequence: crate::export::sequence::Options {
             append_to: summary(),
+            figure: look::figure(&args.figure, &args.look)?,
             ..look::sequence(&args.sequence)?
         },
         outputs,
         captions: args.look.captions.clone(),
+        phases: look::phases(&args.figure.phases),
         is_filtered: args.view.filtered,
         reading,
     })

@@ -20,6 +20,7 @@ pub mod sequence;
 pub mod sink;
 mod svg;
 pub mod target;
+mod tex;
 mod video;
 
 use std::path::{Path, PathBuf};
@@ -28,7 +29,7 @@ use crate::base::error::{Error, Result};
 
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
-pub use encoder::{Encoder, Format, Frame, Needs, Start, Written};
+pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Start, Written};
 use sequence::Sequence;
 use target::Target;
 
@@ -50,6 +51,7 @@ pub const FORMATS: &[Format] = &[
         word: "svg",
         what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
         start: start_svg,
+        whole: OneDrawing::Asked,
         ..PICTURE
     },
     Format {
@@ -80,6 +82,14 @@ pub const FORMATS: &[Format] = &[
         word: "pdf",
         what: "a page per window as vectors, or the `--strip`",
         start: pdf::start,
+        whole: OneDrawing::Asked,
+        ..PICTURE
+    },
+    Format {
+        word: "tex",
+        what: "the lines that put a `--figure` into LaTeX, with a caption",
+        start: tex::start,
+        whole: OneDrawing::Asked,
         ..PICTURE
     },
     Format {
@@ -132,7 +142,7 @@ const POSTER: &Format = &Format {
 
 /// Drawings where that is what is asked for, else one that moves.
 fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    let is_sequence = sequence.view.frames.len() > 1 && sequence.options.strip.is_none();
+    let is_sequence = sequence.view.frames.len() > 1 && !sequence.options.is_one_drawing();
     if is_sequence && !target.is_numbered() {
         animated_svg::start(sequence, target)
     } else {
@@ -196,7 +206,7 @@ pub fn check(outputs: &[Output], inputs: &[PathBuf]) -> Result<()> {
 
 /// Whether a sequence of this many windows needs a strip for these outputs even if none was asked for.
 pub fn needs_strip(outputs: &[Output], windows: usize) -> bool {
-    let strip = |o: &Output| o.format.is_strip && !o.target.is_numbered();
+    let strip = |o: &Output| o.format.whole == OneDrawing::Always && !o.target.is_numbered();
     windows > 1 && outputs.iter().any(strip)
 }
 

@@ -40,15 +40,15 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
-    ("draw", &[&["text"], &["style"], &["scene"], &["picture"], &["paint", "strip"]]),
+    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["animated_svg", "apng", "csv", "dot", "gif", "html", "json", "mermaid", "pdf", "png", "svg", "video"],
+        &["animated_svg", "apng", "csv", "dot", "gif", "html", "json", "mermaid", "pdf", "png", "svg", "tex", "video"],
         &["report", "run"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["export", "survey"]]),
+    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "survey"]]),
     ("cli", &[&["args", "terminal"], &["look"]]),
 ];
 

@@ -120,6 +120,7 @@ fn run(
         picture: &Discs,
         painter: &Painter::new(&fonts),
         fonts: &fonts,
+        latex: None,
         strip: None,
         options,
     };

@@ -13,6 +13,7 @@ mod cli;
 mod docs;
 mod encode;
 mod evidence;
+mod figures;
 mod layout;
 mod pages;
 mod phases;

@@ -64,6 +64,8 @@ pub(super) struct RenderArgs {
     pub(super) look: LookArgs,
     #[command(flatten)]
     pub(super) sequence: SequenceArgs,
+    #[command(flatten)]
+    pub(super) figure: FigureArgs,
     /// Print how long each station took.
     #[arg(long)]
     pub(super) timings: bool,
@@ -250,6 +252,31 @@ pub(super) struct LookArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Figure")]
+pub(super) struct FigureArgs {
+    /// A figure for a paper, `--width` wide (88mm), with text of 6 pt at least: what lives when, who talks to whom, or
+    /// the reconfigurations one by one. For `.pdf`, `.svg`, `.png`, `.webp`; `.tex` includes it.
+    #[arg(long, value_name = "lives", value_parser = ["lives"], conflicts_with_all = [
+        "strip", "style", "size", "fit", "orientation", "layout", "layout_from", "mode", "hide", "group", "collapse",
+        "expand", "rqt_defaults", "show_recorder", "title",
+    ])]
+    pub(super) figure: Option<String>,
+    /// What the rows or boxes of a figure stand for; by default as much as fits.
+    #[arg(long, value_name = "nodes|groups|topics", value_parser = ["nodes", "groups", "topics"], requires = "figure")]
+    pub(super) rows: Option<String>,
+    /// The phases whose beginnings `--figure steps` shows, such as `3,5`. [default: the six that change most]
+    #[arg(long, value_name = "N,M,…", value_delimiter = ',', requires = "figure", value_parser = clap::value_parser!(u16).range(2..))]
+    pub(super) steps: Vec<u16>,
+    /// The size of names in a figure, `7pt` to `12pt`; all else is a point smaller.
+    #[arg(long, value_name = "PT", default_value = "7pt", value_parser = points, requires = "figure")]
+    pub(super) text: f64,
+    /// Phases of the mission: found (`auto`), `none`, or a file with a line per phase (`0:38 navigation`; names alone
+    /// name those that are found).
+    #[arg(long, value_name = "FILE|auto|none", default_value = "auto")]
+    pub(super) phases: String,
+}
+
+#[derive(Debug, Args)]
 #[command(next_help_heading = "Sequence")]
 pub(super) struct SequenceArgs {
     /// How long a window is shown, in milliseconds.
@@ -321,6 +348,12 @@ fn width(text: &str) -> Result<f64, String> {
     let millimetres = text.strip_suffix("mm").and_then(|n| n.parse().ok());
     let millimetres = millimetres.filter(|mm: &f64| (20.0..=2000.0).contains(mm));
     millimetres.ok_or_else(|| "write a width such as `88mm`; 20 to 2000".to_owned())
+}
+
+fn points(text: &str) -> Result<f64, String> {
+    let points = text.strip_suffix("pt").and_then(|n| n.parse().ok());
+    let points = points.filter(|pt: &f64| (7.0..=12.0).contains(pt));
+    points.ok_or_else(|| "write a size such as `8pt`; 7 to 12".to_owned())
 }
 
 fn bytes(text: &str) -> Result<u64, String> {
