@@ -4,8 +4,8 @@
 //! one file below `bag/` and one row in `FORMATS`.
 
 mod adapters;
+mod chunked;
 pub(crate) mod decompress;
-mod index;
 mod input;
 mod mcap;
 mod model;

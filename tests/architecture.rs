@@ -19,7 +19,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[&["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
-        &["adapters", "index", "input"],
+        &["adapters", "input"],
+        &["chunked"],
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[

@@ -1,11 +1,12 @@
 //! The rows of `messages`, part by part, and what is wanted of their payloads.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use super::Bag;
 use super::db::{Db, Refusal, Row};
 use crate::bag::adapters::Gather;
-use crate::bag::decompress::zstd_payload;
+use crate::bag::decompress::{Allowance, zstd_payload};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
@@ -23,6 +24,8 @@ pub(super) struct Rows<'a> {
     wants: &'a [Want],
     /// Whether the sizes of all payloads are told.
     sized: bool,
+    /// For payloads that are compressed one by one.
+    allowance: Arc<Allowance>,
 }
 
 /// Rows that say nothing.
@@ -42,6 +45,7 @@ impl<'a> Rows<'a> {
             sql,
             wants,
             sized,
+            allowance: Arc::default(),
         }
     }
 
@@ -115,7 +119,8 @@ impl<'a> Rows<'a> {
             return gather.add(id, time, stored, sink);
         }
         let data = row.bytes(4);
-        let size = data.and_then(|data| tell_payload(data, (id, time), want, sink));
+        let size =
+            data.and_then(|data| tell_payload(data, (id, time), want, &self.allowance, sink));
         if size.is_none() {
             let text =
                 "payloads larger than 16 MiB or badly compressed were counted and not looked into";
@@ -158,11 +163,12 @@ fn tell_payload(
     data: &[u8],
     (connection, time): (ConnectionId, Stamp),
     want: Want,
+    allowance: &Arc<Allowance>,
     sink: &mut dyn Sink,
 ) -> Option<u32> {
     let unpacked;
     let data = if data.starts_with(ZSTD) {
-        unpacked = zstd_payload(data, MOST_PAYLOAD)?;
+        unpacked = zstd_payload(data, MOST_PAYLOAD, allowance)?;
         &unpacked
     } else {
         data
