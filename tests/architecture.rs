@@ -20,6 +20,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "input"],
+        &["deferred"],
         &["chunked"],
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),

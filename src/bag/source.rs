@@ -271,6 +271,15 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg(unix)]
+    fn what_is_unpacked_is_for_its_owner_alone() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = Temporary::new().unwrap();
+        let mode = folder.path().metadata().unwrap().permissions().mode();
+        assert_eq!(mode & 0o077, 0, "{mode:o}");
+    }
+
+    #[test]
     fn a_stream_peeks_takes_and_skips_the_same_from_a_file_and_a_reader() {
         let bytes: Vec<u8> = (0..=255).cycle().take(10_000).collect();
         let dir = tempfile::tempdir().unwrap();

@@ -3,6 +3,7 @@
 use std::io;
 
 use super::Grammar;
+use super::forward::next_chunk;
 use super::index::{Body, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless};
 use super::plan::Chunk;
 use super::record::{Record, Stop};
@@ -24,20 +25,42 @@ impl<G: Grammar> Query<'_, G> {
             Ok(index) => index,
             Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
         };
-        if let Some(index) = index {
+        if let Some((index, where_expected)) = index {
             let body = || self.body(chunk).ok().flatten();
-            return self.tell(&index, body, sink);
+            self.tell(&index, body, sink);
+            if !where_expected {
+                self.unnamed(chunk, sink);
+            }
+            return;
         }
         let text = "chunks were read whole, since their index is missing or wrong";
         sink.notice(Notice::new(NoticeKind::Downgraded, text));
-        if let Err(why) = self.walk(chunk, sink) {
+        let mut stream = Stream::of_file(self.source, chunk.start, chunk.end, FAR);
+        if let Err(why) = self.walk(&mut stream, sink) {
             let text = format!("a chunk is damaged inside: {why}");
             sink.notice(Notice::new(NoticeKind::Damaged, text));
         }
+        self.unnamed(chunk, sink);
     }
 
-    /// The chunk's index, if it says exactly what the tail says.
-    fn index(&self, chunk: &Chunk, promised: &IndexSum) -> io::Result<Option<Index>> {
+    /// Reads the chunks that stand behind `chunk` though the tail does not name them.
+    fn unnamed(&self, chunk: &Chunk, sink: &mut dyn Sink) {
+        let Ok(Some(body)) = self.body(chunk) else {
+            return;
+        };
+        let mut stream = Stream::of_file(self.source, body.range.end, chunk.end, FAR);
+        while next_chunk::<G>(&mut stream) {
+            let text = "chunks were read that the index does not name";
+            sink.notice(Notice::new(NoticeKind::Downgraded, text));
+            if let Err(why) = self.walk(&mut stream, sink) {
+                let text = format!("a chunk is damaged inside: {why}");
+                sink.notice(Notice::new(NoticeKind::Damaged, text));
+            }
+        }
+    }
+
+    /// The chunk's index, if it says exactly what the tail says, and whether it stands where it should.
+    fn index(&self, chunk: &Chunk, promised: &IndexSum) -> io::Result<Option<(Index, bool)>> {
         let len = chunk.index.end - chunk.index.start;
         if len > LONGEST_INDEX {
             return Ok(None);
@@ -46,7 +69,7 @@ impl<G: Grammar> Query<'_, G> {
             && let Some(found) = self.index_at(chunk.index.start, len, promised)?
             && (!G::INDEX_IS_GUESSED || found.spans(chunk.first, chunk.last))
         {
-            return Ok(Some(found));
+            return Ok(Some((found, true)));
         }
         let Some(body) = self.body(chunk)? else {
             return Ok(None);
@@ -54,7 +77,8 @@ impl<G: Grammar> Query<'_, G> {
         // Behind a chunk there may be a gap, and headers may be longer than usual.
         let most = (len * 2 + 4096).min(LONGEST_INDEX);
         let len = chunk.end.saturating_sub(body.range.end).min(most);
-        self.index_at(body.range.end, len, promised)
+        let found = self.index_at(body.range.end, len, promised)?;
+        Ok(found.map(|index| (index, false)))
     }
 
     fn index_at(&self, start: u64, len: u64, promised: &IndexSum) -> io::Result<Option<Index>> {
@@ -78,10 +102,9 @@ impl<G: Grammar> Query<'_, G> {
         Ok(how.map(|how| Body { how, range }))
     }
 
-    /// Reads the chunk record by record.
-    fn walk(&self, chunk: &Chunk, sink: &mut dyn Sink) -> Result<(), String> {
-        let mut stream = Stream::of_file(self.source, chunk.start, chunk.end, FAR);
-        let Ok(Record::Chunk(head)) = G::next(&mut stream) else {
+    /// Reads the chunk that `stream` stands at record by record.
+    fn walk(&self, stream: &mut Stream<'_>, sink: &mut dyn Sink) -> Result<(), String> {
+        let Ok(Record::Chunk(head)) = G::next(stream) else {
             return Err("it has no readable head".to_owned());
         };
         let mut walk = Walk {
@@ -89,7 +112,7 @@ impl<G: Grammar> Query<'_, G> {
             gather: Gather::default(),
             sink,
         };
-        let told = unpack(&mut stream, &head, &self.allowance, &mut walk);
+        let told = unpack(stream, &head, &self.allowance, &mut walk);
         walk.gather.flush(walk.sink);
         match told {
             Ok(None) => Ok(()),
