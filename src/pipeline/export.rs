@@ -35,6 +35,23 @@ pub struct Render {
     pub is_filtered: bool,
 }
 
+impl Render {
+    /// Reads so and writes these, everything else as the command line has it.
+    ///
+    /// # Errors
+    /// As [`Drawing::new`].
+    pub fn new(reading: Reading, outputs: Vec<Output>) -> Result<Self> {
+        Ok(Self {
+            reading,
+            drawing: Drawing::new()?,
+            sequence: options::Options::default(),
+            outputs,
+            captions: None,
+            is_filtered: false,
+        })
+    }
+}
+
 /// What came of it.
 #[derive(Debug)]
 pub struct Rendered {
@@ -76,7 +93,7 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
     }
     // What is not drawn needs no places.
-    let is_drawn = job.outputs.iter().any(|o| o.format.is_drawn());
+    let is_drawn = job.outputs.iter().any(|o| o.format.is_drawn);
     let Composed {
         view,
         options,
