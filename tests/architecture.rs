@@ -19,7 +19,9 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[&["words"], &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
-        &["adapters", "index", "input"],
+        &["adapters", "input"],
+        &["deferred"],
+        &["chunked"],
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[

@@ -10,6 +10,7 @@
 
 mod architecture;
 mod cli;
+mod damaged;
 mod docs;
 mod encode;
 mod evidence;
