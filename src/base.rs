@@ -10,4 +10,5 @@ pub(crate) mod leftovers;
 pub mod name;
 pub mod notice;
 pub mod time;
+pub mod words;
 pub(crate) mod yaml;

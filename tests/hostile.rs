@@ -250,7 +250,14 @@ fn the_longest_span_is_drawn() {
         let output = bagreel(dir.path(), &["info", &crafted(name)]);
         assert_eq!(output.status.code(), Some(0), "{name}: {}", errors(&output));
     }
-    let args = ["render", &crafted("06_span292.mcap"), "-p", "all", "-o", "x.gif"];
+    let args = [
+        "render",
+        &crafted("06_span292.mcap"),
+        "-p",
+        "all",
+        "-o",
+        "x.gif",
+    ];
     let output = bagreel(dir.path(), &args);
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
 }
@@ -261,7 +268,10 @@ fn a_clock_that_is_set_late_makes_no_windows_of_fifty_years() {
     let args = ["render", &crafted("08_jump1970.bag"), "-o", "x.json"];
     let output = bagreel(dir.path(), &args);
     let said = errors(&output);
-    assert!(said.contains("impossible time, set aside (300 times)"), "{said}");
+    assert!(
+        said.contains("impossible time, set aside (300 times)"),
+        "{said}"
+    );
     assert!(said.contains(" 6 windows of 20 s"), "{said}");
 }
 

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::stop::Stop;
 use crate::base::error::{Error, Result};
 use crate::base::notice::Notices;
+use crate::base::words::visible;
 use crate::pipeline::{Stage, Watch};
 
 /// Standard error and output, as the user set them up.
@@ -84,7 +85,7 @@ impl Terminal {
     pub fn results(&mut self, text: &str) -> Result<()> {
         let mut out = io::stdout().lock();
         let written = out
-            .write_all(visible(text).as_bytes())
+            .write_all(printable(text).as_bytes())
             .and_then(|()| out.flush());
         match written {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -185,19 +186,13 @@ fn last_words() {
     let _ = writeln!(io::stderr(), "\nerror: {}", Error::Interrupted);
 }
 
-/// Names come from bags: control characters and marks that turn the direction of text are shown, not obeyed.
-pub fn visible(text: &str) -> String {
-    let hidden = |c: char| {
-        (c.is_control() && c != '\n' && c != '\t')
-            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
-    };
+/// Lines as they may be printed, whatever names they hold: all but line ends and tabs is made visible.
+fn printable(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        if hidden(c) {
-            out.extend(c.escape_unicode());
-        } else {
-            out.push(c);
-        }
+    for part in text.split_inclusive(['\n', '\t']) {
+        let kept = part.trim_end_matches(['\n', '\t']);
+        out.push_str(&visible(kept));
+        out.push_str(&part[kept.len()..]);
     }
     out
 }
@@ -208,7 +203,10 @@ mod tests {
 
     #[test]
     fn names_cannot_steer_the_terminal() {
-        assert_eq!(visible("/a\u{1b}[2J\u{202e}b"), "/a\\u{1b}[2J\\u{202e}b");
-        assert_eq!(visible("/größe ✓"), "/größe ✓");
+        assert_eq!(
+            printable("/a\u{1b}[2J\u{202e}b\n"),
+            "/a\\u{1b}[2J\\u{202e}b\n"
+        );
+        assert_eq!(printable("/größe ✓\ta\n\nb"), "/größe ✓\ta\n\nb");
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::base::budget;
 use crate::base::error::{Error, Result};
-use crate::base::time::{Moment, Period, Span, Stamp, short};
+use crate::base::time::{Moment, Period, Span, Stamp};
+use crate::base::words;
 
 const SECOND: i64 = 1_000_000_000;
 /// What a bag shorter than five minutes may get, the longest first.
@@ -105,7 +106,7 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
     Err(Error::usage(
         format!(
             "`--start` and `--end` leave nothing of the {} of this bag",
-            short(bag.nanos())
+            words::period(bag.nanos())
         ),
         format!("the bag covers {} to {}", bag.start, bag.end),
     ))
