@@ -29,10 +29,12 @@ pub fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
             return Err(Error::usage(what, "give every output its own name"));
         }
         if let Some(path) = kept.iter().find(|path| would_harm(target, path)) {
-            let what = match path.is_dir() {
-                true => format!("`{name}` would overwrite a file of `{}`", path.display()),
-                false => format!("`{name}` would overwrite an input"),
+            let whose = if path.is_dir() {
+                format!("a file of `{}`", path.display())
+            } else {
+                "an input".to_owned()
             };
+            let what = format!("`{name}` would overwrite {whose}");
             return Err(Error::usage(what, "give the output another name"));
         }
         check_place(target)?;
