@@ -33,8 +33,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["publishers", "source"],
         &["collector"],
     ]),
-    ("graph", &[&["build", "diff", "window"]]),
-    ("mission", &[&["ledger"], &["events", "json"], &["info"]]),
+    ("graph", &[&["build", "diff", "sending", "window"]]),
+    ("mission", &[&["activity", "ledger"], &["events", "json", "phases"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "filter", "names", "runs", "union"],
         &["options"],

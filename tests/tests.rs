@@ -16,6 +16,7 @@ mod evidence;
 mod hostile;
 mod layout;
 mod pages;
+mod phases;
 mod properties;
 mod reading;
 mod ros2_example;
