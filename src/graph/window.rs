@@ -303,14 +303,14 @@ mod tests {
 
     #[test]
     fn no_span_is_too_long_for_600_windows() {
-        for start in [0, -1, i64::MIN] {
+        for end in [i64::MAX / 2, i64::MAX] {
             let span = Span {
-                start: Stamp(start),
-                end: Stamp::MAX,
+                start: Stamp(0),
+                end: Stamp(end),
             };
             let windows = divide(&Division::default(), span).unwrap();
-            assert!((500..=600).contains(&windows.spans.len()), "{start}");
-            assert_eq!(windows.spans.last().unwrap().end, Stamp::MAX);
+            assert!((500..=600).contains(&windows.spans.len()), "{end}");
+            assert_eq!(windows.spans.last().unwrap().end, Stamp(end));
         }
     }
 
