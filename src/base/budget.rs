@@ -8,6 +8,10 @@ pub(crate) const CHOSEN_WINDOWS: i64 = 600;
 /// The most windows that may be asked for: a bag of a day by the second. Each costs about a kilobyte per element.
 pub(crate) const WINDOWS: i64 = 100_000;
 
+/// The longest mission, in days: nobody records for a hundred years, and sums of three such lengths in nanoseconds still
+/// fit a number.
+pub(crate) const SPAN_DAYS: i64 = 36_525;
+
 /// The longest style, topology or file of captions, in bytes: a hundred times the largest we know.
 pub(crate) const USER_TEXT: u64 = 16 << 20;
 

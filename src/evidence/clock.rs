@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::base::budget;
 use crate::base::time::{Span, Stamp};
 
 const DAY: i64 = 86_400_000_000_000;
@@ -39,22 +40,22 @@ pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
     let is_rare = strangers <= (days.values().sum::<u64>() / RARE).max(1);
     let others = || clusters.iter().filter(|c| *c != bulk);
     let is_unset = bulk.first > UNSET_DAYS && others().all(|c| (0..=UNSET_DAYS).contains(&c.last));
-    if strangers == 0 {
-        return Belief::default();
-    }
-    if strangers < bulk.messages && (is_rare || is_unset) {
+    let whole = clusters.last().map_or(0, |c| c.last) - clusters.first().map_or(0, |c| c.first);
+    let is_too_long = whole >= budget::SPAN_DAYS;
+    if strangers < bulk.messages && (is_rare || is_unset) || is_too_long {
+        let last = bulk.last.min(bulk.first + budget::SPAN_DAYS - 1);
         let span = Span {
             start: Stamp(bulk.first.saturating_mul(DAY)),
-            end: Stamp((bulk.last + 1).saturating_mul(DAY)),
+            end: Stamp((last + 1).saturating_mul(DAY)),
         };
         return Belief {
-            span: Some(span),
+            span: (strangers > 0 || is_too_long).then_some(span),
             jump: None,
         };
     }
     Belief {
         span: None,
-        jump: Some(told(&clusters)),
+        jump: (clusters.len() > 1).then(|| told(&clusters)),
     }
 }
 
@@ -125,6 +126,14 @@ mod tests {
         assert_eq!(kept(&[(0, 249), (20_000, 250)]), Some((20_000, 20_001)));
         assert_eq!(kept(&[(10_957, 249), (20_000, 250)]), None);
         assert_eq!(kept(&[(0, 250), (20_000, 249)]), None);
+    }
+
+    #[test]
+    fn no_mission_is_longer_than_a_hundred_years() {
+        assert_eq!(kept(&[(0, 2), (100_000, 2)]), Some((100_000, 100_001)));
+        assert_eq!(kept(&[(0, 3), (100_000, 2)]), Some((0, 1)));
+        let yearly: Vec<_> = (0..200).map(|year| (year * 365, 1)).collect();
+        assert_eq!(kept(&yearly), Some((0, budget::SPAN_DAYS)));
     }
 
     #[test]

@@ -91,10 +91,20 @@ fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     }
 }
 
+const DAY: i64 = 86_400_000_000_000;
+
 fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let text = file::read_text(path, budget::MISSION_JSON)?;
     let mut mission = read_json(&text, path)?;
     drop(text);
+    if mission.span.nanos() / DAY >= budget::SPAN_DAYS {
+        return Err(Error::BadFile {
+            path: path.to_owned(),
+            line: 0,
+            reason: format!("its windows cover more than {} days", budget::SPAN_DAYS),
+            hint: "times are nanoseconds since 1970".to_owned(),
+        });
+    }
     mission.find_changes(reading.rate_change, &[]);
     mission.activity = Activity::of_windows(&mission);
     if mission.ledger.phases.is_empty() {
