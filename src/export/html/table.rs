@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::base::words;
 use crate::base::words::visible;
-use crate::draw::paint::svg::escape;
+use crate::draw::paint::xml::escape;
 use crate::view::{Frame, View};
 
 /// More windows with changes than this are counted.
