@@ -249,10 +249,7 @@ fn a_mission_of_three_hundred_years_is_none() {
         let output = bagreel(dir.path(), args);
         let said = errors(&output);
         assert_eq!(output.status.code(), Some(0), "{args:?}: {said}");
-        assert!(
-            said.contains("impossible time, set aside"),
-            "{said}"
-        );
+        assert!(said.contains("impossible time, set aside"), "{said}");
     }
     for command in ["info", "events", "render"] {
         let output = bagreel(dir.path(), &[command, &crafted("06_span292.json")]);
