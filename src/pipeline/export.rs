@@ -49,6 +49,7 @@ impl Render {
             sequence: options::Options::default(),
             outputs,
             captions: None,
+            kept: Vec::new(),
             is_filtered: false,
         })
     }
