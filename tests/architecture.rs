@@ -16,7 +16,11 @@ const STATIONS: &[&str] = &[
 /// known to all.
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
-    ("base", &[&["words"], &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
+    ("base", &[
+        &["budget", "leftovers", "words"],
+        &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"],
+        &["file"],
+    ]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "input"],
@@ -50,8 +54,13 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["animated_svg", "apng", "csv", "dot", "gif", "html", "json", "mermaid", "pdf", "png", "svg", "tex", "video"],
         &["report", "run"],
     ]),
+<<<<<<< HEAD
     ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "survey"]]),
     ("cli", &[&["args", "terminal"], &["look"]]),
+=======
+    ("pipeline", &[&["captions", "draw", "read"], &["export", "survey"]]),
+    ("cli", &[&["args", "stop"], &["look", "terminal"]]),
+>>>>>>> safety
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.

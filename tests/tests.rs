@@ -14,7 +14,11 @@ mod damaged;
 mod docs;
 mod encode;
 mod evidence;
+<<<<<<< HEAD
 mod figures;
+=======
+mod hostile;
+>>>>>>> safety
 mod layout;
 mod pages;
 mod phases;
