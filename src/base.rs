@@ -6,5 +6,6 @@ pub mod error;
 pub mod geometry;
 pub mod name;
 pub mod notice;
+pub(crate) mod table;
 pub mod time;
 pub(crate) mod yaml;

@@ -3,7 +3,6 @@
 mod animated_svg;
 mod apng;
 pub mod check;
-mod csv;
 pub mod dot;
 pub(crate) mod encoder;
 mod gif;
@@ -12,6 +11,8 @@ mod json;
 pub mod mermaid;
 pub mod options;
 pub mod palette;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod pdf;
 mod png;
 pub mod report;
@@ -19,6 +20,7 @@ pub mod run;
 pub mod sequence;
 pub mod sink;
 mod svg;
+pub mod tables;
 pub mod target;
 mod video;
 
@@ -139,11 +141,20 @@ pub const FORMATS: &[Format] = &[
     },
     Format {
         word: "csv",
-        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
+        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, ledger, phases, bags",
         is_limited: false,
         is_strip: false,
         check: None,
-        start: csv::start,
+        start: tables::start_csv,
+    },
+    #[cfg(feature = "parquet")]
+    Format {
+        word: "parquet",
+        what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
+        is_limited: false,
+        is_strip: false,
+        check: None,
+        start: tables::start_parquet,
     },
 ];
 

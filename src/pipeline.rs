@@ -3,11 +3,13 @@
 mod captions;
 mod draw;
 mod export;
+mod extract;
 mod read;
 mod survey;
 
 pub use draw::Drawing;
 pub use export::{Render, Rendered, check, render, show};
+pub use extract::{Extract, Extracted, extract};
 pub use read::{Reading, explain, read};
 pub use survey::{is_survey, survey};
 

@@ -16,7 +16,7 @@ const STATIONS: &[&str] = &[
 /// known to all.
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
-    ("base", &[&["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
+    ("base", &[&["digest", "error", "geometry", "name", "notice", "time", "yaml"], &["table"], &["csv"]]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "index", "input"],
@@ -45,11 +45,11 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["animated_svg", "apng", "csv", "dot", "gif", "html", "json", "mermaid", "pdf", "png", "svg", "video"],
-        &["report", "run"],
+        &["animated_svg", "apng", "dot", "gif", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "video"],
+        &["report", "run", "tables"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["export", "survey"]]),
-    ("cli", &[&["args", "terminal"], &["look"]]),
+    ("pipeline", &[&["captions", "draw", "read"], &["export", "extract", "survey"]]),
+    ("cli", &[&["args", "terminal"], &["extract", "look"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
@@ -71,10 +71,16 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "mission/json",
         ],
     ),
-    // Tables of a mission are written as a stream, small ones as text.
-    ("csv", &["base/csv", "export/csv"]),
     // Temporary files: of outputs, of decompressed bags, of times beyond what memory may hold.
-    ("tempfile", &["bag/source", "evidence/times", "export/sink"]),
+    (
+        "tempfile",
+        &[
+            "bag/source",
+            "evidence/times",
+            "export/sink",
+            "export/tables",
+        ],
+    ),
     // Plain functions on numbers, as the standard library's would be.
     ("libm", &[]),
 ];

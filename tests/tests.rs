@@ -19,4 +19,5 @@ mod properties;
 mod reading;
 mod ros2_example;
 mod support;
+mod tables;
 mod warehouse;

@@ -119,7 +119,8 @@ impl Query<'_> {
                 nameless(sink, entries.len() as u64);
                 continue;
             };
-            let known = self.wants[id.0 as usize] > Want::Stamps && self.range.is_none();
+            // Of entries outside the range they are not looked up, and no sink is told of those.
+            let known = self.wants[id.0 as usize] > Want::Stamps;
             let sizes = sizes
                 .as_ref()
                 .filter(|_| known)
