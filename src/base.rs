@@ -8,4 +8,5 @@ pub mod name;
 pub mod notice;
 pub(crate) mod table;
 pub mod time;
+pub mod words;
 pub(crate) mod yaml;

@@ -59,7 +59,9 @@ fn topics_and_times_choose_rows_with_their_sizes() {
     let all = [&["extract", WAREHOUSE, "-o", "all.csv"], &filter[..]].concat();
     ends(dir.path(), &all, 0);
     let part = [
-        &["extract", WAREHOUSE, "-o", "part.csv", "--start", "60", "--end", "1:30"],
+        &[
+            "extract", WAREHOUSE, "-o", "part.csv", "--start", "60", "--end", "1:30",
+        ],
         &filter[..],
     ]
     .concat();
@@ -98,15 +100,18 @@ fn several_bags_are_one_table_in_order() {
 #[test]
 fn every_field_has_a_column() {
     let dir = tempfile::tempdir().unwrap();
-    let args = [
-        "extract", COURIER, "-o", "t", "--fields", "--format", "csv",
-    ];
+    let args = ["extract", COURIER, "-o", "t", "--fields", "--format", "csv"];
     ends(dir.path(), &args, 0);
     let scan = csv(&dir.path().join("t/scan.csv"));
     let head: Vec<&str> = scan[0].iter().map(String::as_str).collect();
     assert_eq!(
         &head[..4],
-        ["time_ns", "header.stamp.sec", "header.stamp.nanosec", "header.frame_id"]
+        [
+            "time_ns",
+            "header.stamp.sec",
+            "header.stamp.nanosec",
+            "header.frame_id"
+        ]
     );
     let ranges = head.iter().position(|c| *c == "ranges").unwrap();
     let ranges: Vec<f32> = serde_json::from_str(&scan[1][ranges]).unwrap();
@@ -150,7 +155,9 @@ fn what_cannot_be_decoded_is_said() {
         "{said}"
     );
     assert!(
-        said.contains("messages of `/known` (std_msgs/String) were left out: they do not have the layout"),
+        said.contains(
+            "messages of `/known` (std_msgs/String) were left out: they do not have the layout"
+        ),
         "{said}"
     );
     assert_eq!(csv(&dir.path().join("t/known.csv")).len(), 10 + 1);
@@ -176,11 +183,11 @@ fn what_makes_no_sense_is_refused() {
 mod parquet {
     use std::fs::File;
 
+    use ::parquet::arrow::arrow_reader::ParquetRecordBatchReader;
     use arrow_array::cast::AsArray as _;
     use arrow_array::types::{Int64Type, TimestampNanosecondType};
-    use arrow_array::{Array as _, RecordBatch};
+    use arrow_array::{RecordBatch, RecordBatchReader as _};
     use arrow_schema::DataType;
-    use ::parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
     use super::*;
 
@@ -221,7 +228,9 @@ mod parquet {
         let kind = |name: &str| schema.field_with_name(name).unwrap().data_type().clone();
         assert_eq!(kind("header.stamp.sec"), DataType::Int32);
         assert_eq!(kind("range_max"), DataType::Float32);
-        assert!(matches!(kind("ranges"), DataType::List(of) if *of.data_type() == DataType::Float32));
+        assert!(
+            matches!(kind("ranges"), DataType::List(of) if *of.data_type() == DataType::Float32)
+        );
         let tf = read(&dir.path().join("t/tf.parquet")).remove(0);
         let schema = tf.schema();
         let name = "transforms.transform.translation.x";
@@ -240,7 +249,6 @@ mod parquet {
             let rows = csv(&dir.path().join(format!("x.{table}.csv")));
             let file = File::open(dir.path().join(format!("x.{table}.parquet"))).unwrap();
             let reader = ParquetRecordBatchReader::try_new(file, 1 << 20).unwrap();
-            use arrow_array::RecordBatchReader as _;
             let schema = reader.schema();
             let names: Vec<&String> = schema.fields().iter().map(|f| f.name()).collect();
             assert_eq!(names, rows[0].iter().collect::<Vec<_>>());

@@ -312,7 +312,9 @@ mod tests {
                 to.push(1);
             }
             if let Values::Texts(to) = &mut batch.columns[1].values {
-                texts.iter().for_each(|t| to.push(t.as_bytes()));
+                for text in texts {
+                    to.push(text.as_bytes());
+                }
             }
         };
         add(&mut batch, &["x", "yz"]);

@@ -12,7 +12,7 @@ use std::ops::Range;
 use super::cursor::{Cursor, Malformed};
 use crate::bag::{Connection, Encoding};
 use crate::base::table::{Batch, Column, Kind, Values};
-use definition::{Definition, Field};
+use definition::{Array, Definition, Field};
 
 /// Messages inside messages deeper than this are hostile.
 const DEEPEST: usize = 16;
@@ -27,28 +27,20 @@ enum Primitive {
     Text,
 }
 
-/// How many elements an array has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Count {
-    Fixed(usize),
-    /// As many as the payload says.
-    Told,
-}
-
 /// The next thing to do with a payload.
 #[derive(Clone, Debug, PartialEq)]
 enum Step {
     One(usize, Primitive),
     /// A list of bytes is one value.
-    Bytes(usize, Count),
+    Bytes(usize, Array),
     /// The list that ends on `level` of each of `columns`.
     List {
-        count: Count,
+        count: Array,
         columns: Range<usize>,
         level: usize,
         /// The fewest bytes that an element takes.
         least: usize,
-        element: Vec<Step>,
+        element: Vec<Self>,
     },
     /// CDR writes a message without fields as one byte.
     Nothing,
@@ -108,7 +100,12 @@ impl Decoder {
     ///
     /// # Errors
     /// If the payload has another layout.
-    pub(crate) fn decode(&self, data: &[u8], batch: &mut Batch, first: usize) -> Result<(), Malformed> {
+    pub(crate) fn decode(
+        &self,
+        data: &[u8],
+        batch: &mut Batch,
+        first: usize,
+    ) -> Result<(), Malformed> {
         let mut payload = Cursor::new(&self.encoding, data)?;
         if !self.is_empty {
             run(&self.steps, &mut payload, &mut batch.columns[first..])?;
@@ -167,18 +164,21 @@ impl Plan<'_> {
                 "its definition has more than {MOST_COLUMNS} fields"
             ));
         }
-        let Some(array) = field.array else {
-            return self.one(message, &field.kind, name, levels, depth);
+        let count = field.array;
+        let bytes = |least: usize| match count {
+            Array::Fixed(count) => least.saturating_mul(count),
+            _ => 4,
         };
-        let count = array.map_or(Count::Told, Count::Fixed);
+        if count == Array::No {
+            return self.one(message, &field.kind, name, levels, depth);
+        }
         if ["uint8", "byte", "char", "octet"].contains(&field.kind.as_str()) {
             let step = Step::Bytes(self.columns.len(), count);
             self.columns.push((name.to_owned(), Kind::Bytes, levels));
-            return Ok((vec![step], array.unwrap_or(4)));
+            return Ok((vec![step], bytes(1)));
         }
         let start = self.columns.len();
         let (element, least) = self.one(message, &field.kind, name, levels + 1, depth)?;
-        let bytes = array.map_or(4, |count| least.saturating_mul(count));
         let list = Step::List {
             count,
             columns: start..self.columns.len(),
@@ -186,7 +186,7 @@ impl Plan<'_> {
             least,
             element,
         };
-        Ok((vec![list], bytes))
+        Ok((vec![list], bytes(least)))
     }
 
     /// A field, or an element of its array.
@@ -274,13 +274,14 @@ fn run(steps: &[Step], payload: &mut Cursor<'_>, columns: &mut [Column]) -> Resu
 }
 
 /// How many elements an array has; never more than the payload has room for.
-fn many(payload: &mut Cursor<'_>, count: Count, least: usize) -> Result<usize, Malformed> {
+fn many(payload: &mut Cursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
     match count {
-        Count::Told => payload.length(least),
-        Count::Fixed(count) if count.saturating_mul(least.max(1)) > payload.remaining() => {
+        Array::Told => payload.length(least),
+        Array::Fixed(count) if count.saturating_mul(least.max(1)) > payload.remaining() => {
             Err(payload.wrong("a whole array"))
         }
-        Count::Fixed(count) => Ok(count),
+        Array::Fixed(count) => Ok(count),
+        Array::No => Ok(1),
     }
 }
 
@@ -313,7 +314,12 @@ fn text(payload: &mut Cursor<'_>, to: &mut Values) -> Result<(), Malformed> {
 }
 
 /// Adds `count` numbers of `size` bytes each.
-fn numbers(payload: &mut Cursor<'_>, count: usize, size: usize, to: &mut Values) -> Result<(), Malformed> {
+fn numbers(
+    payload: &mut Cursor<'_>,
+    count: usize,
+    size: usize,
+    to: &mut Values,
+) -> Result<(), Malformed> {
     let is_big = payload.is_big_endian();
     let data = payload.numbers(count, size)?;
     macro_rules! add {

@@ -1,5 +1,6 @@
 //! A folder of tables while they are written: out of sight until all of them are whole, and few files open at a time.
 
+use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -85,7 +86,10 @@ pub(crate) fn file_stem(topic: &str) -> String {
         match byte {
             b'/' => stem.push('.'),
             b if b.is_ascii_alphanumeric() || b == b'_' || b == b'-' => stem.push(char::from(b)),
-            b => stem.push_str(&format!("%{b:02X}")),
+            b => {
+                // Writing to a string cannot fail.
+                let _ = write!(stem, "%{b:02X}");
+            }
         }
     }
     stem.truncate(LONGEST);

@@ -53,7 +53,7 @@ impl TableFormat {
 
 /// A table being written.
 pub(crate) enum Writer<W: Write + Send> {
-    Csv(csv::Rows<W>),
+    Csv(Box<csv::Rows<W>>),
     #[cfg(feature = "parquet")]
     Parquet(Box<parquet::Rows<W>>),
 }
@@ -68,7 +68,7 @@ impl<W: Write + Send> Writer<W> {
     ) -> io::Result<Self> {
         let _ = facts;
         match format {
-            TableFormat::Csv => csv::Rows::new(to, batch).map(Self::Csv),
+            TableFormat::Csv => Ok(Self::Csv(Box::new(csv::Rows::new(to, batch)?))),
             #[cfg(feature = "parquet")]
             TableFormat::Parquet => {
                 let rows = parquet::Rows::new(to, batch, facts)?;

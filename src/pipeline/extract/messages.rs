@@ -3,7 +3,7 @@
 use super::{Extract, Extracted, of_report, stop};
 use crate::bag::{Connection, ConnectionId, Message, Sink as Takes, Want};
 use crate::base::error::{Error, Result};
-use crate::base::name::TopicName;
+use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, Notices};
 use crate::base::table::{Batch, Cell, Kind};
 use crate::base::time::Stamp;
@@ -77,7 +77,7 @@ impl Taken {
         self.sources.push(Source {
             topic: connection.topic.clone(),
             type_name: Arc::clone(&connection.type_name),
-            publisher: connection.publisher.as_ref().map(|p| p.shared()),
+            publisher: connection.publisher.as_ref().map(NodeName::shared),
             is_sized,
         });
         let id = self.stamps.series();

@@ -6,8 +6,17 @@ pub(super) struct Field {
     pub(super) name: String,
     /// Its type without array and bounds, as written: `float64`, `Point`, `geometry_msgs/Point`.
     pub(super) kind: String,
-    /// If it is an array: its length, where that is fixed.
-    pub(super) array: Option<Option<usize>>,
+    pub(super) array: Array,
+}
+
+/// Whether a field is an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Array {
+    No,
+    /// Of this length.
+    Fixed(usize),
+    /// Of the length that the payload says.
+    Told,
 }
 
 /// A message: its package, its own name, its fields.
@@ -110,12 +119,15 @@ fn field(line: &str) -> Result<Option<Field>, String> {
     }))
 }
 
-/// The length in `[]`, `[<=3]` or `[3]`; `None` without brackets.
-fn length(array: &str) -> Result<Option<Option<usize>>, String> {
+/// The length in `[]`, `[<=3]` or `[3]`.
+fn length(array: &str) -> Result<Array, String> {
     match array.strip_prefix('[').and_then(|a| a.strip_suffix(']')) {
-        None if array.is_empty() => Ok(None),
-        Some(inner) if inner.is_empty() || inner.starts_with("<=") => Ok(Some(None)),
-        Some(inner) if inner.parse::<usize>().is_ok() => Ok(Some(inner.parse().ok())),
-        _ => Err(format!("its definition has an array `{array}`")),
+        None if array.is_empty() => Ok(Array::No),
+        Some(inner) if inner.is_empty() || inner.starts_with("<=") => Ok(Array::Told),
+        Some(inner) => inner
+            .parse()
+            .map(Array::Fixed)
+            .map_err(|_| format!("its definition has an array `{array}`")),
+        None => Err(format!("its definition has an array `{array}`")),
     }
 }

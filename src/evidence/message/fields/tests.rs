@@ -106,8 +106,8 @@ fn hostile_payloads_end_early() {
     data[..4].copy_from_slice(&(1_u32 << 19).to_le_bytes());
     assert!(fails(nothing, &data));
     // A definition that doubles on every level.
-    let doubling: String = (0..20)
-        .map(|k| format!("===\nMSG: a/L{k}\nL{0} a\nL{0} b\n", k + 1))
-        .collect();
+    let level = |k: u32| format!("===\nMSG: a/L{k}\nL{0} a\nL{0} b\n", k + 1);
+    let doubling: Vec<String> = (0..20).map(level).collect();
+    let doubling = doubling.concat();
     assert!(fails(&format!("L0 x\n{doubling}"), &[]));
 }
