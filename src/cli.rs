@@ -1,6 +1,7 @@
 //! What was typed, turned into work; the only file (with its folder) that knows clap and the environment.
 
 mod args;
+mod extract;
 mod look;
 mod stop;
 pub mod terminal;
@@ -26,7 +27,8 @@ use crate::pipeline::{
     Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
 };
 use args::{
-    Command, EventsArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs, TimeArgs, Typed,
+    Command, EventsArgs, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs,
+    TimeArgs, Typed,
 };
 
 const DONE: u8 = 0;
@@ -49,6 +51,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = match typed.command {
         Command::Render(args) => render(&args, &mut terminal),
         Command::Info(args) => info(&args, &mut terminal),
+        Command::Extract(args) => extract(&args, &mut terminal),
         Command::Events(args) => events(&args, &mut terminal),
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
@@ -133,6 +136,13 @@ fn code(mission: &Mission) -> u8 {
     } else {
         DONE
     }
+}
+
+fn extract(args: &ExtractArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+    let inputs = args.bags.iter().map(|path| input(path)).collect();
+    let (notices, undecoded) = extract::extract(args, inputs, terminal)?;
+    let is_whole = undecoded == 0 && !notices.any_loss();
+    Ok(if is_whole { DONE } else { SKIPPED })
 }
 
 fn render(args: &RenderArgs, terminal: &mut Terminal) -> Result<u8, Error> {

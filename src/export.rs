@@ -3,7 +3,6 @@
 mod animated_svg;
 mod apng;
 pub mod check;
-mod csv;
 pub mod dot;
 pub(crate) mod encoder;
 mod gif;
@@ -12,6 +11,8 @@ mod json;
 pub mod mermaid;
 pub mod options;
 pub mod palette;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod pdf;
 mod png;
 pub mod report;
@@ -19,6 +20,7 @@ pub mod run;
 pub mod sequence;
 pub mod sink;
 mod svg;
+pub mod tables;
 pub mod target;
 mod tex;
 mod video;
@@ -127,9 +129,17 @@ pub const FORMATS: &[Format] = &[
     },
     Format {
         word: "csv",
-        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
-        check: Some(csv::check),
-        start: csv::start,
+        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, ledger, phases, bags",
+        check: Some(tables::check),
+        start: tables::start_csv,
+        ..DATA
+    },
+    #[cfg(feature = "parquet")]
+    Format {
+        word: "parquet",
+        what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
+        check: Some(tables::check),
+        start: tables::start_parquet,
         ..DATA
     },
 ];
@@ -218,7 +228,7 @@ pub fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
 /// The files that an output makes: of most formats the one of its name.
 fn files(output: &Output) -> Vec<Target> {
     match output.format.word {
-        "csv" => csv::files(&output.target),
+        word @ ("csv" | "parquet") => tables::files(&output.target, word),
         _ => vec![output.target.clone()],
     }
 }

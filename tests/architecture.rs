@@ -18,8 +18,9 @@ const STATIONS: &[&str] = &[
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
         &["budget", "leftovers", "words"],
-        &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"],
-        &["file"],
+        &["digest", "error", "geometry", "name", "notice", "time", "yaml"],
+        &["file", "table"],
+        &["csv"],
     ]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
@@ -51,16 +52,11 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["animated_svg", "apng", "csv", "dot", "gif", "html", "json", "mermaid", "pdf", "png", "svg", "tex", "video"],
-        &["report", "run"],
+        &["animated_svg", "apng", "dot", "gif", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
+        &["report", "run", "tables"],
     ]),
-<<<<<<< HEAD
-    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "survey"]]),
-    ("cli", &[&["args", "terminal"], &["look"]]),
-=======
-    ("pipeline", &[&["captions", "draw", "read"], &["export", "survey"]]),
-    ("cli", &[&["args", "stop"], &["look", "terminal"]]),
->>>>>>> safety
+    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
+    ("cli", &[&["args", "stop"], &["extract", "look", "terminal"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
@@ -82,10 +78,16 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "mission/json",
         ],
     ),
-    // Tables of a mission are written as a stream, small ones as text.
-    ("csv", &["base/csv", "export/csv"]),
     // Temporary files: of outputs, of decompressed bags, of times beyond what memory may hold.
-    ("tempfile", &["bag/source", "evidence/times", "export/sink"]),
+    (
+        "tempfile",
+        &[
+            "bag/source",
+            "evidence/times",
+            "export/sink",
+            "export/tables",
+        ],
+    ),
     // Times are read and spelled.
     ("jiff", &["base"]),
     // Plain functions on numbers, as the standard library's would be.

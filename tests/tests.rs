@@ -14,11 +14,8 @@ mod damaged;
 mod docs;
 mod encode;
 mod evidence;
-<<<<<<< HEAD
 mod figures;
-=======
 mod hostile;
->>>>>>> safety
 mod layout;
 mod pages;
 mod phases;
@@ -26,4 +23,5 @@ mod properties;
 mod reading;
 mod ros2_example;
 mod support;
+mod tables;
 mod warehouse;

@@ -1,6 +1,136 @@
 //! Tables as comma-separated values (RFC 4180).
 
+use std::io::{self, Write};
+
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
+
+use super::table::{Batch, Column, Kind, Texts, Values, span};
+
+/// A table being written: the names of its columns, then a row a line. A list is written as JSON, with `NaN` and
+/// `Infinity` as Python's and JavaScript's readers take them; what is unknown is empty.
+pub(crate) struct Rows<W: Write> {
+    writer: csv::Writer<W>,
+    field: Vec<u8>,
+}
+
+impl<W: Write> Rows<W> {
+    /// Begins a table with the columns of `batch`.
+    pub(crate) fn new(to: W, batch: &Batch) -> io::Result<Self> {
+        let mut writer = WriterBuilder::new()
+            .terminator(Terminator::Any(b'\n'))
+            .from_writer(to);
+        writer.write_record(batch.columns.iter().map(|c| c.name.as_bytes()))?;
+        Ok(Self {
+            writer,
+            field: Vec::new(),
+        })
+    }
+
+    /// Writes all rows of `batch`.
+    pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
+        for row in 0..batch.rows {
+            for column in &batch.columns {
+                self.field.clear();
+                if column.valid.as_ref().is_none_or(|valid| valid[row]) {
+                    field(column, 0, row, &mut self.field)?;
+                }
+                self.writer.write_field(&self.field)?;
+            }
+            self.writer.write_record(None::<&[u8]>)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the table.
+    pub(crate) fn finish(self) -> io::Result<W> {
+        self.writer
+            .into_inner()
+            .map_err(csv::IntoInnerError::into_error)
+    }
+}
+
+/// The value at place `at` of a level: a list, or below all lists what stands in it.
+fn field(column: &Column, level: usize, at: usize, to: &mut Vec<u8>) -> io::Result<()> {
+    let in_list = level > 0;
+    let Some(ends) = column.lists.get(level) else {
+        return value(column, at, in_list, to);
+    };
+    to.push(b'[');
+    for (count, element) in span(ends, at).enumerate() {
+        if count > 0 {
+            to.push(b',');
+        }
+        field(column, level + 1, element, to)?;
+    }
+    to.push(b']');
+    Ok(())
+}
+
+fn value(column: &Column, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
+    match &column.values {
+        Values::Flag(v) => write!(to, "{}", v[at]),
+        Values::I8(v) => write!(to, "{}", v[at]),
+        Values::U8(v) => write!(to, "{}", v[at]),
+        Values::I16(v) => write!(to, "{}", v[at]),
+        Values::U16(v) => write!(to, "{}", v[at]),
+        Values::I32(v) => write!(to, "{}", v[at]),
+        Values::U32(v) => write!(to, "{}", v[at]),
+        Values::I64(v) => write!(to, "{}", v[at]),
+        Values::U64(v) => write!(to, "{}", v[at]),
+        Values::F32(v) if v[at].is_finite() => write!(to, "{:?}", v[at]),
+        Values::F32(v) => odd(f64::from(v[at]), in_list, to),
+        Values::F64(v) if v[at].is_finite() => number(v[at], to),
+        Values::F64(v) => odd(v[at], in_list, to),
+        Values::Texts(v) if column.kind == Kind::Bytes => bytes(v.get(at), to),
+        Values::Texts(v) => text(v, at, in_list, to),
+    }
+}
+
+/// The shortest digits that give the number back; very large and very small ones with an exponent.
+fn number(value: f64, to: &mut Vec<u8>) -> io::Result<()> {
+    let size = value.abs();
+    if value == 0.0 || (1e-5..1e17).contains(&size) {
+        write!(to, "{value}")
+    } else {
+        write!(to, "{value:e}")
+    }
+}
+
+/// A number that is none.
+fn odd(value: f64, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
+    match (in_list, value.is_nan(), value > 0.0) {
+        (_, true, _) => write!(to, "NaN"),
+        (true, _, true) => write!(to, "Infinity"),
+        (true, _, false) => write!(to, "-Infinity"),
+        (false, _, true) => write!(to, "inf"),
+        (false, _, false) => write!(to, "-inf"),
+    }
+}
+
+fn bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
+    for (count, byte) in bytes.iter().enumerate() {
+        let before = if count == 0 { '[' } else { ',' };
+        write!(to, "{before}{byte}")?;
+    }
+    write!(to, "{}", if bytes.is_empty() { "[]" } else { "]" })
+}
+
+fn text(texts: &Texts, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
+    if !in_list {
+        to.extend_from_slice(texts.get(at));
+        return Ok(());
+    }
+    to.push(b'"');
+    for byte in texts.get(at) {
+        match byte {
+            b'"' | b'\\' => to.extend([b'\\', *byte]),
+            0..0x20 => write!(to, "\\u{byte:04x}")?,
+            other => to.push(*other),
+        }
+    }
+    to.push(b'"');
+    Ok(())
+}
 
 /// A table as text: the names of the columns, then a row a line.
 pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {

@@ -30,6 +30,9 @@ pub(super) enum Command {
     Render(Box<RenderArgs>),
     /// Tell what a bag holds, which evidence it has, and what cannot be known; over a folder, one row per bag.
     Info(Box<InfoArgs>),
+    /// Write the messages themselves as tables: a row per message, or a table per topic with every field.
+    #[command(after_help = EXTRACT_HELP)]
+    Extract(Box<ExtractArgs>),
     /// Print the reconfiguration log: what appeared, vanished, changed rate or hands, and when.
     Events(Box<EventsArgs>),
     /// List the built-in styles, or print one to start your own from.
@@ -101,6 +104,34 @@ pub(super) struct EventsArgs {
     #[command(flatten)]
     pub(super) graph: GraphArgs,
 }
+
+#[derive(Debug, Args)]
+pub(super) struct ExtractArgs {
+    /// Bags, as `render` takes them. The messages of several are one table.
+    #[arg(required = true, value_name = "BAG")]
+    pub(super) bags: Vec<PathBuf>,
+    /// The file to write, `.csv` or `.parquet`; `-` is standard output; with `--fields` a folder.
+    #[arg(long, short, value_name = "FILE|FOLDER")]
+    pub(super) output: String,
+    /// The format, where the name does not tell it. [default with `--fields`: parquet]
+    #[arg(long, value_name = "csv|parquet")]
+    pub(super) format: Option<String>,
+    /// Decode messages: a table per topic, a column per field.
+    #[arg(long)]
+    pub(super) fields: bool,
+    /// Names of topics to take, as in `rqt_graph`: `/nav/.*,-/nav/debug`.
+    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
+    pub(super) topic_filter: Option<String>,
+    /// Begin here: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(super) start: Option<Moment>,
+    /// End here, written like `--start`.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(super) end: Option<Moment>,
+}
+
+const EXTRACT_HELP: &str =
+    "Columns of a row per message: time_ns, topic, type, publisher, size_bytes; sorted by time.";
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "lower")]

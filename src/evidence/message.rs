@@ -3,3 +3,4 @@
 pub mod cursor;
 pub(crate) mod definition;
 pub(crate) mod dynamic;
+pub(crate) mod fields;

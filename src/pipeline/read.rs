@@ -219,7 +219,7 @@ fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
 }
 
 /// The time that all bags cover, if every one of them tells without being read.
-fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
+pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
     let mut all: Option<Span> = None;
     for reader in readers {
         let Some(span) = reader.span()? else {
