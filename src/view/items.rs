@@ -15,6 +15,8 @@ use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
 pub(crate) enum Place {
     /// Nowhere.
     Hidden,
+    /// It is this item, or part of it.
+    Item(u32),
     /// Into this arrow.
     Arrow(u32),
     /// Inside this item.
@@ -246,6 +248,27 @@ impl Viewed {
                 }
             }
         }
+    }
+
+    /// Whether the picture shows this or a box that it is part of. What a filter leaves out is not told either.
+    pub(crate) fn sees(&self, what: Element) -> bool {
+        let is = |reasons: &[Option<_>], id: u32| reasons.get(id as usize) == Some(&None);
+        let both = |edge: Option<&(NodeId, TopicId)>| {
+            edge.is_some_and(|(node, topic)| {
+                is(&self.selection.nodes, *node) && is(&self.selection.topics, *topic)
+            })
+        };
+        match what {
+            Element::Node(id) => is(&self.selection.nodes, id),
+            Element::Topic(id) => is(&self.selection.topics, id),
+            Element::Publish(id) => both(self.published.get(id as usize)),
+            Element::Subscribe(id) => both(self.subscribed.get(id as usize)),
+        }
+    }
+
+    /// Whether a single arrow carries a topic from its publishers.
+    pub(crate) fn has_single_sender(&self, topic: Element) -> bool {
+        self.carriers.get(&topic).is_some_and(|all| all.len() == 1)
     }
 
     fn is_namespace(&self, item: u32) -> bool {
