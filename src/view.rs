@@ -24,12 +24,12 @@ use std::sync::Arc;
 
 use crate::base::notice::Notices;
 use crate::base::time::{Span, Stamp};
+use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::{Element, State};
 use crate::mission::Mission;
 use crate::mission::ledger::{EntryId, Kind};
 
-pub use caption::hertz;
 pub use collapse::Candidate;
 pub use filter::NameFilter;
 pub use filtered::filtered;
@@ -273,6 +273,19 @@ pub struct Phrase {
     pub headlines: usize,
 }
 
+impl Headline {
+    /// The start of a node.
+    #[cfg(test)]
+    pub(crate) fn started() -> Self {
+        Self {
+            entry: 0,
+            kind: Kind::Started,
+            what: Element::Node(0),
+            time: Stamp(0),
+        }
+    }
+}
+
 /// One window of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -297,22 +310,37 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// A window in which nothing is.
+    pub fn empty(index: usize, span: Span) -> Self {
+        Self {
+            index,
+            span,
+            partial: false,
+            messages: 0,
+            items: Vec::new(),
+            arrows: Vec::new(),
+            headlines: Vec::new(),
+            counts: Counts::default(),
+            caption: Vec::new(),
+        }
+    }
+
     /// The caption in at most so many phrases, the rest counted: `a started; b stopped; and 3 more`.
     pub fn words(&self, most: usize) -> String {
-        let mut parts: Vec<String> = self.caption.iter().take(most).map(|p| p.text.clone()).collect();
+        let mut parts: Vec<String> = self
+            .caption
+            .iter()
+            .take(most)
+            .map(|p| p.text.clone())
+            .collect();
         let rest: usize = self.caption.iter().skip(most).map(|p| p.headlines).sum();
         match rest {
             0 => {}
-            n if parts.is_empty() => parts.push(count(n, "change")),
+            n if parts.is_empty() => parts.push(words::count(n, "change")),
             n => parts.push(format!("and {n} more")),
         }
         parts.join("; ")
     }
-}
-
-/// `1 change`, `3 changes`.
-fn count(n: usize, word: &str) -> String {
-    format!("{n} {word}{}", if n == 1 { "" } else { "s" })
 }
 
 /// The whole sequence as the picture shows it. Items are sorted by (kind, name), arrows by (from, to, kind),
@@ -332,7 +360,9 @@ pub struct View {
 impl View {
     /// Whether window `k` shows a change.
     pub fn is_changed(&self, k: usize) -> bool {
-        self.frames.get(k).is_some_and(|frame| !frame.headlines.is_empty())
+        self.frames
+            .get(k)
+            .is_some_and(|frame| !frame.headlines.is_empty())
     }
 
     /// The place of the window that shows most; the first of several.

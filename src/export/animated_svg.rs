@@ -7,11 +7,12 @@ use std::fmt::Write as _;
 
 use super::{AtOnce, Encoder};
 use crate::base::error::Result;
-use crate::base::time::{offset, short};
+use crate::base::words;
+use crate::base::words::visible;
 use crate::draw::paint::classes::bars;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
 use crate::draw::paint::svg::escape;
-use crate::draw::text::visible;
+use crate::draw::picture::rate_label;
 use crate::export::sequence::{Sequence, Whole};
 use crate::export::target::Target;
 use crate::view::View;
@@ -22,6 +23,8 @@ const MANY: usize = 300;
 /// With more changed windows than this, what changed is not written in words.
 const MOST_CAPTIONS: usize = 24;
 /// The longest caption, in characters.
+/// So many phrases are written out at most; the rest is counted.
+const MOST_PHRASES: usize = 4;
 const LONGEST_CAPTION: usize = 110;
 /// Around the graph.
 const MARGIN: f64 = 12.0;
@@ -57,7 +60,7 @@ fn remark(view: &View) -> Option<String> {
 }
 
 fn animation(view: &View, whole: &Whole<'_>, frame_ms: u32) -> String {
-    let runs = Runs::of(view, crate::view::hertz);
+    let runs = Runs::of(view, rate_label);
     let play = Play {
         view,
         runs: &runs,
@@ -199,15 +202,15 @@ impl Play<'_> {
             out,
             "</text><text class=\"u\" x=\"16\" y=\"45\">{} windows of {} · {}</text>",
             self.windows,
-            short(first.span.nanos()),
-            offset(whole)
+            words::period(first.span.nanos()),
+            words::offset(whole)
         );
         let told = self
             .view
             .frames
             .iter()
             .zip(0_u32..)
-            .filter(|(f, _)| !f.caption.is_empty());
+            .filter(|(f, _)| !f.headlines.is_empty());
         if told.clone().count() > MOST_CAPTIONS {
             return;
         }
@@ -218,7 +221,7 @@ impl Play<'_> {
             if window == 0 {
                 steps.remove(0);
             }
-            let words: String = visible(&frame.caption.join("; "))
+            let words: String = visible(&frame.words(MOST_PHRASES))
                 .chars()
                 .take(LONGEST_CAPTION)
                 .collect();
@@ -257,7 +260,7 @@ impl Play<'_> {
                     out,
                     "<text class=\"x\" style=\"text-anchor:{anchor}\" x=\"{x:.0}\" y=\"{:.0}\">{}</text>",
                     y + 17.0,
-                    offset(nanos)
+                    words::offset(nanos)
                 );
             }
         }
@@ -301,16 +304,12 @@ impl ElementLook for AnimatedElement<'_> {
     fn text(&self) -> String {
         let still = at(&self.life.rates, self.play.still);
         let label = |place: u32| &self.play.runs.labels[place as usize];
-        let known = |run: &&Run| !matches!(label(run.value).as_str(), "" | "0");
+        let silent = words::rate(0.0);
+        let is_known = |label: &String| !label.is_empty() && *label != silent;
+        let known = |run: &&Run| is_known(label(run.value));
         let first = self.life.rates.iter().find(known).map_or(0, |s| s.value);
-        match label(if matches!(label(still).as_str(), "" | "0") {
-            first
-        } else {
-            still
-        }) {
-            hz if hz.is_empty() => String::new(),
-            hz => format!("{hz} Hz"),
-        }
+        let shown = if is_known(label(still)) { still } else { first };
+        label(shown).clone()
     }
 
     fn more(&self) -> String {

@@ -20,7 +20,7 @@ use krilla::{Document, SerializeSettings};
 use super::{Encoder, Frame, Needs, Written};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect};
-use crate::base::time;
+use crate::base::words;
 use crate::draw::scene::{self, Anchor, Form, Group, Piece, Scene, Shape, Step, Text};
 use crate::draw::style::Color;
 use crate::draw::text::Fonts;
@@ -92,8 +92,8 @@ impl Book<'_> {
     fn entry(&self, place: usize) -> String {
         let frame = self.sequence.view.frames.get(place);
         frame.map_or_else(String::new, |frame| {
-            let at = time::offset(self.sequence.mission.offset(frame.span.start));
-            let caption = frame.caption.first().map_or("", String::as_str);
+            let at = words::offset(self.sequence.mission.offset(frame.span.start));
+            let caption = frame.caption.first().map_or("", |phrase| &phrase.text);
             format!("{at} {caption}").trim_end().to_owned()
         })
     }

@@ -1,7 +1,8 @@
 //! Time divided into periods: which windows a mission has.
 
 use crate::base::error::{Error, Result};
-use crate::base::time::{Moment, Period, Span, Stamp, short};
+use crate::base::time::{Moment, Period, Span, Stamp};
+use crate::base::words;
 
 /// How many windows are made at most.
 pub const MOST_WINDOWS: i64 = 100_000;
@@ -107,7 +108,7 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
     Err(Error::usage(
         format!(
             "`--start` and `--end` leave nothing of the {} of this bag",
-            short(bag.nanos())
+            words::period(bag.nanos())
         ),
         format!("the bag covers {} to {}", bag.start, bag.end),
     ))

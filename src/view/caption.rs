@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::items::Viewed;
 use super::{Headline, Phrase};
 use crate::base::name::last_part;
+use crate::base::words;
 use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Mission;
 use crate::mission::ledger::{Detail, EntryId, Kind, Ledger};
@@ -13,22 +14,6 @@ use crate::mission::ledger::{Detail, EntryId, Kind, Ledger};
 const MOST_NAMED: usize = 3;
 /// Longer names are cut.
 const LONGEST_NAME: usize = 48;
-
-/// A rate in the fewest digits that tell it apart: `0.05`, `7.4`, `15`, `120`; `?` for what is no number.
-pub fn hertz(hz: f64) -> String {
-    if !hz.is_finite() {
-        return "?".to_owned();
-    }
-    let text = match hz.abs() {
-        size if size >= 99.95 => format!("{hz:.0}"),
-        size if size >= 0.95 => format!("{hz:.1}"),
-        _ => format!("{hz:.2}"),
-    };
-    match text.split_once('.') {
-        Some(_) => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        None => text,
-    }
-}
 
 /// Puts headlines into words, with full names: what is called alike in two namespaces is told apart.
 pub(crate) struct Speaker<'a> {
@@ -88,9 +73,18 @@ impl<'a> Speaker<'a> {
     fn together(&self, kind: Kind, all: &[&Headline]) -> Phrase {
         let topics: usize = all.iter().filter_map(|h| self.topics.get(&h.entry)).sum();
         let what = together(kind).unwrap_or_default();
-        let names: Vec<String> = all.iter().map(|h| self.short(h.what)).take(MOST_NAMED).collect();
+        let names: Vec<String> = all
+            .iter()
+            .map(|h| self.short(h.what))
+            .take(MOST_NAMED)
+            .collect();
         Phrase {
-            text: format!("{} {what}{} ({}, …)", all.len(), with(topics), names.join(", ")),
+            text: format!(
+                "{} {what}{} ({}, …)",
+                all.len(),
+                with(topics),
+                names.join(", ")
+            ),
             headlines: all.len(),
         }
     }
@@ -103,7 +97,9 @@ impl<'a> Speaker<'a> {
             Kind::Stopped => format!("{name} stopped{}", with(topics)),
             Kind::Restarted => format!("{name} restarted"),
             Kind::Silent => format!("{name} fell silent"),
-            Kind::Appeared => self.edge(headline.what, "now").unwrap_or_else(|| name + " appeared"),
+            Kind::Appeared => self
+                .edge(headline.what, "now")
+                .unwrap_or_else(|| name + " appeared"),
             Kind::Vanished => {
                 let edge = self.edge(headline.what, "no longer");
                 edge.unwrap_or_else(|| name + " vanished")
@@ -119,7 +115,7 @@ impl<'a> Speaker<'a> {
         let entry = self.ledger.entries.get(headline.entry as usize);
         match entry.map(|e| &e.detail) {
             Some(Detail::Rates { from_hz, to_hz }) => {
-                format!("{name} {} → {} Hz", hertz(*from_hz), hertz(*to_hz))
+                format!("{name} {}", words::rate_change(*from_hz, *to_hz))
             }
             Some(Detail::Senders { from, to }) => {
                 let (from, to) = (self.people(from), self.people(to));
@@ -156,7 +152,12 @@ impl<'a> Speaker<'a> {
     }
 
     fn whole_name(&self, what: Element) -> Option<&str> {
-        let topic = |id: u32| self.elements.topics.get(id as usize).map(|t| t.name.as_str());
+        let topic = |id: u32| {
+            self.elements
+                .topics
+                .get(id as usize)
+                .map(|t| t.name.as_str())
+        };
         match what {
             Element::Node(id) => self.elements.nodes.get(id as usize).map(|n| &*n.role),
             Element::Topic(id) => topic(id),
@@ -171,7 +172,10 @@ impl<'a> Speaker<'a> {
 
     /// Nodes by name, whether or not they are shown: `/planner`, `/planner and /teleop`, `4 nodes`.
     fn people(&self, nodes: &[NodeId]) -> String {
-        let names: Vec<String> = nodes.iter().map(|id| self.name(Element::Node(*id))).collect();
+        let names: Vec<String> = nodes
+            .iter()
+            .map(|id| self.name(Element::Node(*id)))
+            .collect();
         match &names[..] {
             [] => String::new(),
             [one] => one.clone(),
@@ -198,16 +202,12 @@ fn together(kind: Kind) -> Option<&'static str> {
 fn with(topics: usize) -> String {
     match topics {
         0 => String::new(),
-        1 => " with 1 topic".to_owned(),
-        n => format!(" with {n} topics"),
+        n => format!(" with {}", words::count(n, "topic")),
     }
 }
 
 fn clip(name: &str) -> String {
-    match name.char_indices().nth(LONGEST_NAME) {
-        None => name.to_owned(),
-        Some((end, _)) => format!("{}…", name.get(..end).unwrap_or_default()),
-    }
+    words::shorten(name, LONGEST_NAME).into_owned()
 }
 
 fn prefixed(prefix: &str, text: &str) -> String {
@@ -219,88 +219,72 @@ fn prefixed(prefix: &str, text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::view::testing::mission;
-    use crate::view::{ViewOptions, view};
+    use crate::view::{Frame, Mark, ViewOptions, view};
+
+    fn last(windows: &[&str]) -> Frame {
+        let (view, _) = view(&mission(windows), &ViewOptions::default());
+        view.frames.last().unwrap().clone()
+    }
 
     /// The caption of the last window.
     fn caption(windows: &[&str]) -> String {
-        let (view, _) = view(&mission(windows), &ViewOptions::default());
-        view.frames.last().unwrap().caption.join("; ")
-    }
-
-    #[test]
-    fn rates_are_written_with_few_digits() {
-        let all = [
-            0.0,
-            0.05,
-            0.5,
-            0.999,
-            1.0,
-            7.44,
-            12.5,
-            15.0,
-            99.97,
-            120.4,
-            f64::NAN,
-        ];
-        let all: Vec<String> = all.into_iter().map(hertz).collect();
-        assert_eq!(all.join(" "), "0 0.05 0.5 1 1 7.4 12.5 15 100 120 ?");
+        last(windows).words(usize::MAX)
     }
 
     #[test]
     fn nodes_come_with_their_topics() {
         assert_eq!(
             caption(&["/a", "/a /cam/driver>/cam/image /cam/driver>/cam/info"]),
-            "driver appeared with 2 topics"
+            "/cam/driver started with 2 topics"
         );
-        assert_eq!(caption(&["/a /b>/t", "/a"]), "b vanished with 1 topic");
+        assert_eq!(caption(&["/a /b>/t", "/a"]), "/b stopped with 1 topic");
     }
 
     #[test]
     fn topics_rates_and_connections_have_their_own_words() {
-        assert_eq!(caption(&["/a", "/a =/s/scan"]), "scan appeared");
+        assert_eq!(caption(&["/a", "/a =/s/scan"]), "/s/scan appeared");
         assert_eq!(
             caption(&["=/s/scan@15", "=/s/scan@7.4"]),
-            "scan 15 → 7.4 Hz"
+            "/s/scan 15 → 7.4 Hz"
         );
-        assert_eq!(caption(&["/a>/t /b", "/a>/t /b</t"]), "b now subscribes /t");
+        assert_eq!(
+            caption(&["/a>/t /b", "/a>/t /b</t"]),
+            "/b now subscribes /t"
+        );
         assert_eq!(
             caption(&["/a>/t /b>/t", "/a>/t /b"]),
-            "b no longer publishes /t"
-        );
-        assert_eq!(
-            caption(&["=/a =/b =/c =/d", "/x"]),
-            "x appeared; 4 topics vanished"
+            "/b no longer publishes /t"
         );
         assert_eq!(caption(&["/a", "/a"]), "");
     }
 
     #[test]
     fn a_hand_over_is_told_once() {
-        let mission = mission(&["/planner>/cmd_vel@2 /teleop", "/planner /teleop>/cmd_vel@2"]);
-        let (view, _) = view(&mission, &ViewOptions::default());
+        let frame = last(&["/planner>/cmd_vel@2 /teleop", "/planner /teleop>/cmd_vel@2"]);
         assert_eq!(
-            view.frames[1].caption,
-            ["/cmd_vel handed over from planner to teleop"]
+            frame.words(usize::MAX),
+            "/cmd_vel handed over from /planner to /teleop"
         );
-        let topic = view.frames[1].items.last().unwrap();
+        let topic = frame.items.last().unwrap();
         assert_eq!(
-            (topic.mark, view.frames[1].tally.others),
+            (topic.mark, frame.counts.handed_over),
             (Some(Mark::HandedOver), 1)
         );
     }
 
     #[test]
-    fn many_changes_are_bounded() {
+    fn the_words_of_a_caption_stand_for_all_headlines() {
         let name = "x".repeat(10_000);
-        let now = format!("/{name} /b /c =/e =/f =/g =/h@5 =/i@5 =/j@5 =/k@5 =/l@5");
-        let before = "/m /n /o =/p =/q =/r =/h@1 =/i@1 =/j@1 =/k@1 =/l@1";
-        let caption = caption(&[before, &now]);
-        assert_eq!(caption.split("; ").count(), MOST_PHRASES);
-        assert!(
-            caption.len() < 400 && caption.ends_with("and 11 more"),
-            "{caption}"
+        let now = format!("/{name} /b /c /d =/e =/h@5 =/i@5 =/j@5 =/k@5 =/l@5");
+        let frame = last(&["/m =/h@1 =/i@1 =/j@1 =/k@1 =/l@1", &now]);
+        let told: usize = frame.caption.iter().map(|p| p.headlines).sum();
+        assert_eq!((told, frame.counts.total()), (11, 11));
+        assert_eq!(frame.headlines.len(), 11);
+        assert_eq!(
+            frame.words(3),
+            "4 nodes started (b, c, d, …); /m stopped; /e appeared; and 5 more"
         );
+        assert!(frame.words(usize::MAX).len() < 400);
     }
 }

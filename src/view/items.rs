@@ -43,7 +43,7 @@ pub(crate) struct Viewed {
     pub(crate) published: Vec<(NodeId, TopicId)>,
     /// Node and topic of each subscription.
     pub(crate) subscribed: Vec<(NodeId, TopicId)>,
-    /// Per publication, and per topic with publications, the arrows that carry it from its node.
+    /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
     pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
     /// Arrows from node to node that were too many.
     pub(crate) dropped: usize,
@@ -238,13 +238,14 @@ impl Viewed {
     fn set_carriers(&mut self, elements: &Elements) {
         for (arrow, id) in self.arrows.iter().zip(0..) {
             for member in &arrow.members {
-                let Element::Publish(publish) = member else {
-                    continue;
+                self.carriers.entry(*member).or_default().push(id);
+                let edge = match member {
+                    Element::Publish(publish) => elements.publishes.get(*publish as usize),
+                    _ => None,
                 };
-                if let Some(edge) = elements.publishes.get(*publish as usize) {
+                if let Some(edge) = edge {
                     let topic = self.carriers.entry(Element::Topic(edge.topic)).or_default();
                     topic.push(id);
-                    self.carriers.entry(*member).or_default().push(id);
                 }
             }
         }

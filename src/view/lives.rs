@@ -76,8 +76,12 @@ impl<'a> Lives<'a> {
             pauses.clone().any(|pause| covers(&pause))
         };
         let mut paused = Alive {
-            nodes: ids(&self.elements.nodes).map(|id| own(Element::Node(id))).collect(),
-            topics: ids(&self.elements.topics).map(|id| own(Element::Topic(id))).collect(),
+            nodes: ids(&self.elements.nodes)
+                .map(|id| own(Element::Node(id)))
+                .collect(),
+            topics: ids(&self.elements.topics)
+                .map(|id| own(Element::Topic(id)))
+                .collect(),
             publishes: Vec::new(),
             subscribes: Vec::new(),
         };
@@ -88,7 +92,13 @@ impl<'a> Lives<'a> {
             .collect();
         let mut sent: BTreeMap<u32, bool> = BTreeMap::new();
         let states = alive.publishes.iter().zip(&paused.publishes);
-        for (edge, (_, is_paused)) in self.elements.publishes.iter().zip(states).filter(|s| *s.1.0) {
+        for (edge, (_, is_paused)) in self
+            .elements
+            .publishes
+            .iter()
+            .zip(states)
+            .filter(|s| *s.1.0)
+        {
             *sent.entry(edge.topic).or_insert(true) &= is_paused;
         }
         for (topic, is_paused) in sent {
@@ -117,10 +127,13 @@ impl<'a> Lives<'a> {
                 && topics.get(edge.topic as usize) != Some(&Some(false))
         };
         let publishes = self.elements.publishes.iter().zip(0..);
-        let publishes: Vec<bool> = publishes.map(|(e, id)| edge(e, Element::Publish(id))).collect();
+        let publishes: Vec<bool> = publishes
+            .map(|(e, id)| edge(e, Element::Publish(id)))
+            .collect();
         let subscribes = self.elements.subscribes.iter().zip(0..);
-        let subscribes: Vec<bool> =
-            subscribes.map(|(e, id)| edge(e, Element::Subscribe(id))).collect();
+        let subscribes: Vec<bool> = subscribes
+            .map(|(e, id)| edge(e, Element::Subscribe(id)))
+            .collect();
         let mut carried: Vec<Option<bool>> = vec![None; topics.len()];
         let all = self.elements.publishes.iter().zip(&publishes);
         for (edge, lives) in all.chain(self.elements.subscribes.iter().zip(&subscribes)) {
@@ -130,7 +143,9 @@ impl<'a> Lives<'a> {
         }
         let topics = topics.into_iter().zip(carried);
         Alive {
-            topics: topics.map(|(own, carried)| own.or(carried).unwrap_or(true)).collect(),
+            topics: topics
+                .map(|(own, carried)| own.or(carried).unwrap_or(true))
+                .collect(),
             nodes,
             publishes,
             subscribes,

@@ -98,6 +98,9 @@ impl News {
             Element::Publish(id) => viewed.publish.get(id as usize).copied(),
             Element::Subscribe(id) => viewed.subscribe.get(id as usize).copied(),
         };
+        if !viewed.pairs.is_empty() && matches!(what, Element::Publish(_) | Element::Subscribe(_)) {
+            self.add_carriers(viewed, what, sign);
+        }
         match place {
             Some(Place::Item(id)) => sign.keep(&mut self.items, id, Reach::of_item(viewed, id)),
             Some(Place::Inside(id)) => sign.keep(&mut self.items, id, Reach::Inside),

@@ -66,7 +66,11 @@ impl Life {
                 self.is_measured = true;
             }
         }
-        self.last = if shown.mark == Some(Mark::Removed) { 0 } else { at };
+        self.last = if shown.mark == Some(Mark::Removed) {
+            0
+        } else {
+            at
+        };
         let (sent, time) = self.sent;
         shown.steady_hz = self.is_measured.then(|| sent / time.max(1.0));
         self.show(shown);
@@ -81,11 +85,19 @@ impl Life {
             known.look.or(Some((shown.state, shown.degree)))
         };
         // `sent` holds the rate from here to the next change of it.
-        let steady = if known.is_measured { Some(known.sent.0) } else { shown.steady_hz };
+        let steady = if known.is_measured {
+            Some(known.sent.0)
+        } else {
+            shown.steady_hz
+        };
         shown.steady_hz = steady;
         let ends_here = is_rate(shown);
         *self = Self {
-            last: if shown.mark == Some(Mark::Added) { 0 } else { at },
+            last: if shown.mark == Some(Mark::Added) {
+                0
+            } else {
+                at
+            },
             look,
             sent: (steady.unwrap_or(0.0), 0.0),
             is_measured: steady.is_some() && !ends_here,

@@ -107,12 +107,18 @@ impl Presence {
             Element::Publish(id) => is(&alive.publishes, *id),
             Element::Subscribe(id) => is(&alive.subscribes, *id),
         };
-        let items = viewed.items.iter().map(|item| item.members.iter().any(lives));
+        let items = viewed
+            .items
+            .iter()
+            .map(|item| item.members.iter().any(lives));
         let items: Vec<bool> = items.collect();
         let pair = |(p, s): &(u32, u32)| is(&alive.publishes, *p) && is(&alive.subscribes, *s);
         let arrow = |(at, arrow): (usize, &super::Arrow)| {
             let members = || arrow.members.iter().any(lives);
-            let itself = viewed.pairs.get(at).map_or_else(members, |pairs| pairs.iter().any(pair));
+            let itself = viewed
+                .pairs
+                .get(at)
+                .map_or_else(members, |pairs| pairs.iter().any(pair));
             itself && is(&items, arrow.from) && is(&items, arrow.to)
         };
         let arrows = viewed.arrows.iter().enumerate().map(arrow).collect();

@@ -4,8 +4,8 @@ use super::arrows::arrow_head;
 use super::badge::badge;
 use super::options;
 use super::page::Page;
-use super::words;
 use crate::base::geometry::{Point, Rect};
+use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
@@ -67,6 +67,11 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
             mark(&[Mark::Restarted]),
             Sign::Change(Mark::Restarted),
             "restarted",
+        ),
+        (
+            mark(&[Mark::Paused]),
+            Sign::Change(Mark::Paused),
+            "fell silent",
         ),
         (
             mark(&[Mark::Changed]),
@@ -232,14 +237,8 @@ fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
 /// An element that stands for all of its kind.
 fn shown(state: State, degree: Degree, mark: Option<Mark>) -> Shown {
     Shown {
-        id: 0,
-        state,
-        degree,
         mark,
-        hz: None,
-        from_hz: None,
-        count: None,
-        lifecycle: None,
+        ..Shown::plain(0, state, degree)
     }
 }
 

@@ -2,16 +2,19 @@
 
 use std::fmt::Write as _;
 
-use crate::base::time::offset;
+use crate::base::words;
+use crate::base::words::visible;
 use crate::draw::paint::svg::escape;
-use crate::draw::text::visible;
 use crate::view::{Frame, View};
 
 /// More windows with changes than this are counted.
 const MOST_ROWS: usize = 200;
 
+/// So many phrases are written out in one row; the rest is counted.
+const MOST_PHRASES: usize = 8;
+
 fn is_told(frame: &Frame) -> bool {
-    !frame.caption.is_empty()
+    !frame.headlines.is_empty()
 }
 
 /// How many windows there are, and how many of them have changes.
@@ -37,9 +40,9 @@ pub(super) fn rows(view: &View) -> String {
         let _ = write!(
             out,
             "<tr><th><a href=\"#t={secs}\">{}</a><td>",
-            offset(millis * 1_000_000)
+            words::offset(millis * 1_000_000)
         );
-        escape(&mut out, &visible(&frame.caption.join("; ")));
+        escape(&mut out, &visible(&frame.words(MOST_PHRASES)));
         out.push('\n');
     }
     out

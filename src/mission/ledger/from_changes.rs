@@ -164,11 +164,17 @@ impl<'a> Owners<'a> {
                 let topic = || moved.contains_key(&Element::Topic(edge.topic));
                 let handed = || self.handed.get(&edge.topic).copied();
                 let restarted = || self.restarted.get(&edge.node).copied();
-                let with_topic = || topic().then(|| self.topic_mover(edge.topic, moved)).flatten();
-                node.or_else(handed).or_else(restarted).or_else(|| match what {
-                    Element::Subscribe(_) => with_topic(),
-                    _ => None,
-                })
+                let with_topic = || {
+                    topic()
+                        .then(|| self.topic_mover(edge.topic, moved))
+                        .flatten()
+                };
+                node.or_else(handed)
+                    .or_else(restarted)
+                    .or_else(|| match what {
+                        Element::Subscribe(_) => with_topic(),
+                        _ => None,
+                    })
             }
             Element::Topic(topic) => self.topic_mover(topic, moved),
         }
@@ -199,12 +205,20 @@ impl<'a> Owners<'a> {
         if let Some(at) = self.handed.get(&topic) {
             return Some(*at);
         }
-        let again = |edge: &Edge| self.restarted.get(&edge.node).filter(|_| edge.topic == topic);
+        let again = |edge: &Edge| {
+            self.restarted
+                .get(&edge.node)
+                .filter(|_| edge.topic == topic)
+        };
         if let Some(at) = self.elements.publishes.iter().find_map(again) {
             return Some(*at);
         }
         let (edge, node) = self.senders.get(&topic).and_then(|all| all.first())?;
-        let moved = if self.came.contains_key(edge) { &self.came } else { &self.went };
+        let moved = if self.came.contains_key(edge) {
+            &self.came
+        } else {
+            &self.went
+        };
         let node = moved.get(&Element::Node(*node));
         node.or_else(|| moved.get(edge)).copied()
     }
@@ -214,12 +228,20 @@ fn told(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
     match change {
         Change::Added { what, time } => {
             let is_node = matches!(what, Element::Node(_));
-            let kind = if is_node { Kind::Started } else { Kind::Appeared };
+            let kind = if is_node {
+                Kind::Started
+            } else {
+                Kind::Appeared
+            };
             (kind, *what, *time, Detail::None)
         }
         Change::Removed { what, .. } => {
             let is_node = matches!(what, Element::Node(_));
-            let kind = if is_node { Kind::Stopped } else { Kind::Vanished };
+            let kind = if is_node {
+                Kind::Stopped
+            } else {
+                Kind::Vanished
+            };
             (kind, *what, None, Detail::None)
         }
         Change::Rate {
@@ -235,9 +257,12 @@ fn told(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
             let detail = Detail::Senders { from, to };
             (Kind::HandedOver, Element::Topic(*topic), None, detail)
         }
-        Change::Restarted { node, time } => {
-            (Kind::Restarted, Element::Node(*node), Some(*time), Detail::None)
-        }
+        Change::Restarted { node, time } => (
+            Kind::Restarted,
+            Element::Node(*node),
+            Some(*time),
+            Detail::None,
+        ),
         Change::Value {
             kind,
             what,
