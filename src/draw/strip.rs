@@ -394,6 +394,7 @@ mod tests {
             elements: Elements::default(),
             windows: Vec::new(),
             ledger: crate::mission::Ledger::default(),
+            activity: crate::mission::Activity::default(),
             layout: None,
             notices: Notices::new(),
         };

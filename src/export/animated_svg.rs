@@ -11,7 +11,7 @@ use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::paint::classes::bars;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
-use crate::draw::paint::svg::escape;
+use crate::draw::paint::xml::escape;
 use crate::draw::picture::rate_label;
 use crate::export::sequence::{Sequence, Whole};
 use crate::export::target::Target;

@@ -10,7 +10,7 @@ use crate::base::digest;
 use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
-use crate::draw::paint::svg::escape;
+use crate::draw::paint::xml::escape;
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
 use crate::draw::text;

@@ -207,6 +207,18 @@ fn too_many(many: i64, nanos: i64) -> Error {
     )
 }
 
+/// `span` cut into pieces of `step` nanoseconds, at least 1; the last one may be shorter.
+pub(crate) fn every(span: Span, step: i64) -> Vec<Span> {
+    let step = step.max(1);
+    let many = count(span.nanos().max(1), step);
+    let starts = (0..many).map(|k| span.start.plus(k * step));
+    let piece = |start: Stamp| Span {
+        start,
+        end: start.plus(step).min(span.end),
+    };
+    starts.map(piece).collect()
+}
+
 /// A period as `--period` takes it.
 pub fn plain(nanos: i64) -> String {
     if nanos % SECOND == 0 {

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 use crate::base::geometry::Point;
 use crate::base::words::is_invisible;
-use crate::draw::paint::svg::{escape, units};
+use crate::draw::paint::xml::{escape, units};
 use crate::draw::picture::{Part, Union};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;

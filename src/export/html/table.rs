@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 
 use crate::base::words;
 use crate::base::words::visible;
-use crate::draw::paint::svg::escape;
+use crate::draw::paint::xml::escape;
 use crate::view::{Frame, View};
 
 /// More windows with changes than this are counted.
 const MOST_ROWS: usize = 200;
 
 /// So many phrases are written out in one row; the rest is counted.
-const MOST_PHRASES: usize = 8;
+const MOST_PHRASES: usize = 5;
 
 fn is_told(frame: &Frame) -> bool {
     !frame.headlines.is_empty()
