@@ -149,7 +149,7 @@ impl<'a> Builder<'a> {
                         continue;
                     };
                     let place = streams.iter().position(|s| s == at).unwrap_or(0);
-                    follow(track, rates, place, stream.latched, self.mission.1);
+                    follow(track, rates, place, stream.latched, self.mission.1, proof.degree);
                     if !deaths.is_empty() {
                         let times = collected.messages.times(stream.times)?;
                         track.bound_all(&times, &deaths);
@@ -217,8 +217,15 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Puts the messages of one stream on a track.
-fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end: Stamp) {
+/// Puts the messages of one stream on a track, which `degree` ties them to.
+fn follow(
+    track: &mut Liveness,
+    rates: &Rates,
+    place: usize,
+    latched: bool,
+    end: Stamp,
+    degree: Degree,
+) {
     let Some(spoke) = rates.traces.get(place).copied().flatten() else {
         track.extent = track.extent.max(Extent::Whole);
         return;
@@ -232,6 +239,6 @@ fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end:
             .map_or(Some(spoke.first), |l| Some(l.min(spoke.first)));
     }
     for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
-        track.mark(tally.window, Degree::Measured);
+        track.mark(tally.window, degree);
     }
 }

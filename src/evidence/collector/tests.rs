@@ -271,6 +271,7 @@ fn every_layout_survives_any_cut() {
 fn flow() -> Collector {
     let mut collector = Collector::new(Options {
         infer_stamps: true,
+        payload_bytes: 0,
         why: vec!["/detector".into(), "/image".into()],
         ..Options::default()
     });

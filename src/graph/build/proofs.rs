@@ -21,7 +21,7 @@ pub(crate) fn prove(
 ) -> io::Result<(Vec<Proof>, Values)> {
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
-    let mut known = Findings::new(&collected.streams, &mut collected.facts, end);
+    let mut known = Findings::new(&collected.streams, &mut collected.facts, (start, end));
     known.take_at_their_word(|source| SOURCES.get(source).is_some_and(|s| s.lasting));
     for (row, source) in SOURCES.iter().enumerate() {
         for conclude in source.conclude {
@@ -74,6 +74,9 @@ fn explain(known: &mut Findings<'_>, messages: &Stamps) {
         ) else {
             continue;
         };
+        if known.worded.contains(&(proof.what, proof.source)) {
+            continue;
+        }
         let (time, text) = match &proof.when {
             Validity::Messages(at) | Validity::First(at) => {
                 let times = known.streams[*at].times;
