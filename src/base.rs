@@ -7,4 +7,5 @@ pub mod geometry;
 pub mod name;
 pub mod notice;
 pub mod time;
+pub mod words;
 pub(crate) mod yaml;

@@ -26,6 +26,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
+use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
 pub use encoder::{Encoder, Format, Frame, Needs, Start, Written};
 use sequence::Sequence;
@@ -36,114 +37,88 @@ pub const FORMATS: &[Format] = &[
     Format {
         word: "gif",
         what: "the animation",
-        is_limited: true,
-        is_strip: false,
-        check: None,
         start: gif::start,
+        ..ANIMATION
     },
     Format {
         word: "apng",
         what: "the animation, lossless for all but antialiasing",
-        is_limited: true,
-        is_strip: false,
-        check: None,
         start: apng::start,
+        ..ANIMATION
     },
     Format {
         word: "svg",
         what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: start_svg,
+        ..PICTURE
     },
     Format {
         word: "png",
         what: "an image per window with `{n}`, the only window, or a film strip",
-        is_limited: false,
-        is_strip: true,
-        check: None,
         start: png::start_png,
+        ..IMAGE
     },
     Format {
         word: "webp",
         what: "an image per window with `{n}`, the only window, or a film strip",
-        is_limited: false,
-        is_strip: true,
-        check: None,
         start: png::start_webp,
+        ..IMAGE
     },
     Format {
         word: "dot",
         what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: dot::encoder::start,
+        ..DATA
     },
     Format {
         word: "mmd",
         what: "a Mermaid flow chart, per window with `{n}`, else the union",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: mermaid::encoder::start,
+        ..DATA
     },
     Format {
         word: "pdf",
         what: "a page per window as vectors, or the `--strip`",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: pdf::start,
+        ..PICTURE
     },
     Format {
         word: "mp4",
         what: "a video, through `ffmpeg`",
-        is_limited: false,
-        is_strip: false,
         check: Some(video::check),
         start: video::start_mp4,
+        ..PICTURE
     },
     Format {
         word: "webm",
         what: "a video, through `ffmpeg`",
-        is_limited: false,
-        is_strip: false,
         check: Some(video::check),
         start: video::start_webm,
+        ..PICTURE
     },
     Format {
         word: "html",
         what: "one page that plays the mission, with everything in it",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: html::encoder::start,
+        ..PICTURE
     },
     Format {
         word: "md",
         what: "a report for a pull request or a job summary",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: report::encoder::start,
+        ..PICTURE
     },
     Format {
         word: "json",
         what: "the evolution as data, which can be read again",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: json::start,
+        ..DATA
     },
     Format {
         word: "csv",
         what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
-        is_limited: false,
-        is_strip: false,
-        check: None,
         start: csv::start,
+        ..DATA
     },
 ];
 
@@ -151,10 +126,8 @@ pub const FORMATS: &[Format] = &[
 const POSTER: &Format = &Format {
     word: "png",
     what: "the first window as an image",
-    is_limited: false,
-    is_strip: false,
-    check: None,
     start: png::start_poster,
+    ..PICTURE
 };
 
 /// Drawings where that is what is asked for, else one that moves.

@@ -5,6 +5,7 @@
 
 mod build;
 pub mod diff;
+pub mod sending;
 pub mod window;
 
 use std::sync::Arc;

@@ -1,8 +1,10 @@
 //! The whole sequence: every window with its graph and what changed; written as JSON and read back as an input.
 
+pub mod activity;
 pub mod events;
 pub mod info;
 pub mod ledger;
+pub mod phases;
 
 mod json;
 pub use json::read::read_json;
@@ -15,6 +17,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
 use crate::graph::{Elements, Graph, NodeId};
 
+pub use activity::Activity;
 pub use ledger::Ledger;
 
 /// One window with its graph.
@@ -53,6 +56,8 @@ pub struct Mission {
     pub windows: Vec<Window>,
     /// What happened, in continuous time.
     pub ledger: Ledger,
+    /// What was alive and how busy on a grid of its own; made when the mission is read, not part of its file.
+    pub activity: Activity,
     /// Where everything was drawn, if it was.
     pub layout: Option<Places>,
     /// What went wrong without stopping us.

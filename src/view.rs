@@ -26,7 +26,6 @@ use crate::evidence::Degree;
 use crate::graph::{Element, State};
 use crate::mission::Mission;
 
-pub use caption::hertz;
 pub use collapse::Candidate;
 pub use filter::NameFilter;
 pub use filtered::filtered;

@@ -16,7 +16,7 @@ const STATIONS: &[&str] = &[
 /// known to all.
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
-    ("base", &[&["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
+    ("base", &[&["words"], &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "index", "input"],
@@ -29,8 +29,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["publishers", "source"],
         &["collector"],
     ]),
-    ("graph", &[&["build", "diff", "window"]]),
-    ("mission", &[&["ledger"], &["events", "json"], &["info"]]),
+    ("graph", &[&["build", "diff", "sending", "window"]]),
+    ("mission", &[&["activity", "ledger"], &["events", "json", "phases"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "filter", "names", "runs", "union"],
         &["options"],
@@ -75,6 +75,8 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     ("csv", &["base/csv", "export/csv"]),
     // Temporary files: of outputs, of decompressed bags, of times beyond what memory may hold.
     ("tempfile", &["bag/source", "evidence/times", "export/sink"]),
+    // Times are read and spelled.
+    ("jiff", &["base"]),
     // Plain functions on numbers, as the standard library's would be.
     ("libm", &[]),
 ];
@@ -431,4 +433,38 @@ fn files_are_rooms_not_halls() {
         .filter(|(lines, _)| *lines > 500)
         .collect();
     assert!(long.is_empty(), "{long:#?}");
+}
+
+/// What formats for people, and where else it may stand with a reason.
+const SPELLINGS: &[(&str, &[&str])] = &[
+    // A rate. The log of events holds the numbers before it makes a sentence of them.
+    (" Hz\"", &["mission/events"]),
+    ("} Hz", &["mission/events"]),
+    ("} kHz", &[]),
+    // A size.
+    ("} MB", &[]),
+    ("} kB", &[]),
+    // A clock or an offset. The player's script has its own, which a browser runs.
+    (":02}:{", &[]),
+    // A plural.
+    ("{ \"s\" }", &[]),
+    ("\"s\" } else", &[]),
+    // A character that nobody sees; names of characters that the font lacks are told in a note.
+    ("escape_unicode", &["draw/picture", "evidence/topology"]),
+    // A name that is cut. Labels are cut by their width in the font, not by characters.
+    ("'…'", &["draw/text", "export/report/escape"]),
+    ("}…\"", &[]),
+];
+
+#[test]
+fn one_module_spells_for_people() {
+    let mut wrong = Vec::new();
+    for file in files().iter().filter(|f| f.path != "base/words") {
+        for (spelling, allowed) in SPELLINGS {
+            if file.code.contains(spelling) && !allowed.iter().any(|a| is_below(&file.path, a)) {
+                wrong.push(format!("{} spells `{spelling}` itself", file.path));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "use `base::words`: {wrong:#?}");
 }

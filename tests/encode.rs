@@ -63,6 +63,7 @@ fn mission(windows: usize) -> (Mission, View) {
         elements: graph::Elements::default(),
         windows: Vec::new(),
         ledger: bagreel::mission::Ledger::default(),
+        activity: bagreel::mission::Activity::default(),
         layout: None,
         notices: notice::Notices::new(),
     };

@@ -15,6 +15,7 @@ mod encode;
 mod evidence;
 mod layout;
 mod pages;
+mod phases;
 mod properties;
 mod reading;
 mod ros2_example;

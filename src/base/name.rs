@@ -87,6 +87,21 @@ pub fn is_recorder(node: &str) -> bool {
         || last.starts_with("_ros2cli_")
 }
 
+/// Whether our default leaves out this node or topic: log, clock, parameters, statistics, recorder events.
+pub fn is_quiet(name: &str) -> bool {
+    const EXACT: [&str; 5] = [
+        "/rosout",
+        "/rosout_agg",
+        "/parameter_events",
+        "/clock",
+        "/statistics",
+    ];
+    EXACT.contains(&name)
+        || name.ends_with("/parameter_updates")
+        || name.ends_with("/parameter_descriptions")
+        || name.starts_with("/events/")
+}
+
 fn is_numbered(name: &str, prefix: &str) -> bool {
     let number = name.strip_prefix(prefix);
     number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::num::NonZeroI64;
 
+use super::words;
+
 /// A point in time: nanoseconds since 1970-01-01T00:00:00Z, by the clock of the recorder.
 ///
 /// Bags hold any value: 0, simulated time near 0, negative numbers. All of `i64` is allowed.
@@ -43,17 +45,6 @@ impl Stamp {
         jiff::Timestamp::from_nanosecond(i128::from(self.0))
             .ok()
             .map(|t| t.to_string())
-    }
-
-    /// The UTC clock as `hh:mm:ss`, for a frame's title bar.
-    pub fn clock(self) -> String {
-        let second = self.0.div_euclid(SECOND).rem_euclid(86_400);
-        format!(
-            "{:02}:{:02}:{:02}",
-            second / 3600,
-            second / 60 % 60,
-            second % 60
-        )
     }
 }
 
@@ -114,7 +105,7 @@ impl Period {
 
 impl fmt::Display for Period {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&short(self.nanos()))
+        f.write_str(&words::period(self.nanos()))
     }
 }
 
@@ -193,40 +184,6 @@ impl Moment {
     }
 }
 
-/// A length as short as it can be said exactly: `10 s`, `1.5 s`, `2 min`, `500 ms`, `1 d`.
-pub fn short(nanos: i64) -> String {
-    const DAY: i64 = 86_400 * SECOND;
-    const HOUR: i64 = 3600 * SECOND;
-    const MINUTE: i64 = 60 * SECOND;
-    match nanos {
-        0 => "0 s".to_owned(),
-        n if n % DAY == 0 => format!("{} d", n / DAY),
-        n if n % HOUR == 0 => format!("{} h", n / HOUR),
-        n if n % MINUTE == 0 => format!("{} min", n / MINUTE),
-        n if n.abs() >= SECOND => format!("{} s", n as f64 / 1e9),
-        n => format!("{} ms", n as f64 / 1e6),
-    }
-}
-
-/// An offset into a mission as `mm:ss`, `h:mm:ss` from an hour on, with a fraction below a second if it has one.
-pub fn offset(nanos: i64) -> String {
-    let sign = if nanos < 0 { "-" } else { "" };
-    let nanos = nanos.unsigned_abs();
-    let second = nanos / 1_000_000_000;
-    let milli = nanos / 1_000_000 % 1000;
-    let fraction = if milli == 0 {
-        String::new()
-    } else {
-        format!(".{milli:03}").trim_end_matches('0').to_owned()
-    };
-    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
-    if hour > 0 {
-        format!("{sign}{hour}:{minute:02}:{second:02}{fraction}")
-    } else {
-        format!("{sign}{minute:02}:{second:02}{fraction}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,13 +211,5 @@ mod tests {
         assert_eq!(at("-30s"), Some(170));
         assert_eq!(at("1970-01-01T00:02:00Z"), Some(120));
         assert_eq!(at("noon"), None);
-    }
-
-    #[test]
-    fn offsets_and_lengths_read_well() {
-        assert_eq!(offset(430 * SECOND), "07:10");
-        assert_eq!(offset(3_723_500_000_000), "1:02:03.5");
-        assert_eq!(short(90 * SECOND), "90 s");
-        assert_eq!(short(120 * SECOND), "2 min");
     }
 }

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::base::error::Error;
 use crate::base::notice::Notices;
+use crate::base::words::visible;
 use crate::pipeline::{Stage, Watch};
 
 /// Standard error and output, as the user set them up.
@@ -168,32 +169,4 @@ fn bar(stage: Stage) -> ProgressBar {
     bar.set_style(style.progress_chars("=> "));
     bar.set_message(stage.word());
     bar
-}
-
-/// Names come from bags: control characters and marks that turn the direction of text are shown, not obeyed.
-pub fn visible(text: &str) -> String {
-    let hidden = |c: char| {
-        (c.is_control() && c != '\n' && c != '\t')
-            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
-    };
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        if hidden(c) {
-            out.extend(c.escape_unicode());
-        } else {
-            out.push(c);
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_cannot_steer_the_terminal() {
-        assert_eq!(visible("/a\u{1b}[2J\u{202e}b"), "/a\\u{1b}[2J\\u{202e}b");
-        assert_eq!(visible("/größe ✓"), "/größe ✓");
-    }
 }

@@ -3,6 +3,7 @@
 mod arrows;
 mod badge;
 mod boxes;
+mod chips;
 mod legend;
 mod measured;
 mod options;
@@ -11,7 +12,6 @@ mod timeline;
 mod title;
 mod tween;
 mod union;
-mod words;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -25,6 +25,7 @@ use self::title::Title;
 pub use self::union::{Part, Union, sign};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::words;
 use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
@@ -375,15 +376,10 @@ fn tracks(measured: &Measured<'_>, layout: &Layout, fit: Fit) -> Vec<ArrowPath> 
 pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
     let names = view.items.iter().map(|item| &*item.name);
     let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();
-    let first: Vec<String> = missing
-        .iter()
-        .take(3)
-        .map(|c| c.escape_unicode().to_string())
-        .collect();
-    let more = if missing.len() > 3 { ", …" } else { "" };
+    let spelled = missing.iter().map(|c| c.escape_unicode().to_string());
+    let some = words::some_of(&spelled.collect::<Vec<_>>(), 3);
     let text = format!(
-        "names hold characters that the font lacks; they are drawn as {}{more}; `--font FILE` adds a font",
-        first.join(", ")
+        "names hold characters that the font lacks; they are drawn as {some}; `--font FILE` adds a font"
     );
     (!missing.is_empty()).then(|| Notice::new(NoticeKind::Glyph, text))
 }

@@ -5,6 +5,7 @@ pub(crate) mod choice;
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::base::time;
+use crate::base::words;
 use crate::draw::picture::{Measured, PageOptions, Picture};
 use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
 use crate::draw::style::Style;
@@ -221,7 +222,7 @@ impl<'a> Source<'a> {
         let line = Stroke::solid(self.style.legend.line, 0.5);
         panel.shape(Shape::line(Form::Rect(border, 0.0), line));
         let start = self.mission.span.start;
-        let time = |at: time::Stamp| time::offset(at.since(start));
+        let time = |at: time::Stamp| words::offset(at.since(start));
         let lines = [
             (
                 format!("{}–{}", time(frame.span.start), time(frame.span.end)),
@@ -400,6 +401,7 @@ mod tests {
             elements: Elements::default(),
             windows: Vec::new(),
             ledger: crate::mission::Ledger::default(),
+            activity: crate::mission::Activity::default(),
             layout: None,
             notices: Notices::new(),
         };

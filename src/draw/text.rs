@@ -174,7 +174,7 @@ impl Fonts {
     }
 
     fn can_show(&self, c: char) -> bool {
-        !is_invisible(c) && self.advance(c, Weight::Regular).is_some()
+        !crate::base::words::is_invisible(c) && self.advance(c, Weight::Regular).is_some()
     }
 
     /// `text` shortened in the middle by `…` until it is at most `most` pixels wide; at least its ends are kept.
@@ -202,31 +202,6 @@ impl Fonts {
         }
         Cow::Owned(short(fits))
     }
-}
-
-/// `text` with control characters, invisible and direction marks written as `\u{…}`, so that it cannot hide or turn
-/// round what stands beside it; for pages, where the reader's own fonts show the rest.
-pub fn visible(text: &str) -> Cow<'_, str> {
-    if !text.contains(is_invisible) {
-        return Cow::Borrowed(text);
-    }
-    let spelled = |c: char| {
-        if is_invisible(c) {
-            c.escape_unicode().to_string()
-        } else {
-            c.to_string()
-        }
-    };
-    Cow::Owned(text.chars().map(spelled).collect())
-}
-
-/// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
-pub(crate) fn is_invisible(c: char) -> bool {
-    c.is_control()
-        || (c.is_whitespace() && c != ' ')
-        || matches!(c, '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180e}' | '\u{200b}'..='\u{200f}'
-            | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}'
-            | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e0fff}')
 }
 
 #[cfg(test)]

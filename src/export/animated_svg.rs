@@ -7,11 +7,11 @@ use std::fmt::Write as _;
 
 use super::{AtOnce, Encoder};
 use crate::base::error::Result;
-use crate::base::time::{offset, short};
+use crate::base::words;
+use crate::base::words::visible;
 use crate::draw::paint::classes::bars;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
-use crate::draw::paint::svg::escape;
-use crate::draw::text::visible;
+use crate::draw::paint::xml::escape;
 use crate::export::sequence::{Sequence, Whole};
 use crate::export::target::Target;
 use crate::view::View;
@@ -57,7 +57,7 @@ fn remark(view: &View) -> Option<String> {
 }
 
 fn animation(view: &View, whole: &Whole<'_>, frame_ms: u32) -> String {
-    let runs = Runs::of(view, crate::view::hertz);
+    let runs = Runs::of(view, words::rate);
     let play = Play {
         view,
         runs: &runs,
@@ -199,8 +199,8 @@ impl Play<'_> {
             out,
             "</text><text class=\"u\" x=\"16\" y=\"45\">{} windows of {} · {}</text>",
             self.windows,
-            short(first.span.nanos()),
-            offset(whole)
+            words::period(first.span.nanos()),
+            words::offset(whole)
         );
         let told = self
             .view
@@ -257,7 +257,7 @@ impl Play<'_> {
                     out,
                     "<text class=\"x\" style=\"text-anchor:{anchor}\" x=\"{x:.0}\" y=\"{:.0}\">{}</text>",
                     y + 17.0,
-                    offset(nanos)
+                    words::offset(nanos)
                 );
             }
         }
@@ -301,16 +301,12 @@ impl ElementLook for AnimatedElement<'_> {
     fn text(&self) -> String {
         let still = at(&self.life.rates, self.play.still);
         let label = |place: u32| &self.play.runs.labels[place as usize];
-        let known = |run: &&Run| !matches!(label(run.value).as_str(), "" | "0");
+        let silent = words::rate(0.0);
+        let is_known = |label: &String| !label.is_empty() && *label != silent;
+        let known = |run: &&Run| is_known(label(run.value));
         let first = self.life.rates.iter().find(known).map_or(0, |s| s.value);
-        match label(if matches!(label(still).as_str(), "" | "0") {
-            first
-        } else {
-            still
-        }) {
-            hz if hz.is_empty() => String::new(),
-            hz => format!("{hz} Hz"),
-        }
+        let shown = if is_known(label(still)) { still } else { first };
+        label(shown).clone()
     }
 
     fn more(&self) -> String {

@@ -9,6 +9,7 @@ mod plain;
 mod rqt;
 
 use crate::base::geometry::Size;
+use crate::base::words;
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::evidence::Evidence;
@@ -126,7 +127,7 @@ fn line(shown: &Shown) -> &'static str {
 /// A rate as `rqt_graph` writes it; `None` where nothing flows.
 fn rate(shown: &Shown) -> Option<String> {
     let hz = shown.hz.filter(|hz| *hz > 0.0 && hz.is_finite())?;
-    (shown.mark != Some(Mark::Removed)).then(|| format!("{hz:.1} Hz"))
+    (shown.mark != Some(Mark::Removed)).then(|| words::rate(hz))
 }
 
 /// The width of a line in whole points, 1 to 5, a step per factor of ten from 1 Hz on.

@@ -176,6 +176,8 @@ pub struct Format {
     pub word: &'static str,
     /// What it is, for `--help` and the README.
     pub what: &'static str,
+    /// Whether it shows the picture; the others write the graph itself, whose size no page limits.
+    pub is_drawn: bool,
     /// Whether `--max-bytes` binds it.
     pub is_limited: bool,
     /// Whether, without `{n}`, several windows become a film strip unless one asks for another.
@@ -186,10 +188,36 @@ pub struct Format {
     pub start: Start,
 }
 
-impl Format {
-    /// Whether it shows the picture; the others write the graph itself, whose size no page limits.
-    pub fn is_drawn(&self) -> bool {
-        let data = ["dot", "mmd", "json", "csv", "parquet", "gexf", "graphml"];
-        !data.contains(&self.word)
-    }
+/// What formats of drawings have in common.
+pub(crate) const PICTURE: Format = Format {
+    word: "",
+    what: "",
+    is_drawn: true,
+    is_limited: false,
+    is_strip: false,
+    check: None,
+    start: nothing,
+};
+
+/// What formats that play have in common.
+pub(crate) const ANIMATION: Format = Format {
+    is_limited: true,
+    ..PICTURE
+};
+
+/// What formats of single images have in common.
+pub(crate) const IMAGE: Format = Format {
+    is_strip: true,
+    ..PICTURE
+};
+
+/// What formats that hold the graph itself have in common.
+pub(crate) const DATA: Format = Format {
+    is_drawn: false,
+    ..PICTURE
+};
+
+/// The start that each row replaces by its own.
+fn nothing<'a>(_: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
+    AtOnce::start(target, || (String::new(), Vec::new()))
 }

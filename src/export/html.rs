@@ -7,12 +7,13 @@ mod table;
 use std::fmt::Write as _;
 
 use crate::base::digest;
-use crate::base::time;
+use crate::base::words;
+use crate::base::words::visible;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
-use crate::draw::paint::svg::escape;
+use crate::draw::paint::xml::escape;
 use crate::draw::picture::Union;
 use crate::draw::style::Style;
-use crate::draw::text::{self, visible};
+use crate::draw::text;
 use crate::mission::Mission;
 use crate::view::runs::{ElementRuns, Runs, at};
 use crate::view::{Frame, View};
@@ -41,7 +42,7 @@ pub struct Page<'a> {
 impl Page<'_> {
     /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
     pub fn write(&self) -> String {
-        let runs = Runs::of(self.view, |hz| crate::view::hertz(hz) + " Hz");
+        let runs = Runs::of(self.view, words::rate);
         let still = self.view.busiest();
         let fonts = fonts();
         let look = self.look(&runs);
@@ -131,7 +132,7 @@ impl Page<'_> {
     fn place(&self, still: usize) -> String {
         let count = self.view.frames.len();
         let at = self.view.frames.get(still).map_or(0, |f| self.offset(f));
-        format!("window {} of {count} · {}", still + 1, time::offset(at))
+        format!("window {} of {count} · {}", still + 1, words::offset(at))
     }
 
     /// Nanoseconds from the start of the first window to that of `frame`.
@@ -147,7 +148,7 @@ impl Page<'_> {
         let whole = last.span.end.since(first.span.start);
         let tick = |quarter: i64| {
             let second = whole / 4_000_000_000 * quarter;
-            format!("<span>{}</span>", time::offset(second * 1_000_000_000))
+            format!("<span>{}</span>", words::offset(second * 1_000_000_000))
         };
         (0..=4).map(tick).collect()
     }

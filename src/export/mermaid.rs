@@ -4,8 +4,9 @@ pub(crate) mod encoder;
 
 use std::fmt::Write as _;
 
+use crate::base::words;
 use crate::draw::style::Style;
-use crate::view::{ArrowKind, Frame, ItemKind, Mark, Shown, View, hertz};
+use crate::view::{ArrowKind, Frame, ItemKind, Mark, Shown, View};
 
 /// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
 pub fn chart(view: &View, style: &Style, frame: &Frame) -> String {
@@ -26,7 +27,9 @@ pub fn chart(view: &View, style: &Style, frame: &Frame) -> String {
         };
         let label = match (topic, shown.hz.filter(|hz| *hz > 0.0)) {
             (topic, None) => topic,
-            (topic, Some(hz)) => format!("{topic} {} Hz", hertz(hz)).trim_start().to_owned(),
+            (topic, Some(hz)) => format!("{topic} {}", words::rate(hz))
+                .trim_start()
+                .to_owned(),
         };
         let label = if label.is_empty() {
             label

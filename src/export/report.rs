@@ -7,7 +7,7 @@ mod tables;
 
 use std::fmt::Write as _;
 
-use crate::base::time::{offset, short};
+use crate::base::words;
 use crate::draw::style::{BUILTIN, Style};
 use crate::export::mermaid;
 use crate::export::sequence::Sequence;
@@ -62,14 +62,14 @@ fn headline(sequence: &Sequence<'_>, view: &View) -> String {
     let _ = write!(
         out,
         "{} from {} in {} of {}; ",
-        offset(span),
+        words::offset(span),
         first
             .span
             .start
             .rfc3339()
             .unwrap_or_else(|| first.span.start.to_string()),
-        count(view.frames.len(), "window"),
-        short(first.span.nanos())
+        words::count(view.frames.len(), "window"),
+        words::period(first.span.nanos())
     );
     let changed = view.frames.iter().filter(|f| !f.caption.is_empty()).count();
     if changed == 0 {
@@ -109,13 +109,8 @@ fn told(tally: &Counts) -> Vec<String> {
     ];
     let present = all.iter().filter(|(n, _, _)| *n > 0);
     present
-        .map(|(n, word, what)| count(*n, word) + what)
+        .map(|(n, word, what)| words::count(*n, word) + what)
         .collect()
-}
-
-fn count(n: usize, word: &str) -> String {
-    let plural = if n == 1 { "" } else { "s" };
-    format!("{n} {word}{plural}")
 }
 
 fn changes(view: &View) -> String {
@@ -126,7 +121,7 @@ fn changes(view: &View) -> String {
         let words = frame.caption.join("; ");
         format!(
             "| {} | {} | {} |\n",
-            offset(at),
+            words::offset(at),
             frame.index + 1,
             plain(&words)
         )
@@ -153,7 +148,7 @@ fn chart(view: &View) -> String {
         let _ = writeln!(
             out,
             "{} more left out of the graph.\n",
-            count(left_out, "edge")
+            words::count(left_out, "edge")
         );
     }
     out

@@ -1,7 +1,8 @@
 //! Time divided into periods: which windows a mission has.
 
 use crate::base::error::{Error, Result};
-use crate::base::time::{Moment, Period, Span, Stamp, short};
+use crate::base::time::{Moment, Period, Span, Stamp};
+use crate::base::words;
 
 /// How many windows are made at most.
 pub const MOST_WINDOWS: i64 = 100_000;
@@ -107,7 +108,7 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
     Err(Error::usage(
         format!(
             "`--start` and `--end` leave nothing of the {} of this bag",
-            short(bag.nanos())
+            words::period(bag.nanos())
         ),
         format!("the bag covers {} to {}", bag.start, bag.end),
     ))
@@ -204,6 +205,18 @@ fn too_many(many: i64, nanos: i64) -> Error {
         format!("{many} windows are more than {MOST_WINDOWS}"),
         format!("`--period {}` would do", plain(enough)),
     )
+}
+
+/// `span` cut into pieces of `step` nanoseconds, at least 1; the last one may be shorter.
+pub(crate) fn every(span: Span, step: i64) -> Vec<Span> {
+    let step = step.max(1);
+    let many = count(span.nanos().max(1), step);
+    let starts = (0..many).map(|k| span.start.plus(k * step));
+    let piece = |start: Stamp| Span {
+        start,
+        end: start.plus(step).min(span.end),
+    };
+    starts.map(piece).collect()
 }
 
 /// A period as `--period` takes it.

@@ -1,7 +1,8 @@
 //! The reconfiguration log: every change of a mission as one row with its time, in order.
 
 use crate::base::name::last_part;
-use crate::base::time::{Stamp, offset};
+use crate::base::time::Stamp;
+use crate::base::words;
 use crate::graph::diff::Change;
 use crate::graph::{Edge, Element};
 use crate::mission::Mission;
@@ -57,7 +58,12 @@ fn event(mission: &Mission, window: usize, start: Stamp, change: &Change) -> Eve
             what,
             from_hz,
             to_hz,
-        } => (*what, None, Some(hz(*from_hz)), Some(hz(*to_hz))),
+        } => (
+            *what,
+            None,
+            Some(words::number(*from_hz)),
+            Some(words::number(*to_hz)),
+        ),
         Change::HandedOver { topic, from, to } => {
             (Element::Topic(*topic), None, names(from), names(to))
         }
@@ -93,22 +99,6 @@ fn named(mission: &Mission, what: Element) -> (String, Option<String>) {
     }
 }
 
-/// A rate as people say it: three significant digits.
-pub fn hz(rate: f64) -> String {
-    let digits = match rate.abs() {
-        r if r >= 99.95 => 0,
-        r if r >= 9.995 => 1,
-        _ => 2,
-    };
-    let text = format!("{rate:.digits$}");
-    let text = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        &text
-    };
-    text.to_owned()
-}
-
 impl Event {
     /// The event as one sentence without a period: `/planner appeared`, `/scan 15 → 7.4 Hz`.
     pub fn sentence(&self) -> String {
@@ -134,17 +124,6 @@ impl Event {
     /// When it happened, counted from the mission's start, such as `07:10.2`; `~` in front where only the window is known.
     pub fn at(&self, mission: &Mission) -> String {
         let about = if self.exact { "" } else { "~" };
-        format!("{about}{}", offset(mission.offset(self.time)))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rates_are_said_with_three_digits() {
-        let said: Vec<_> = [0.0, 0.125, 7.4, 15.0, 29.97, 100.0, 1234.5].map(hz).into();
-        assert_eq!(said, ["0", "0.12", "7.4", "15", "30", "100", "1234"]);
+        format!("{about}{}", words::offset(mission.offset(self.time)))
     }
 }

@@ -152,12 +152,15 @@ impl Entry {
 pub struct Phase {
     /// From when to when, half-open.
     pub span: Span,
-    /// What it is called: the user's name, or what began in it.
+    /// What it is called: the user's name, or what began in it: `+4 nodes: controller, costmap and 2 more`.
     pub name: Arc<str>,
-    /// Nodes that are there and were not in the phase before.
+    /// Nodes (roles; topics where publishers are unknown) that are there and were not in the phase before; in the first
+    /// phase all that are there.
     pub nodes_added: u32,
     /// Nodes that were in the phase before and are not there.
     pub nodes_removed: u32,
+    /// Whether it stands for many short phases in a row that only added or only removed.
+    pub is_ramp: bool,
     /// The earlier phase, by place, that has the same configuration.
     pub same_as: Option<u32>,
 }

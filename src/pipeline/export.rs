@@ -76,7 +76,7 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
     }
     // What is not drawn needs no places.
-    let is_drawn = job.outputs.iter().any(|o| o.format.is_drawn());
+    let is_drawn = job.outputs.iter().any(|o| o.format.is_drawn);
     let Composed {
         view,
         options,

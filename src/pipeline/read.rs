@@ -13,7 +13,10 @@ use crate::evidence::EvidenceLine;
 use crate::evidence::collector::{self, Collected, Collector};
 use crate::graph;
 use crate::graph::diff::RATE_CHANGE;
+use crate::graph::sending::sending;
 use crate::graph::window::{self, Division, Length, Windows};
+use crate::mission::activity::{self, Activity, Cell};
+use crate::mission::phases::phases;
 use crate::mission::{Mission, Window, read_json};
 
 /// What to read and how.
@@ -104,6 +107,10 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let mut mission = read_json(&text, path)?;
     drop(text);
     mission.find_changes(reading.rate_change, &[]);
+    mission.activity = Activity::of_windows(&mission);
+    if mission.ledger.phases.is_empty() {
+        mission.ledger.phases = phases(&mission.elements, &mission.activity);
+    }
     Ok(mission)
 }
 
@@ -194,11 +201,29 @@ fn build(recorded: &mut Recorded, reading: &Reading, watch: &mut dyn Watch) -> R
         let merged = merged(&mission, &windows);
         mission = graphs(recorded, &merged, reading)?;
     }
+    mission.activity = activity(&mut recorded, &mission, reading)?;
+    mission.ledger.phases = phases(&mission.elements, &mission.activity);
     if reading.division.length == Length::Auto {
         let text = format!("the period is {}; `--period` takes another", windows.period);
         mission.notices.add(Notice::new(NoticeKind::Chosen, text));
     }
     Ok(mission)
+}
+
+/// The graphs of the same mission on the grid that no `--period` moves.
+fn activity(recorded: &mut Recorded, mission: &Mission, reading: &Reading) -> Result<Activity> {
+    let options = graph::Options {
+        // Counted in windows, which these are not.
+        grace: 0,
+        ..reading.graph.clone()
+    };
+    let spans = activity::grid(mission.span);
+    let built = graph::build(&mut recorded.collected, &spans, &options)?;
+    let cells = spans.into_iter().zip(built.graphs);
+    Ok(Activity {
+        cells: cells.map(|(span, graph)| Cell { span, graph }).collect(),
+        sending: sending(&mut recorded.collected, &mission.elements)?,
+    })
 }
 
 /// Builds the graph of every window and finds what changed.
@@ -232,6 +257,7 @@ fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Resu
         elements: built.elements,
         windows: list,
         ledger: crate::mission::Ledger::default(),
+        activity: Activity::default(),
         layout: None,
         notices,
     };

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::items::Viewed;
 use super::{ArrowKind, Frame, Item, ItemKind, Mark, Shown};
 use crate::base::name::last_part;
+use crate::base::words;
 use crate::graph::diff::{Change, ValueKind};
 use crate::graph::{Element, Elements, NodeId, TopicId};
 
@@ -14,22 +15,6 @@ const MOST_PHRASES: usize = 6;
 const MOST_NAMED: usize = 3;
 /// Longer names are cut.
 const LONGEST_NAME: usize = 40;
-
-/// A rate in the fewest digits that tell it apart: `0.05`, `7.4`, `15`, `120`; `?` for what is no number.
-pub fn hertz(hz: f64) -> String {
-    if !hz.is_finite() {
-        return "?".to_owned();
-    }
-    let text = match hz.abs() {
-        size if size >= 99.95 => format!("{hz:.0}"),
-        size if size >= 0.95 => format!("{hz:.1}"),
-        _ => format!("{hz:.2}"),
-    };
-    match text.split_once('.') {
-        Some(_) => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        None => text,
-    }
-}
 
 /// Puts changes into words. Names are short where that is clear: `planner`, `scan`, but `/cmd_vel` at the root.
 pub(crate) struct Speaker<'a> {
@@ -208,7 +193,7 @@ impl<'a> Speaker<'a> {
         rates.sort_by(|a, b| factor(&b.1).total_cmp(&factor(&a.1)));
         let rest = rates.len().saturating_sub(MOST_NAMED);
         for (name, (from, to)) in rates.iter().take(MOST_NAMED) {
-            phrases.push(format!("{name} {} → {} Hz", hertz(*from), hertz(*to)));
+            phrases.push(format!("{name} {}", words::rate_change(*from, *to)));
         }
         match rest {
             0 => {}
@@ -340,10 +325,7 @@ fn whole(item: &Item) -> (&str, Option<&'static str>) {
 }
 
 fn clip(name: &str) -> String {
-    match name.char_indices().nth(LONGEST_NAME) {
-        None => name.to_owned(),
-        Some((end, _)) => format!("{}…", name.get(..end).unwrap_or_default()),
-    }
+    words::shorten(name, LONGEST_NAME).into_owned()
 }
 
 fn prefixed(prefix: &str, text: &str) -> String {
@@ -376,25 +358,6 @@ mod tests {
     fn caption(windows: &[&str]) -> String {
         let (view, _) = view(&mission(windows), &ViewOptions::default());
         view.frames.last().unwrap().caption.join("; ")
-    }
-
-    #[test]
-    fn rates_are_written_with_few_digits() {
-        let all = [
-            0.0,
-            0.05,
-            0.5,
-            0.999,
-            1.0,
-            7.44,
-            12.5,
-            15.0,
-            99.97,
-            120.4,
-            f64::NAN,
-        ];
-        let all: Vec<String> = all.into_iter().map(hertz).collect();
-        assert_eq!(all.join(" "), "0 0.05 0.5 1 1 7.4 12.5 15 100 120 ?");
     }
 
     #[test]

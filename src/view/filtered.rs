@@ -5,7 +5,7 @@ use super::state::{shows_node, shows_topic};
 use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph};
-use crate::mission::{Mission, Window};
+use crate::mission::{Activity, Mission, Window};
 
 /// The evolution without what the view leaves out. Topics in groups and what is inside collapsed namespaces are seen,
 /// so they stay, under their own names; so do changes, as they were found in the whole graph.
@@ -16,6 +16,8 @@ pub fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     Mission {
         elements: keep.elements(&mission.elements),
         windows: windows.map(|w| keep.window(w, options, &viewed)).collect(),
+        // By ids of elements that are others here.
+        activity: Activity::default(),
         ..mission.clone()
     }
 }

@@ -7,7 +7,8 @@ use super::counts::tally;
 use super::items::Viewed;
 use super::marks::{MarkedRate, News, alone};
 use super::state::{States, present};
-use super::{Frame, Mark, Shown, ViewOptions, hertz};
+use super::{Frame, Mark, Shown, ViewOptions};
+use crate::base::words;
 use crate::graph::diff::RATE_CHANGE;
 use crate::mission::Mission;
 
@@ -79,7 +80,8 @@ fn marked(before: &States, now: &States, news: &BTreeMap<u32, MarkedRate>) -> Ve
 /// Whether the rate of several together changed, when the rate of one of them did.
 fn summed(from: Option<f64>, to: Option<f64>) -> Option<MarkedRate> {
     let (from, to) = (from?, to?);
-    let differs = (to - from).abs() > RATE_CHANGE * from && hertz(from) != hertz(to);
+    let differs =
+        (to - from).abs() > RATE_CHANGE * from && words::number(from) != words::number(to);
     let mark = if to > from {
         Mark::Faster
     } else {

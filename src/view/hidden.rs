@@ -6,6 +6,7 @@ use super::ViewOptions;
 use super::items::Viewed;
 use super::select::Reason;
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::words;
 use crate::graph::Elements;
 
 /// So many names are given as examples.
@@ -92,19 +93,15 @@ fn words(reason: Reason) -> (&'static str, &'static str) {
 }
 
 fn examples(names: &[&str]) -> String {
-    let mut list: Vec<String> = names.iter().take(EXAMPLES).map(|n| shortened(n)).collect();
+    let mut list: Vec<String> = names
+        .iter()
+        .take(EXAMPLES)
+        .map(|n| words::shorten(n, 60).into_owned())
+        .collect();
     if names.len() > EXAMPLES {
         list.push("…".to_owned());
     }
     list.join(", ")
-}
-
-/// Names come from the bag: they may be of any length.
-fn shortened(name: &str) -> String {
-    match name.char_indices().nth(60) {
-        None => name.to_owned(),
-        Some((end, _)) => format!("{}…", name.get(..end).unwrap_or_default()),
-    }
 }
 
 #[cfg(test)]

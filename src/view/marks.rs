@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::items::{Place, Viewed};
-use super::{ItemKind, Mark, hertz};
+use super::{ItemKind, Mark};
+use crate::base::words;
 use crate::graph::diff::Change;
 use crate::graph::{Element, Elements, Graph, TopicId};
 
@@ -31,7 +32,7 @@ impl News {
                     what,
                     from_hz,
                     to_hz,
-                } if hertz(*from_hz) != hertz(*to_hz) => {
+                } if words::number(*from_hz) != words::number(*to_hz) => {
                     let faster = to_hz > from_hz;
                     let mark = if faster { Mark::Faster } else { Mark::Slower };
                     news.add(viewed, *what, mark, Some(*from_hz));

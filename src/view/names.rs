@@ -1,19 +1,6 @@
-//! Which names are housekeeping: by our own short list, and by the lists of `rqt_graph`.
+//! Which names are housekeeping by the lists of `rqt_graph`; our own short list is the names' station's.
 
-/// Whether our default leaves out this node or topic: log, clock, parameters, statistics, recorder events.
-pub(crate) fn is_quiet(name: &str) -> bool {
-    const EXACT: [&str; 5] = [
-        "/rosout",
-        "/rosout_agg",
-        "/parameter_events",
-        "/clock",
-        "/statistics",
-    ];
-    EXACT.contains(&name)
-        || name.ends_with("/parameter_updates")
-        || name.ends_with("/parameter_descriptions")
-        || name.starts_with("/events/")
-}
+pub(crate) use crate::base::name::is_quiet;
 
 /// Whether `rqt_graph`'s "Debug" leaves out this node or topic (`_quiet_filter` of its `dotcode.py`).
 pub(crate) fn is_debug(name: &str) -> bool {

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use super::names::{is_debug, is_params, is_quiet, is_tf};
 use super::options::{Mode, ViewOptions};
-use crate::base::name::{is_player, is_recorder};
-use crate::graph::{Elements, Node};
+use crate::graph::Elements;
+use crate::mission::activity::records;
 
 /// Why something is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,12 +28,6 @@ pub(crate) enum Reason {
 pub(crate) struct Selection {
     pub(crate) nodes: Vec<Option<Reason>>,
     pub(crate) topics: Vec<Option<Reason>>,
-}
-
-/// Whether a node is a recorder or player, by its name or by what it logs.
-fn records(node: &Node) -> bool {
-    let name = node.name.as_str();
-    is_recorder(name) || is_player(name) || node.evidence.words().any(|word| word == "recorder")
 }
 
 /// How many connections a topic has.

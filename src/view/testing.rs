@@ -40,6 +40,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         elements,
         windows,
         ledger: crate::mission::Ledger::default(),
+        activity: crate::mission::Activity::default(),
         layout: None,
         notices: Notices::new(),
     };

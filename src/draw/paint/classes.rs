@@ -9,11 +9,11 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use crate::base::geometry::Point;
-use crate::draw::paint::svg::{escape, units};
+use crate::base::words::is_invisible;
+use crate::draw::paint::xml::{escape, units};
 use crate::draw::picture::{Part, Union};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
-use crate::draw::text::is_invisible;
 use crate::view::runs::Runs;
 use crate::view::runs::word;
 use crate::view::{Mark, View};

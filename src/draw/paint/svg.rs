@@ -1,7 +1,8 @@
 //! A scene as SVG text: the only painter for screens.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Display, Write as _};
 
+use super::xml::{Xml, hundredth, tenth};
 use crate::base::digest::base64;
 use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
 use crate::draw::style::Color;
@@ -9,19 +10,12 @@ use crate::draw::text::{Fonts, Weight};
 
 /// The scene as one SVG document: UTF-8, a line per group, coordinates rounded to a tenth of a pixel, names escaped.
 pub fn write(scene: &Scene) -> String {
-    let mut out = String::with_capacity(4096 + scene.groups.len() * 512);
-    open(&mut out, scene, "");
-    for group in &scene.groups {
-        write_group(&mut out, group);
-        out.push('\n');
-    }
-    out.push_str("</svg>\n");
-    out
+    document(scene, "")
 }
 
 /// The same with the bundled font inside, so that it looks the same where Inter is not installed (125 KB more).
 pub fn write_with_fonts(scene: &Scene) -> String {
-    let mut css = String::from("<style>");
+    let mut css = String::new();
     for (weight, data) in [
         (400, crate::draw::text::REGULAR),
         (600, crate::draw::text::SEMIBOLD),
@@ -34,148 +28,113 @@ pub fn write_with_fonts(scene: &Scene) -> String {
         base64(&mut css, data);
         css.push_str(")}");
     }
-    css.push_str("</style>\n");
-    let mut out = String::with_capacity(css.len() + 4096 + scene.groups.len() * 512);
-    open(&mut out, scene, &css);
-    for group in &scene.groups {
-        write_group(&mut out, group);
-        out.push('\n');
+    document(scene, &css)
+}
+
+fn document(scene: &Scene, css: &str) -> String {
+    let mut xml = Xml::with_capacity(4096 + css.len() + scene.groups.len() * 512);
+    open(&mut xml, scene);
+    if !scene.title.is_empty() {
+        xml.leaf("title", &scene.title).raw("\n");
     }
-    out.push_str("</svg>\n");
-    out
+    if !css.is_empty() {
+        xml.open("style").raw(css).close().raw("\n");
+    }
+    if scene.background != Color::NONE {
+        xml.open("rect")
+            .attribute("width", tenth(scene.size.w))
+            .attribute("height", tenth(scene.size.h))
+            .attribute("fill", scene.background);
+        xml.close_empty().raw("\n");
+    }
+    for group in &scene.groups {
+        write_group(&mut xml, group);
+        xml.raw("\n");
+    }
+    xml.close().raw("\n");
+    xml.finish()
 }
 
 /// A document of the scene's size that holds this one group and no background, for painters that keep groups apart.
 pub(crate) fn write_alone(scene: &Scene, group: &Group) -> String {
-    let mut out = String::with_capacity(1024);
-    open_tag(&mut out, scene);
-    write_group(&mut out, group);
-    out.push_str("</svg>");
-    out
+    let mut xml = Xml::with_capacity(1024);
+    open(&mut xml, scene);
+    write_group(&mut xml, group);
+    xml.finish()
 }
 
-fn open(out: &mut String, scene: &Scene, style: &str) {
-    open_tag(out, scene);
-    if !scene.title.is_empty() {
-        out.push_str("<title>");
-        escape(out, &scene.title);
-        out.push_str("</title>\n");
-    }
-    out.push_str(style);
-    if scene.background != Color::NONE {
-        let size = scene.size;
-        out.push_str("<rect width=\"");
-        number(out, size.w);
-        out.push_str("\" height=\"");
-        number(out, size.h);
-        let _ = writeln!(out, "\" fill=\"{}\"/>", scene.background);
-    }
-}
-
-fn open_tag(out: &mut String, scene: &Scene) {
+fn open(xml: &mut Xml, scene: &Scene) {
     let size = scene.size;
-    out.push_str("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"");
     let (scale, unit) = match scene.width_mm {
         Some(mm) if size.w > 0.0 => (mm / size.w, "mm"),
         _ => (1.0, ""),
     };
-    number(out, size.w * scale);
-    let _ = write!(out, "{unit}\" height=\"");
-    number(out, size.h * scale);
-    let _ = write!(out, "{unit}\" viewBox=\"0 0 ");
-    number(out, size.w);
-    out.push(' ');
-    number(out, size.h);
-    let _ = writeln!(
-        out,
-        "\" font-family=\"{}, Helvetica, Arial, sans-serif\">",
-        Fonts::FAMILY
-    );
+    let [width, height] = [size.w, size.h].map(|side| format!("{}{unit}", tenth(side * scale)));
+    xml.open("svg")
+        .attribute("xmlns", "http://www.w3.org/2000/svg")
+        .attribute("width", width)
+        .attribute("height", height)
+        .attribute(
+            "viewBox",
+            format_args!("0 0 {} {}", tenth(size.w), tenth(size.h)),
+        )
+        .attribute(
+            "font-family",
+            format_args!("{}, Helvetica, Arial, sans-serif", Fonts::FAMILY),
+        )
+        .raw("\n");
 }
 
-fn write_group(out: &mut String, group: &Group) {
-    out.push_str("<g class=\"");
-    escape(out, &group.class);
-    out.push('"');
+fn write_group(xml: &mut Xml, group: &Group) {
+    xml.open("g").attribute("class", &group.class);
     for (key, value) in &group.data {
-        let _ = write!(out, " data-{key}=\"");
-        escape(out, value);
-        out.push('"');
+        xml.attribute(format_args!("data-{key}"), value);
     }
-    out.push_str(" id=\"");
-    escape(out, &group.id);
-    out.push('"');
+    xml.attribute("id", &group.id);
     if group.fade.0 < 1.0 {
         // A hundredth: fine enough for the eye, and a group that has all but vanished vanishes.
-        let hundredths = libm::round(group.fade.0.max(0.0) * 100.0);
-        let _ = write!(out, " opacity=\"{}\"", hundredths / 100.0);
+        xml.attribute("opacity", hundredth(group.fade.0.max(0.0)));
     }
-    out.push('>');
-    if !group.title.is_empty() {
-        out.push_str("<title>");
-        escape(out, &group.title);
-        out.push_str("</title>");
-    }
+    xml.leaf("title", &group.title);
     for piece in &group.pieces {
         match piece {
-            Piece::Shape(shape) => write_shape(out, shape),
-            Piece::Text(text) => write_text(out, text),
+            Piece::Shape(shape) => write_shape(xml, shape),
+            Piece::Text(text) => write_text(xml, text),
         }
     }
-    out.push_str("</g>");
+    xml.close();
 }
 
-fn write_shape(out: &mut String, shape: &Shape) {
+fn write_shape(xml: &mut Xml, shape: &Shape) {
     match &shape.form {
         Form::Rect(rect, radius) => {
-            out.push_str("<rect");
-            attributes(
-                out,
-                &[
-                    ("x", rect.x),
-                    ("y", rect.y),
-                    ("width", rect.w),
-                    ("height", rect.h),
-                ],
-            );
+            xml.open("rect")
+                .attribute("x", tenth(rect.x))
+                .attribute("y", tenth(rect.y))
+                .attribute("width", tenth(rect.w))
+                .attribute("height", tenth(rect.h));
             if *radius > 0.0 {
-                attributes(out, &[("rx", *radius)]);
+                xml.attribute("rx", tenth(*radius));
             }
         }
         Form::Ellipse(rect) => {
             let centre = rect.centre();
-            out.push_str("<ellipse");
-            attributes(
-                out,
-                &[
-                    ("cx", centre.x),
-                    ("cy", centre.y),
-                    ("rx", rect.w / 2.0),
-                    ("ry", rect.h / 2.0),
-                ],
-            );
+            xml.open("ellipse")
+                .attribute("cx", tenth(centre.x))
+                .attribute("cy", tenth(centre.y))
+                .attribute("rx", tenth(rect.w / 2.0))
+                .attribute("ry", tenth(rect.h / 2.0));
         }
         Form::Path(steps) if is_polygon(steps) => {
-            out.push_str("<polygon points=\"");
-            for (at, step) in steps.iter().enumerate() {
-                if let Step::Move(p) | Step::Line(p) = step {
-                    out.push_str(if at > 0 { " " } else { "" });
-                    number(out, p.x);
-                    out.push(',');
-                    number(out, p.y);
-                }
-            }
-            out.push('"');
+            xml.open("polygon").attribute("points", Corners(steps));
         }
         Form::Path(steps) => {
-            out.push_str("<path d=\"");
-            write_steps(out, steps);
-            out.push('"');
+            xml.open("path").attribute("d", Steps(steps));
         }
     }
-    let _ = write!(out, " fill=\"{}\"", shape.fill);
-    write_stroke(out, &shape.stroke);
-    out.push_str("/>");
+    xml.attribute("fill", shape.fill);
+    write_stroke(xml, &shape.stroke);
+    xml.close_empty();
 }
 
 /// Whether a path is one closed run of straight lines: heads of arrows and signs, which tools should not take for routes.
@@ -183,149 +142,87 @@ fn is_polygon(steps: &[Step]) -> bool {
     matches!(steps, [Step::Move(_), lines @ .., Step::Close] if lines.iter().all(|s| matches!(s, Step::Line(_))))
 }
 
-fn write_steps(out: &mut String, steps: &[Step]) {
-    for step in steps {
-        let (letter, points) = match step {
-            Step::Move(p) => ("M", std::slice::from_ref(p)),
-            Step::Line(p) => ("L", std::slice::from_ref(p)),
-            Step::Curve(points) => ("C", points.as_slice()),
-            Step::Close => ("Z", [].as_slice()),
-        };
-        out.push_str(letter);
-        for (at, p) in points.iter().enumerate() {
-            if at > 0 {
-                out.push(' ');
+/// The corners of a polygon: `0,1 2,3`.
+struct Corners<'a>(&'a [Step]);
+
+impl Display for Corners<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, step) in self.0.iter().enumerate() {
+            if let Step::Move(p) | Step::Line(p) = step {
+                let gap = if at > 0 { " " } else { "" };
+                write!(f, "{gap}{},{}", tenth(p.x), tenth(p.y))?;
             }
-            number(out, p.x);
-            out.push(' ');
-            number(out, p.y);
         }
+        Ok(())
     }
 }
 
-fn write_stroke(out: &mut String, stroke: &Stroke) {
+/// The steps of a path: `M0 1C0 1 2 3 2 3Z`.
+struct Steps<'a>(&'a [Step]);
+
+impl Display for Steps<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for step in self.0 {
+            let (letter, points) = match step {
+                Step::Move(p) => ("M", std::slice::from_ref(p)),
+                Step::Line(p) => ("L", std::slice::from_ref(p)),
+                Step::Curve(points) => ("C", points.as_slice()),
+                Step::Close => ("Z", [].as_slice()),
+            };
+            f.write_str(letter)?;
+            for (at, p) in points.iter().enumerate() {
+                let gap = if at > 0 { " " } else { "" };
+                write!(f, "{gap}{} {}", tenth(p.x), tenth(p.y))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn write_stroke(xml: &mut Xml, stroke: &Stroke) {
     if stroke.width <= 0.0 || stroke.color == Color::NONE {
         return;
     }
-    let _ = write!(out, " stroke=\"{}\" stroke-width=\"", stroke.color);
-    fine(out, stroke.width);
-    out.push('"');
+    xml.attribute("stroke", stroke.color)
+        .attribute("stroke-width", hundredth(stroke.width));
     if stroke.dash.iter().any(|d| *d > 0.0) {
-        out.push_str(" stroke-dasharray=\"");
-        for (at, length) in stroke.dash.iter().enumerate() {
-            if at > 0 {
-                out.push(' ');
-            }
-            fine(out, *length);
-        }
-        out.push('"');
+        let dash = stroke.dash.iter().map(|d| hundredth(*d).to_string());
+        xml.attribute("stroke-dasharray", dash.collect::<Vec<_>>().join(" "));
         if stroke.is_round() {
-            out.push_str(" stroke-linecap=\"round\"");
+            xml.attribute("stroke-linecap", "round");
         }
     }
 }
 
-fn write_text(out: &mut String, text: &Text) {
-    out.push_str("<text");
-    attributes(
-        out,
-        &[("x", text.at.x), ("y", text.at.y), ("font-size", text.size)],
-    );
+fn write_text(xml: &mut Xml, text: &Text) {
+    xml.open("text")
+        .attribute("x", tenth(text.at.x))
+        .attribute("y", tenth(text.at.y))
+        .attribute("font-size", tenth(text.size));
     if text.weight == Weight::SemiBold {
-        out.push_str(" font-weight=\"600\"");
+        xml.attribute("font-weight", 600);
     }
     match text.anchor {
         Anchor::Start => {}
-        Anchor::Middle => out.push_str(" text-anchor=\"middle\""),
-        Anchor::End => out.push_str(" text-anchor=\"end\""),
+        Anchor::Middle => {
+            xml.attribute("text-anchor", "middle");
+        }
+        Anchor::End => {
+            xml.attribute("text-anchor", "end");
+        }
     }
-    let _ = write!(out, " fill=\"{}\"", text.color);
+    xml.attribute("fill", text.color);
     if let Some((color, width)) = text.halo.filter(|(c, _)| *c != Color::NONE) {
-        let _ = write!(out, " stroke=\"{color}\" stroke-width=\"");
-        fine(out, width);
-        out.push_str("\" stroke-linejoin=\"round\" paint-order=\"stroke\"");
+        xml.attribute("stroke", color)
+            .attribute("stroke-width", hundredth(width))
+            .attribute("stroke-linejoin", "round")
+            .attribute("paint-order", "stroke");
     }
     // Without it, blanks at the ends and in a row would vanish.
     if text.text.starts_with(' ') || text.text.ends_with(' ') || text.text.contains("  ") {
-        out.push_str(" xml:space=\"preserve\"");
+        xml.attribute("xml:space", "preserve");
     }
-    out.push('>');
-    escape(out, &text.text);
-    out.push_str("</text>");
-}
-
-fn attributes(out: &mut String, pairs: &[(&str, f64)]) {
-    for (key, value) in pairs {
-        let _ = write!(out, " {key}=\"");
-        number(out, *value);
-        out.push('"');
-    }
-}
-
-/// A coordinate, to a tenth of a pixel; what is no number becomes 0.
-fn number(out: &mut String, value: f64) {
-    write_decimal(out, value, 10);
-}
-
-/// A width or a dash, to a hundredth.
-fn fine(out: &mut String, value: f64) {
-    write_decimal(out, value, 100);
-}
-
-/// In whole units of 1/`parts` (1 to 100); what is no number becomes 0.
-pub(crate) fn units(value: f64, parts: i64) -> i64 {
-    let value = if value.is_finite() {
-        value.clamp(-1e7, 1e7)
-    } else {
-        0.0
-    };
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "held below 1e9 on the line above"
-    )]
-    let units = libm::round(value * parts as f64) as i64;
-    units
-}
-
-/// `value` in units of 1/`parts` (10 or 100), without trailing zeros.
-fn write_decimal(out: &mut String, value: f64, parts: i64) {
-    let units = units(value, parts);
-    if units < 0 {
-        out.push('-');
-    }
-    let (whole, rest) = (units.abs() / parts, units.abs() % parts);
-    let _ = write!(out, "{whole}");
-    match (rest, parts) {
-        (0, _) => {}
-        (_, 10) => {
-            let _ = write!(out, ".{rest}");
-        }
-        _ if rest % 10 == 0 => {
-            let _ = write!(out, ".{}", rest / 10);
-        }
-        _ => {
-            let _ = write!(out, ".{rest:02}");
-        }
-    }
-}
-
-/// `text` for use between tags and in attributes; what XML cannot hold is spelled out.
-pub(crate) fn escape(out: &mut String, text: &str) {
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' | '\t' | '\r' => {
-                let _ = write!(out, "&#{};", u32::from(c));
-            }
-            '\0'..='\u{1f}' | '\u{7f}'..='\u{9f}' | '\u{fffe}' | '\u{ffff}' => {
-                let _ = write!(out, "\\u{{{:x}}}", u32::from(c));
-            }
-            _ => out.push(c),
-        }
-    }
+    xml.text(&text.text).close();
 }
 
 #[cfg(test)]
@@ -341,23 +238,6 @@ mod tests {
             title: String::new(),
             groups,
         })
-    }
-
-    fn decimal(value: f64, parts: i64) -> String {
-        let mut out = String::new();
-        write_decimal(&mut out, value, parts);
-        out
-    }
-
-    #[test]
-    fn coordinates_are_rounded_and_short() {
-        assert_eq!(decimal(1.04, 10), "1");
-        assert_eq!(decimal(-0.25, 10), "-0.3");
-        assert_eq!(decimal(-0.04, 10), "0");
-        assert_eq!(decimal(1.05, 100), "1.05");
-        assert_eq!(decimal(0.9, 100), "0.9");
-        assert_eq!(decimal(f64::NAN, 10), "0");
-        assert_eq!(decimal(f64::INFINITY, 10), "0");
     }
 
     #[test]

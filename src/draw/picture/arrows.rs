@@ -4,7 +4,7 @@ use super::boxes::class;
 use super::measured::arrow_label;
 use super::options::{self, ArrowLook};
 use super::page::Fit;
-use super::{badge, words};
+use super::{badge, chips};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::{Color, Style};
@@ -92,7 +92,7 @@ impl Arrows<'_> {
             id: track.id.clone(),
             class: class(&format!("edge {kind}"), shown),
             data: vec![("from", from.clone()), ("to", to.clone())],
-            title: format!("{from} → {to}\n{kind}: {}", words::facts(shown)),
+            title: format!("{from} → {to}\n{kind}: {}", chips::facts(shown)),
             ..Group::default()
         };
         self.line(&mut group, track, &look);

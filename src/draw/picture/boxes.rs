@@ -3,7 +3,7 @@
 use super::measured::{LINE, Label, Space, Tells, pendant, second_line};
 use super::options::{self, BoxLook};
 use super::page::Fit;
-use super::{badge, words};
+use super::{badge, chips};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Fade, Form, Group, Shape, Stroke, Text};
 use crate::draw::style::{Body, Color, Style};
@@ -262,5 +262,5 @@ fn title(item: &Item, shown: &Shown) -> String {
         ItemKind::Group => "topics",
         ItemKind::Namespace => "namespace",
     };
-    format!("{}\n{what}: {}", item.name, words::facts(shown))
+    format!("{}\n{what}: {}", item.name, chips::facts(shown))
 }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::words;
 use crate::base::geometry::Size;
+use crate::base::words;
 use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{Element, State};
@@ -289,7 +289,7 @@ pub(crate) fn arrow_label(
         _ => String::new(),
     };
     if let Some((before, now)) = changed_rate(shown) {
-        return Some((topic + &words::hz_change(before, now), true));
+        return Some((topic + &words::rate_change(before, now), true));
     }
     let rate = shown
         .hz
@@ -301,11 +301,11 @@ pub(crate) fn arrow_label(
             rate.filter(|hz| (hz - of_topic).abs() > OWN_RATE * of_topic.max(*hz))
         }
         ArrowKind::Direct(_) => {
-            let rate = rate.map(words::hz).unwrap_or_default();
+            let rate = rate.map(words::rate).unwrap_or_default();
             return Some(((topic + &rate).trim_end().to_owned(), false));
         }
     };
-    told.map(|hz| (words::hz(hz), false))
+    told.map(|hz| (words::rate(hz), false))
 }
 
 /// The smaller line of a box in a window.
@@ -318,15 +318,15 @@ pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
     }
     match (tells, changed_rate(shown), shown.hz) {
         (Tells::Nothing | Tells::Changes, _, _) => None,
-        (Tells::Rates, Some((before, now)), _) => Some(words::hz_change(before, now)),
-        (Tells::Rates, None, rate) => rate.filter(|hz| *hz > 0.0).map(words::hz),
+        (Tells::Rates, Some((before, now)), _) => Some(words::rate_change(before, now)),
+        (Tells::Rates, None, rate) => rate.filter(|hz| *hz > 0.0).map(words::rate),
     }
 }
 
 /// What hangs on a box for one window: the rate that changed, where neither an arrow nor its smaller line tells it.
 pub(crate) fn pendant(shown: &Shown, tells: Tells) -> Option<String> {
     let (before, now) = changed_rate(shown).filter(|_| tells == Tells::Changes)?;
-    Some(words::hz_change(before, now))
+    Some(words::rate_change(before, now))
 }
 
 /// The element with this id among those of a window, which are sorted.

@@ -116,7 +116,7 @@ fn characters_without_a_glyph_are_spelled_out_and_noticed() {
     );
     let notice = unshown(&view, &Fonts::bundled()).unwrap();
     assert!(
-        notice.text.contains("\\u{5668}, \\u{673a};"),
+        notice.text.contains("\\u{5668} and \\u{673a};"),
         "{}",
         notice.text
     );

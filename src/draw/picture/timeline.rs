@@ -2,7 +2,7 @@
 
 use super::page::Page;
 use crate::base::geometry::{Point, Rect};
-use crate::base::time::offset;
+use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line, polygon};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
@@ -167,18 +167,16 @@ impl<'a> Timeline<'a> {
         let size = style.size * self.page.unit;
         let y = self.plot.bottom() + size * 1.25;
         let total = last.span.end.since(first.span.start).max(1);
-        let widest = self.fonts.width(
-            &offset(total / 1_000_000_000 * 1_000_000_000),
-            size,
-            Weight::Regular,
-        );
+        let widest = self
+            .fonts
+            .width(&words::offset_seconds(total), size, Weight::Regular);
         #[expect(clippy::cast_possible_truncation, reason = "at most a few hundred")]
         let most = (self.plot.w / (widest * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
         let step = nice(total / most.max(1));
         let mut at = 0;
         while at <= total {
             let x = self.plot.x + self.plot.w * (at as f64 / total as f64);
-            let text = offset(at);
+            let text = words::offset(at);
             let width = self.fonts.width(&text, size, Weight::Regular);
             let x =
                 (x - width / 2.0).clamp(self.plot.x, (self.plot.right() - width).max(self.plot.x));

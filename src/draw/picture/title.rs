@@ -1,9 +1,9 @@
 //! The bar on top and the line below it: which bag, which window, what time, how many changes, and which in words.
 
 use super::page::Page;
-use super::{PageOptions, words};
+use super::{PageOptions, chips};
 use crate::base::geometry::{Point, Rect};
-use crate::base::time::{offset, short};
+use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
@@ -94,18 +94,21 @@ impl<'a> Title<'a> {
             .first()
             .map_or(frame.span.start, |f| f.span.start);
         let end = view.frames.last().map_or(frame.span.end, |f| f.span.end);
-        let at = |stamp: crate::base::time::Stamp| offset(whole(stamp.since(start)));
+        let at = |stamp: crate::base::time::Stamp| words::offset(whole(stamp.since(start)));
         let mut parts = vec![
             format!("window {} of {}", frame.index + 1, view.frames.len()),
             format!(
                 "{} – {} of {}",
                 at(frame.span.start),
                 at(frame.span.end),
-                offset(whole(end.since(start)))
+                words::offset(whole(end.since(start)))
             ),
         ];
         if let Some(first) = view.frames.first().filter(|_| view.frames.len() > 1) {
-            parts.push(format!("{} per window", short(whole(first.span.nanos()))));
+            parts.push(format!(
+                "{} per window",
+                words::period(whole(first.span.nanos()))
+            ));
         }
         if frame.partial {
             parts.push("partial".to_owned());
@@ -157,7 +160,7 @@ impl<'a> Title<'a> {
             weight: Weight::SemiBold,
             color: style.text,
             halo: None,
-            text: frame.span.start.clock(),
+            text: words::clock(frame.span.start.0),
         });
         group
     }
@@ -286,19 +289,19 @@ const NONE: &str = "no reconfiguration";
 
 fn chip_texts(tally: &Counts) -> [String; 3] {
     [
-        words::chip(
+        chips::chip(
             '+',
             tally.nodes_added,
             tally.topics_added,
             tally.edges_added,
         ),
-        words::chip(
+        chips::chip(
             '−',
             tally.nodes_removed,
             tally.topics_removed,
             tally.edges_removed,
         ),
-        words::changed_chip(tally),
+        chips::changed_chip(tally),
     ]
 }
 

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use crate::base::error::Result;
-use crate::base::time::offset;
+use crate::base::words;
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::export::dot::Drawing;
@@ -77,7 +77,7 @@ impl Graphs<'_> {
         let Some(frame) = window.and_then(|at| frames.iter().find(|f| f.index == at)) else {
             return name;
         };
-        let time = |at| offset(mission.offset(at));
+        let time = |at| words::offset(mission.offset(at));
         let (from, to) = (time(frame.span.start), time(frame.span.end));
         format!(
             "{name}: window {} of {}, {from} to {to}",

@@ -152,6 +152,6 @@ mod tests {
             drawing.style.added.color.to_string().to_lowercase()
         );
         assert_eq!(file.matches(&added).count(), 1);
-        assert!(file.contains(r#"n___ns__a -> t___t [style=solid, penwidth=2, label="3.0 Hz"];"#));
+        assert!(file.contains(r#"n___ns__a -> t___t [style=solid, penwidth=2, label="3 Hz"];"#));
     }
 }

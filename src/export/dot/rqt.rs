@@ -374,7 +374,7 @@ mod tests {
         let file = file(&["/a>/t@2 /b</t"], &options);
         let edge = line(&file, "n___a -> n___b [");
         assert!(
-            edge.contains(r#"label="/t\n2.0 Hz", lp=""#) && edge.contains(r#"URL="topic_3A__t""#)
+            edge.contains(r#"label="/t\n2 Hz", lp=""#) && edge.contains(r#"URL="topic_3A__t""#)
         );
     }
 

@@ -10,8 +10,9 @@ use serde::Serialize;
 use super::Page;
 use crate::base::digest;
 use crate::base::geometry::Rect;
-use crate::base::time::{Stamp, offset};
-use crate::draw::text::visible;
+use crate::base::time::Stamp;
+use crate::base::words;
+use crate::base::words::visible;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
 use crate::view::Arrow;
@@ -173,7 +174,7 @@ fn facts_of(
         let first = lives.clone().filter_map(|l| l.0).min();
         let last = lives.filter_map(|l| l.1).max();
         if let (Some(first), Some(last)) = (first, last) {
-            let at = |t: Stamp| offset(t.since(start) / 1_000_000_000 * 1_000_000_000);
+            let at = |t: Stamp| words::offset_seconds(t.since(start));
             facts.push(format!("seen {} – {}", at(first), at(last)));
         }
         if members.len() > 1 {

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use crate::base::time::offset;
-use crate::draw::paint::svg::escape;
-use crate::draw::text::visible;
+use crate::base::words;
+use crate::base::words::visible;
+use crate::draw::paint::xml::escape;
 use crate::view::{Frame, View};
 
 /// More windows with changes than this are counted.
@@ -37,7 +37,7 @@ pub(super) fn rows(view: &View) -> String {
         let _ = write!(
             out,
             "<tr><th><a href=\"#t={secs}\">{}</a><td>",
-            offset(millis * 1_000_000)
+            words::offset(millis * 1_000_000)
         );
         escape(&mut out, &visible(&frame.caption.join("; ")));
         out.push('\n');

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::draw::text::visible;
+use crate::base::words::visible;
 
 /// Longer words are cut, so that one hostile name cannot fill a report.
 const LONGEST: usize = 600;

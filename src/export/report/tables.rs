@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::count;
 use super::escape::{code, plain};
-use crate::base::time::{Stamp, offset};
+use crate::base::time::Stamp;
+use crate::base::words;
+use crate::base::words::count;
 use crate::evidence::Evidence;
 use crate::mission::Mission;
-use crate::view::hertz;
 
 /// A table of these rows, of at most `most` bytes; a last line tells how many rows were cut. `None` without rows.
 pub(super) fn table(
@@ -64,13 +64,13 @@ impl Presence {
     fn mean(&self) -> String {
         match self.rated {
             0 => "–".to_owned(),
-            n => hertz(self.hz / n as f64),
+            n => words::number(self.hz / n as f64),
         }
     }
 }
 
 fn seen(mission: &Mission, first: Option<Stamp>, last: Option<Stamp>) -> String {
-    let at = |t: Stamp| offset(mission.offset(t) / 1_000_000_000 * 1_000_000_000);
+    let at = |t: Stamp| words::offset_seconds(mission.offset(t));
     match (first, last) {
         (Some(first), Some(last)) => format!("{} – {}", at(first), at(last)),
         _ => "–".to_owned(),

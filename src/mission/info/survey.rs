@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::Info;
-use super::text::bytes;
 use crate::base::csv::table;
-use crate::base::time::{Stamp, offset};
+use crate::base::time::Stamp;
+use crate::base::words;
 
 /// A bag in a survey.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -115,9 +115,9 @@ fn text_row(row: &SurveyRow) -> Vec<String> {
     vec![
         row.path.clone(),
         bag.map(|b| b.format.clone()).unwrap_or_default(),
-        bag.map(|b| bytes(b.file_bytes)).unwrap_or_default(),
+        bag.map(|b| words::bytes(b.file_bytes)).unwrap_or_default(),
         Stamp(info.start_ns).to_string().chars().take(19).collect(),
-        offset((info.end_ns - info.start_ns) / 1_000_000_000 * 1_000_000_000),
+        words::offset_seconds(info.end_ns - info.start_ns),
         info.messages.to_string(),
         info.topics.len().to_string(),
         info.nodes_by_degree.total().to_string(),

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::{Degrees, Info, NodeInfo, TopicInfo};
-use crate::base::time::{Stamp, offset};
-use crate::mission::events::hz;
+use crate::base::time::Stamp;
+use crate::base::words;
 
 /// How many columns a sparkline has at most.
 const COLUMNS: usize = 32;
@@ -34,7 +34,7 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
             "{}  {} {compression}, {}, read by {}{how}{state}",
             bag.name,
             bag.format,
-            bytes(bag.file_bytes),
+            words::bytes(bag.file_bytes),
             bag.tier
         )?;
         for (key, value) in &bag.facts {
@@ -46,7 +46,7 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
     writeln!(
         out,
         "{} of mission, {} messages\n",
-        offset((info.end_ns - 1).saturating_sub(info.start_ns) / 1_000_000 * 1_000_000),
+        words::offset((info.end_ns - 1).saturating_sub(info.start_ns) / 1_000_000 * 1_000_000),
         info.messages
     )
 }
@@ -97,13 +97,12 @@ fn how_many(what: &str, degrees: Degrees) -> String {
         .filter(|(n, _)| *n > 0)
         .map(|(n, word)| format!("{n} {word}"))
         .collect();
-    let plural = if degrees.total() == 1 { "" } else { "s" };
     let inner = if parts.is_empty() {
         String::new()
     } else {
         format!(" ({})", parts.join(", "))
     };
-    format!("{} {what}{plural}{inner}", degrees.total())
+    words::count(degrees.total(), what) + &inner
 }
 
 fn topics(out: &mut String, topics: &[TopicInfo]) -> std::fmt::Result {
@@ -121,9 +120,7 @@ fn topics(out: &mut String, topics: &[TopicInfo]) -> std::fmt::Result {
         .unwrap_or(0)
         .min(40);
     for topic in topics {
-        let rate = topic
-            .hz
-            .map_or_else(String::new, |rate| format!("{} Hz", hz(rate)));
+        let rate = topic.hz.map_or_else(String::new, words::rate);
         let types = topic.types.join(" ");
         let bars = sparkline(&topic.activity);
         writeln!(
@@ -145,8 +142,12 @@ fn nodes(out: &mut String, info: &Info) -> std::fmt::Result {
         .unwrap_or(0)
         .min(60);
     for node in &info.nodes {
-        let life =
-            |at: Option<i64>| at.map_or_else(|| "?".to_owned(), |at| seconds(at - info.start_ns));
+        let life = |at: Option<i64>| {
+            at.map_or_else(
+                || "?".to_owned(),
+                |at| words::offset_seconds(at - info.start_ns),
+            )
+        };
         let span = format!("{} – {}", life(node.first_ns), life(node.last_ns));
         writeln!(
             out,
@@ -159,21 +160,10 @@ fn nodes(out: &mut String, info: &Info) -> std::fmt::Result {
     Ok(())
 }
 
-/// Whole seconds into the mission.
-fn seconds(nanos: i64) -> String {
-    offset(nanos.div_euclid(1_000_000_000) * 1_000_000_000)
-}
-
 /// What a node sends and receives per second of the mission.
 fn load(node: &NodeInfo, duration_s: f64) -> String {
-    let rate = |count: u64| hz(count as f64 / duration_s.max(1e-3));
-    let topics = |n: usize| {
-        if n == 1 {
-            "1 topic".to_owned()
-        } else {
-            format!("{n} topics")
-        }
-    };
+    let rate = |count: u64| words::number(count as f64 / duration_s.max(1e-3));
+    let topics = |n: usize| words::count(n, "topic");
     let mut parts = Vec::new();
     if node.publishes > 0 {
         let sent = node
@@ -216,15 +206,6 @@ fn sparkline(activity: &[u64]) -> String {
     sums.into_iter().map(bar).collect()
 }
 
-/// Bytes as people say them, in powers of 1000.
-pub(super) fn bytes(n: u64) -> String {
-    let units = [(1_000_000_000_u64, "GB"), (1_000_000, "MB"), (1000, "kB")];
-    match units.iter().find(|(unit, _)| n >= *unit) {
-        Some((unit, word)) => format!("{:.1} {word}", n as f64 / *unit as f64),
-        None => format!("{n} bytes"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -234,10 +215,5 @@ mod tests {
         assert_eq!(sparkline(&[0, 1, 4, 8]), " ▁▄█");
         assert_eq!(sparkline(&[]), " ");
         assert_eq!(sparkline(&[1; 100]).chars().count(), COLUMNS);
-    }
-
-    #[test]
-    fn sizes_are_said_in_thousands() {
-        assert_eq!([bytes(12), bytes(6_881_622)], ["12 bytes", "6.9 MB"]);
     }
 }

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
-use crate::base::time::{Stamp, offset};
+use crate::base::time::Stamp;
+use crate::base::words;
 use crate::evidence::EvidenceLine;
 use crate::graph::{Edge, Element};
 use crate::mission::Mission;
@@ -24,9 +25,10 @@ pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Resu
         let _ = describe(&mut out, mission, element, &title);
     }
     for piece in pieces {
-        let at = piece
-            .time
-            .map_or_else(|| "always".to_owned(), |time| offset(mission.offset(time)));
+        let at = piece.time.map_or_else(
+            || "always".to_owned(),
+            |time| words::offset(mission.offset(time)),
+        );
         let _ = writeln!(
             out,
             "{at:>12}  {:<18} {:<9} {}",
@@ -87,7 +89,10 @@ fn describe(
         Element::Subscribe(id) => all.subscribes[id as usize].evidence,
     };
     let at = |time: Option<Stamp>| {
-        time.map_or_else(|| "?".to_owned(), |time| offset(mission.offset(time)))
+        time.map_or_else(
+            || "?".to_owned(),
+            |time| words::offset(mission.offset(time)),
+        )
     };
     let (first, last) = all.life(element);
     let words: Vec<&str> = evidence.words().collect();

@@ -115,6 +115,7 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
         elements,
         windows,
         ledger: crate::mission::Ledger::default(),
+        activity: crate::mission::Activity::default(),
         layout: raw.layout.map(layout),
         notices: notices(raw.notices),
     }

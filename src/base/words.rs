@@ -1,0 +1,297 @@
+//! How numbers, times and names are spelled for people: everything that formats for a reader goes through here.
+//!
+//! Data files (JSON, CSV, Parquet) hold plain numbers instead.
+
+use std::borrow::Cow;
+
+const SECOND: i64 = 1_000_000_000;
+
+/// A rate in messages per second: `50 Hz`, `12.5 Hz`, `0.25 Hz`, `1.2 kHz`; `0 Hz` for what is no rate.
+pub fn rate(hz: f64) -> String {
+    let (value, unit) = split_rate(hz);
+    format!("{value} {unit}")
+}
+
+/// A rate that changed: `15 → 7.4 Hz`, `900 Hz → 1.2 kHz`.
+pub fn rate_change(from_hz: f64, to_hz: f64) -> String {
+    let ((from, from_unit), (to, unit)) = (split_rate(from_hz), split_rate(to_hz));
+    if from_unit == unit {
+        format!("{from} → {to} {unit}")
+    } else {
+        format!("{from} {from_unit} → {to} {unit}")
+    }
+}
+
+/// The rate of `count` messages in `seconds`, with no more digits than so few messages can tell: `1 msg` for a single
+/// one, one significant digit below 10, two below 1,000, else as [`rate`]. A count of n is uncertain by about √n.
+pub fn rate_of(count: u64, seconds: f64) -> String {
+    let hz = count as f64 / seconds;
+    match count {
+        0 => rate(0.0),
+        1 => "1 msg".to_owned(),
+        2..=9 => rate(significant(hz, 1)),
+        10..=999 => rate(significant(hz, 2)),
+        _ => rate(hz),
+    }
+}
+
+/// `value` rounded to so many significant digits; as it is where that makes no sense.
+fn significant(value: f64, digits: u8) -> f64 {
+    if !value.is_finite() || value == 0.0 {
+        return value;
+    }
+    let power = f64::from(digits) - 1.0 - libm::floor(libm::log10(libm::fabs(value)));
+    let scale = libm::pow(10.0, libm::fabs(power));
+    // Dividing by a power of ten keeps 0.3 what it is, where multiplying by 0.1 would not.
+    if power >= 0.0 {
+        libm::round(value * scale) / scale
+    } else {
+        libm::round(value / scale) * scale
+    }
+}
+
+fn split_rate(hz: f64) -> (String, &'static str) {
+    match hz {
+        r if !r.is_finite() || r <= 0.0 => ("0".to_owned(), "Hz"),
+        r if r >= 999.5 => (number(r / 1000.0), "kHz"),
+        r => (number(r), "Hz"),
+    }
+}
+
+/// A number, 0 or more, in few digits: whole from 100 on, a tenth from 1 on, two significant digits below, `<0.001`.
+pub fn number(value: f64) -> String {
+    let digits = match value {
+        0.0 => return "0".to_owned(),
+        v if v >= 99.95 => 0,
+        v if v >= 0.95 => 1,
+        v if v >= 0.0995 => 2,
+        v if v >= 0.000_995 => 3,
+        _ => return "<0.001".to_owned(),
+    };
+    let text = format!("{value:.digits$}");
+    match text.split_once('.') {
+        Some(_) => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        None => text,
+    }
+}
+
+/// A number of things: `1 node`, `3 nodes`, `2 entries`, `2 switches`.
+pub fn count(n: usize, word: &str) -> String {
+    if n == 1 {
+        return format!("1 {word}");
+    }
+    match word.strip_suffix('y') {
+        Some(stem) if !stem.ends_with(['a', 'e', 'o', 'u']) => format!("{n} {stem}ies"),
+        _ if word.ends_with('s') || word.ends_with("ch") => format!("{n} {word}es"),
+        _ => format!("{n} {word}s"),
+    }
+}
+
+/// A share as a whole percentage without its sign: `25` for 0.25.
+pub fn percent(share: f64) -> String {
+    format!("{:.0}", share * 100.0)
+}
+
+/// A size in powers of 1000: `12 bytes`, `6.9 MB`.
+pub fn bytes(n: u64) -> String {
+    let units = [(1_000_000_000_u64, "GB"), (1_000_000, "MB"), (1000, "kB")];
+    match units.iter().find(|(unit, _)| n >= *unit) {
+        Some((unit, word)) => format!("{:.1} {word}", n as f64 / *unit as f64),
+        None => format!("{n} bytes"),
+    }
+}
+
+/// A length of time as short as it can be said exactly: `10 s`, `1.5 s`, `2 min`, `500 ms`, `1 d`. For periods.
+pub fn period(nanos: i64) -> String {
+    const DAY: i64 = 86_400 * SECOND;
+    const HOUR: i64 = 3600 * SECOND;
+    const MINUTE: i64 = 60 * SECOND;
+    match nanos {
+        0 => "0 s".to_owned(),
+        n if n % DAY == 0 => format!("{} d", n / DAY),
+        n if n % HOUR == 0 => format!("{} h", n / HOUR),
+        n if n % MINUTE == 0 => format!("{} min", n / MINUTE),
+        n if n.abs() >= SECOND => format!("{} s", n as f64 / 1e9),
+        n => format!("{} ms", n as f64 / 1e6),
+    }
+}
+
+/// A measured length of time, rounded as people say it: `350 ms`, `5.3 s`, `5 min 26 s`, `2 h 5 min`, `3 d 4 h`.
+pub fn duration(nanos: i64) -> String {
+    let two = |big: i64, unit: &str, small: i64, part: &str| match small {
+        0 => format!("{big} {unit}"),
+        _ => format!("{big} {unit} {small} {part}"),
+    };
+    let seconds = (nanos.saturating_add(SECOND / 2)) / SECOND;
+    match nanos {
+        n if n < SECOND => format!("{} ms", n / 1_000_000),
+        n if n < 60 * SECOND => format!("{} s", number(n as f64 / 1e9)),
+        _ if seconds < 3600 => two(seconds / 60, "min", seconds % 60, "s"),
+        _ if seconds < 86_400 => two(seconds / 3600, "h", seconds / 60 % 60, "min"),
+        _ => two(seconds / 86_400, "d", seconds / 3600 % 24, "h"),
+    }
+}
+
+/// A moment of a mission, counted from its start: `07:10.25`, `1:02:03` from an hour on, to the millisecond.
+pub fn offset(nanos: i64) -> String {
+    let sign = if nanos < 0 { "-" } else { "" };
+    let nanos = nanos.unsigned_abs();
+    let second = nanos / 1_000_000_000;
+    let milli = nanos / 1_000_000 % 1000;
+    let fraction = if milli == 0 {
+        String::new()
+    } else {
+        format!(".{milli:03}").trim_end_matches('0').to_owned()
+    };
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    if hour > 0 {
+        format!("{sign}{hour}:{minute:02}:{second:02}{fraction}")
+    } else {
+        format!("{sign}{minute:02}:{second:02}{fraction}")
+    }
+}
+
+/// The same in whole seconds, rounded down: `07:10`.
+pub fn offset_seconds(nanos: i64) -> String {
+    offset(nanos.div_euclid(SECOND).saturating_mul(SECOND))
+}
+
+/// The same to a tenth of a second, rounded down, always with its tenth: `07:10.2`. For logs, where columns align.
+pub fn offset_tenths(nanos: i64) -> String {
+    let tenth = nanos.div_euclid(SECOND / 10).rem_euclid(10);
+    format!("{}.{tenth}", offset_seconds(nanos))
+}
+
+/// The UTC clock of a time since 1970, in nanoseconds: `14:03:22`.
+pub fn clock(nanos: i64) -> String {
+    let second = nanos.div_euclid(SECOND).rem_euclid(86_400);
+    format!(
+        "{:02}:{:02}:{:02}",
+        second / 3600,
+        second / 60 % 60,
+        second % 60
+    )
+}
+
+/// Date, clock and zone of a time since 1970, in nanoseconds: `2024-05-03 14:03:22 UTC`; the bare number of seconds
+/// where the year is outside 0..=9999.
+pub fn date_and_clock(nanos: i64) -> String {
+    match jiff::Timestamp::from_second(nanos.div_euclid(SECOND)) {
+        Ok(time) => time.strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
+        Err(_) => format!("{} s", nanos.div_euclid(SECOND)),
+    }
+}
+
+/// `text` in at most `most` characters, its end cut with `…`.
+pub fn shorten(text: &str, most: usize) -> Cow<'_, str> {
+    if text.chars().nth(most).is_none() {
+        return Cow::Borrowed(text);
+    }
+    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
+    Cow::Owned(kept + "…")
+}
+
+/// Some of many names: `a, b and c`, or `a, b, c and 4 more`. At most `most` are named, at least one.
+pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
+    let told: Vec<&str> = names.iter().take(most.max(1)).map(AsRef::as_ref).collect();
+    match (told.as_slice(), names.len() - told.len()) {
+        ([], _) => String::new(),
+        ([one], 0) => (*one).to_owned(),
+        ([first @ .., last], 0) => format!("{} and {last}", first.join(", ")),
+        (told, rest) => format!("{} and {rest} more", told.join(", ")),
+    }
+}
+
+/// `text` with line ends, other control characters, invisible and direction marks written as `\u{…}`, so that it can
+/// neither steer a terminal nor hide or turn round what stands beside it.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_invisible) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if is_invisible(c) {
+            out.extend(c.escape_unicode());
+        } else {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
+pub fn is_invisible(c: char) -> bool {
+    c.is_control()
+        || (c.is_whitespace() && c != ' ')
+        || matches!(c, '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180e}' | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}'
+            | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e0fff}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_is_spelled_in_one_way() {
+        let minute = 60 * SECOND;
+        let table = [
+            (rate(0.0), "0 Hz"),
+            (rate(f64::NAN), "0 Hz"),
+            (rate(0.0001), "<0.001 Hz"),
+            (rate(0.004), "0.004 Hz"),
+            (rate(0.05), "0.05 Hz"),
+            (rate(0.25), "0.25 Hz"),
+            (rate(1.0), "1 Hz"),
+            (rate(7.44), "7.4 Hz"),
+            (rate(9.96), "10 Hz"),
+            (rate(12.5), "12.5 Hz"),
+            (rate(29.97), "30 Hz"),
+            (rate(100.4), "100 Hz"),
+            (rate(999.6), "1 kHz"),
+            (rate(1200.0), "1.2 kHz"),
+            (rate(48_000.0), "48 kHz"),
+            (rate_change(15.0, 7.4), "15 → 7.4 Hz"),
+            (rate_change(900.0, 1200.0), "900 Hz → 1.2 kHz"),
+            (rate_of(0, 10.0), "0 Hz"),
+            (rate_of(1, 300.0), "1 msg"),
+            (rate_of(3, 10.0), "0.3 Hz"),
+            (rate_of(299, 10.0), "30 Hz"),
+            (rate_of(1249, 100.0), "12.5 Hz"),
+            (count(0, "node"), "0 nodes"),
+            (count(1, "node"), "1 node"),
+            (count(2, "entry"), "2 entries"),
+            (count(2, "switch"), "2 switches"),
+            (percent(0.25), "25"),
+            (bytes(12), "12 bytes"),
+            (bytes(6_881_622), "6.9 MB"),
+            (period(90 * SECOND), "90 s"),
+            (period(2 * minute), "2 min"),
+            (period(500_000_000), "500 ms"),
+            (duration(350_000_000), "350 ms"),
+            (duration(5_340_000_000), "5.3 s"),
+            (duration(326_464_666_680), "5 min 26 s"),
+            (duration(125 * minute), "2 h 5 min"),
+            (duration(76 * 60 * minute), "3 d 4 h"),
+            (offset(430 * SECOND), "07:10"),
+            (offset(3_723_500_000_000), "1:02:03.5"),
+            (offset(-SECOND), "-00:01"),
+            (offset_seconds(430_900_000_000), "07:10"),
+            (offset_tenths(430_190_000_000), "07:10.1"),
+            (clock(50_602 * SECOND), "14:03:22"),
+            (date_and_clock(0), "1970-01-01 00:00:00 UTC"),
+            (shorten("/camera/image", 8).into_owned(), "/camera…"),
+            (shorten("/camera", 7).into_owned(), "/camera"),
+            (some_of(&["a", "b"], 3), "a and b"),
+            (some_of(&["a", "b", "c", "d"], 2), "a, b and 2 more"),
+            (
+                visible("/a\u{1b}[2J\u{202e}\nb").into_owned(),
+                "/a\\u{1b}[2J\\u{202e}\\u{a}b",
+            ),
+            (visible("/größe ✓").into_owned(), "/größe ✓"),
+        ];
+        for (said, expected) in table {
+            assert_eq!(said, expected);
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What was alive and how busy, on a grid of its own that no `--period` moves: in it phases are found and figures drawn.
+
+use crate::base::name::{is_player, is_quiet, is_recorder};
+use crate::base::time::{Span, Stamp};
+use crate::graph::sending::Sending;
+use crate::graph::window::every;
+use crate::graph::{Graph, Node};
+use crate::mission::Mission;
+
+/// The most cells of the grid: more is finer than print, and phases cost their square.
+pub const MOST_CELLS: i64 = 200;
+
+const SECOND: i64 = 1_000_000_000;
+/// The lengths that a cell may have up to a day; then whole days.
+const STEPS: [i64; 16] = [
+    SECOND,
+    2 * SECOND,
+    5 * SECOND,
+    10 * SECOND,
+    20 * SECOND,
+    30 * SECOND,
+    60 * SECOND,
+    120 * SECOND,
+    300 * SECOND,
+    600 * SECOND,
+    1200 * SECOND,
+    1800 * SECOND,
+    3600 * SECOND,
+    7200 * SECOND,
+    21_600 * SECOND,
+    86_400 * SECOND,
+];
+
+/// The graph of a short stretch of time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cell {
+    /// Its time; cells follow one another without holes.
+    pub span: Span,
+    /// What was alive in it.
+    pub graph: Graph,
+}
+
+/// The mission as a finely divided sequence; ids are those of the mission's elements.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Activity {
+    /// In order, 1 to [`MOST_CELLS`]; none where nothing was read.
+    pub cells: Vec<Cell>,
+    /// When messages came, to the nanosecond; empty lists where only windows are known.
+    pub sending: Sending,
+}
+
+/// The cells that divide `span`: as short as 1 s, as long as it takes for at most [`MOST_CELLS`].
+pub fn grid(span: Span) -> Vec<Span> {
+    let nanos = span.nanos().max(1);
+    let fits = |step: &i64| nanos / step < MOST_CELLS;
+    let day = STEPS[STEPS.len() - 1];
+    let step = STEPS.into_iter().find(fits);
+    let step = step.unwrap_or_else(|| (nanos / MOST_CELLS / day + 1).saturating_mul(day));
+    every(span, step)
+}
+
+impl Activity {
+    /// The activity of a mission of which only the windows are known: neighbours are put together until few enough are
+    /// left, by the one of them that holds most messages. Cells of windows that overlap end where the next begins.
+    pub fn of_windows(mission: &Mission) -> Self {
+        let many = usize::try_from(MOST_CELLS).unwrap_or(1);
+        let stride = mission.windows.len().div_ceil(many).max(1);
+        let chunks: Vec<_> = mission.windows.chunks(stride).collect();
+        let start = |k: usize| chunks.get(k).and_then(|c| c.first()).map(|w| w.span.start);
+        let cell = |(k, chunk): (usize, &&[crate::mission::Window])| {
+            let last = chunk.last().map_or(mission.span.end, |w| w.span.end);
+            let busiest = chunk
+                .iter()
+                .max_by_key(|w| (w.messages, std::cmp::Reverse(w.index)))?;
+            Some(Cell {
+                span: Span {
+                    start: start(k)?,
+                    end: start(k + 1).unwrap_or(last),
+                },
+                graph: busiest.graph.clone(),
+            })
+        };
+        Self {
+            cells: chunks.iter().enumerate().filter_map(cell).collect(),
+            sending: Sending::default(),
+        }
+    }
+
+    /// From the first cell's start to the last one's end.
+    pub fn span(&self) -> Span {
+        let start = self.cells.first().map_or(Stamp(0), |c| c.span.start);
+        let end = self.cells.last().map_or(start, |c| c.span.end);
+        Span { start, end }
+    }
+
+    /// The length of the longest cell in nanoseconds, 0 without cells.
+    pub fn step(&self) -> i64 {
+        self.cells.iter().map(|c| c.span.nanos()).max().unwrap_or(0)
+    }
+}
+
+/// Whether a node is a recorder or player, by its name or by what it logs.
+pub fn records(node: &Node) -> bool {
+    let name = node.name.as_str();
+    is_recorder(name) || is_player(name) || node.evidence.words().any(|word| word == "recorder")
+}
+
+/// Whether phases and figures leave out this node: housekeeping, recorders, players.
+pub fn is_hidden_node(node: &Node) -> bool {
+    records(node) || is_quiet(node.name.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number of cells and the length of the first in seconds, for a span of so many seconds.
+    fn cells(seconds: i64) -> (usize, i64) {
+        let cells = grid(Span {
+            start: Stamp(5),
+            end: Stamp(5 + seconds * SECOND),
+        });
+        (cells.len(), cells[0].nanos() / SECOND)
+    }
+
+    #[test]
+    fn the_grid_has_the_shortest_step_that_gives_at_most_two_hundred() {
+        assert_eq!(cells(66), (66, 1));
+        assert_eq!(cells(200), (100, 2));
+        assert_eq!(cells(330), (165, 2));
+        assert_eq!(cells(3600 * 24), (144, 600));
+        let (many, step) = cells(86_400 * 4000);
+        assert!(many <= 200 && step % 86_400 == 0, "{many} of {step}");
+    }
+}

@@ -1,0 +1,183 @@
+//! Phases: stretches of a mission that one graph describes, found by an optimal partition of its activity.
+//!
+//! A boundary must save enough *element-seconds* of wrongly drawn graph, so that crashes, restarts and slow topics cut
+//! nothing, and the majority graph of a phase is the configuration that the mission was in. The result depends on the
+//! mission alone, never on `--period`.
+
+mod name;
+mod partition;
+mod presence;
+mod ramp;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use self::partition::partition;
+use self::presence::{Presence, is_topics, presences};
+use crate::base::time::{Span, Stamp};
+use crate::graph::{Elements, TopicId};
+use crate::mission::activity::Activity;
+use crate::mission::ledger::Phase;
+
+/// A boundary is looked for this far around its cell, in nanoseconds and as a share of the mission.
+const AROUND: (i64, i64) = (6_000_000_000, 33);
+
+/// What describes one phase: its majority graph.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Configuration {
+    /// Nodes by role, topics by name where publishers are unknown: there for at least half of the time.
+    pub(crate) names: BTreeSet<Arc<str>>,
+    /// Topics with a role that sends more than half of their messages.
+    pub(crate) senders: BTreeMap<TopicId, Arc<str>>,
+}
+
+/// The phases of a mission, in order and without holes: one for a mission that does not change, none for one without
+/// activity.
+pub fn phases(elements: &Elements, activity: &Activity) -> Vec<Phase> {
+    let present = presences(elements, activity);
+    let cells: Vec<i64> = activity.cells.iter().map(|c| c.span.nanos()).collect();
+    let cuts = partition(&cells, &present);
+    let starts: Vec<usize> = std::iter::once(0).chain(cuts).collect();
+    let ends = starts[1..].iter().copied().chain([cells.len()]);
+    let ranges: Vec<(usize, usize)> = starts.iter().copied().zip(ends).collect();
+    if cells.is_empty() {
+        return Vec::new();
+    }
+    let found: Vec<Configuration> = ranges
+        .iter()
+        .map(|(from, to)| configuration(elements, activity, &present, *from, *to))
+        .collect();
+    let bounds = boundaries(elements, activity, &present, &ranges);
+    let spans = bounds.windows(2).map(|pair| Span {
+        start: pair[0],
+        end: pair[1],
+    });
+    let spans: Vec<Span> = spans.collect();
+    let (spans, found, ramps) = ramp::joined(&spans, &found, activity.span().nanos());
+    let unit = if is_topics(&present) { "topic" } else { "node" };
+    told(&spans, &found, &ramps, unit)
+}
+
+fn configuration(
+    elements: &Elements,
+    activity: &Activity,
+    present: &[Presence],
+    from: usize,
+    to: usize,
+) -> Configuration {
+    let topics = is_topics(present);
+    let cells = &activity.cells[from..to];
+    let whole: i64 = cells.iter().map(|c| c.span.nanos()).sum();
+    let is_there = |p: &&Presence| {
+        let there = cells.iter().zip(&p.cells[from..to]).filter(|(_, is)| **is);
+        let nanos: i64 = there.map(|(c, _)| c.span.nanos()).sum();
+        nanos * 2 >= whole
+    };
+    let counted = |p: &&Presence| p.counts(topics);
+    let names = present.iter().filter(counted).filter(is_there);
+    Configuration {
+        names: names.map(|p| p.subject.name()).collect(),
+        senders: senders(elements, cells),
+    }
+}
+
+/// Who sends more than half of a topic's messages in these cells.
+fn senders(elements: &Elements, cells: &[super::activity::Cell]) -> BTreeMap<TopicId, Arc<str>> {
+    let mut sent: BTreeMap<TopicId, BTreeMap<Arc<str>, u64>> = BTreeMap::new();
+    let mut all: BTreeMap<TopicId, u64> = BTreeMap::new();
+    for cell in cells {
+        for topic in &cell.graph.topics {
+            *all.entry(topic.id).or_default() += topic.count;
+        }
+        for edge in &cell.graph.publishes {
+            let Some(of) = elements.publishes.get(edge.id as usize) else {
+                continue;
+            };
+            let node = elements.nodes.get(of.node as usize);
+            if let (Some(node), Some(count)) = (node, edge.count.filter(|n| *n > 0)) {
+                let role = Arc::clone(&node.role);
+                *sent.entry(of.topic).or_default().entry(role).or_default() += count;
+            }
+        }
+    }
+    let main = |(topic, of): (TopicId, BTreeMap<Arc<str>, u64>)| {
+        let whole = all.get(&topic).copied().unwrap_or(0);
+        let found = of.into_iter().find(|(_, n)| n * 2 > whole);
+        found.map(|(role, _)| (topic, role))
+    };
+    sent.into_iter().filter_map(main).collect()
+}
+
+/// Where phases begin and end: at the median of the exact starts and stops of what differs, near the cell's start.
+fn boundaries(
+    elements: &Elements,
+    activity: &Activity,
+    present: &[Presence],
+    ranges: &[(usize, usize)],
+) -> Vec<Stamp> {
+    let whole = activity.span();
+    let mut bounds = vec![whole.start];
+    for pair in ranges.windows(2) {
+        let (before, after) = (pair[0], pair[1]);
+        let cell = activity.cells[after.0].span.start;
+        let exact = differing(elements, activity, present, (before, after), cell);
+        let last = bounds.last().copied().unwrap_or(whole.start);
+        bounds.push(exact.filter(|at| *at > last).unwrap_or(cell));
+    }
+    bounds.push(whole.end);
+    bounds
+}
+
+/// The median of the exact times at which what differs between two phases began or ended, near `cell`.
+fn differing(
+    elements: &Elements,
+    activity: &Activity,
+    present: &[Presence],
+    (before, after): ((usize, usize), (usize, usize)),
+    cell: Stamp,
+) -> Option<Stamp> {
+    let old = configuration(elements, activity, present, before.0, before.1).names;
+    let new = configuration(elements, activity, present, after.0, after.1).names;
+    let around = AROUND.0.max(activity.span().nanos() / AROUND.1);
+    let near = |at: &Stamp| at.since(cell).abs() <= around;
+    let topics = is_topics(present);
+    let starts = |name: &Arc<str>| presence::ends(elements, name, topics).0;
+    let stops = |name: &Arc<str>| presence::ends(elements, name, topics).1;
+    let began = new.difference(&old).flat_map(starts);
+    let ended = old.difference(&new).flat_map(stops);
+    let mut times: Vec<Stamp> = began.chain(ended).filter(near).collect();
+    times.sort_unstable();
+    times.get(times.len() / 2).copied()
+}
+
+fn told(spans: &[Span], found: &[Configuration], ramps: &[bool], unit: &str) -> Vec<Phase> {
+    let nothing = BTreeSet::new();
+    let phase = |k: usize| {
+        let before = k.checked_sub(1).map_or(&nothing, |b| &found[b].names);
+        let added: Vec<&Arc<str>> = found[k].names.difference(before).collect();
+        let removed: Vec<&Arc<str>> = before.difference(&found[k].names).collect();
+        let same_as = (0..k).find(|earlier| is_same(&found[*earlier], &found[k]));
+        let count = |list: &[&Arc<str>]| u32::try_from(list.len()).unwrap_or(u32::MAX);
+        Phase {
+            span: spans[k],
+            name: if ramps[k] {
+                name::ramp(found[k].names.len(), unit)
+            } else {
+                name::of_changes(k == 0, &added, &removed, unit)
+            },
+            nodes_added: count(&added),
+            nodes_removed: count(&removed),
+            is_ramp: ramps[k],
+            same_as: same_as.and_then(|at| u32::try_from(at).ok()),
+        }
+    };
+    (0..spans.len()).map(phase).collect()
+}
+
+/// Whether two phases have the same nodes, and no topic another main sender.
+fn is_same(a: &Configuration, b: &Configuration) -> bool {
+    let agree = |(topic, sender): (&TopicId, &Arc<str>)| {
+        b.senders.get(topic).is_none_or(|other| other == sender)
+    };
+    a.names == b.names && a.senders.iter().all(agree)
+}

@@ -1,0 +1,51 @@
+//! What a phase is called as long as nobody gives it a name: what began, else what ended.
+
+use std::sync::Arc;
+
+use crate::base::name::last_part;
+use crate::base::words::{count, some_of};
+
+/// The most names that are listed.
+const MOST: usize = 3;
+
+/// `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `−1 node: replanner`, `same nodes`.
+pub(crate) fn of_changes(
+    is_first: bool,
+    added: &[&Arc<str>],
+    removed: &[&Arc<str>],
+    unit: &str,
+) -> Arc<str> {
+    let text = match (is_first, added, removed) {
+        (true, ..) => count(added.len(), unit),
+        (_, [], []) => format!("same {unit}s"),
+        (_, [], removed) => format!("−{}: {}", count(removed.len(), unit), listed(removed)),
+        (_, added, _) => format!("+{}: {}", count(added.len(), unit), listed(added)),
+    };
+    Arc::from(text)
+}
+
+/// `ramp to 22 nodes`.
+pub(crate) fn ramp(nodes: usize, unit: &str) -> Arc<str> {
+    Arc::from(format!("ramp to {}", count(nodes, unit)))
+}
+
+fn listed(names: &[&Arc<str>]) -> String {
+    let names: Vec<&str> = names.iter().map(|n| last_part(n)).collect();
+    some_of(&names, MOST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phase_is_named_by_what_began() {
+        let names: Vec<Arc<str>> = ["/a/x", "/b/y", "/z", "/w"].map(Arc::from).to_vec();
+        let all: Vec<&Arc<str>> = names.iter().collect();
+        assert_eq!(&*of_changes(true, &all, &[], "node"), "4 nodes");
+        let began = of_changes(false, &all, &all[..1], "node");
+        assert_eq!(&*began, "+4 nodes: x, y, z and 1 more");
+        assert_eq!(&*of_changes(false, &[], &all[..1], "node"), "−1 node: x");
+        assert_eq!(&*of_changes(false, &[], &[], "topic"), "same topics");
+    }
+}

