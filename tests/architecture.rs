@@ -23,7 +23,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "times", "topology"],
+        &["clock", "message", "rhythm", "spread", "texts", "times", "topology"],
         &["claim"],
         &["kinds", "proof"],
         &["publishers", "source"],

@@ -201,7 +201,7 @@ fn build(recorded: &mut Recorded, reading: &Reading, watch: &mut dyn Watch) -> R
         let merged = merged(&mission, &windows);
         mission = graphs(recorded, &merged, reading)?;
     }
-    mission.activity = activity(&mut recorded, &mission, reading)?;
+    mission.activity = activity(recorded, &mission, reading)?;
     mission.ledger.phases = phases(&mission.elements, &mission.activity);
     if reading.division.length == Length::Auto {
         let text = format!("the period is {}; `--period` takes another", windows.period);

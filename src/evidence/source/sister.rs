@@ -74,7 +74,8 @@ fn copy(source: SourceId, known: &mut Findings<'_>, from: &Twin, to: &Twin) {
             Some(rest) => known.facts.known(&format!("{}{rest}", to.space)),
             None => Some(topic),
         };
-        if let Some(twin) = twin.filter(|t| known.is_recorded(*t)) {
+        let own = |twin| known.knows(Key::Publish(to.node, twin));
+        if let Some(twin) = twin.filter(|t| known.is_recorded(*t) && !own(*t)) {
             let what = Key::Subscribe(twin, to.node);
             known.infer(source, what, Key::Node(to.node), |known| {
                 format!(
