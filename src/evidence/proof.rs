@@ -9,9 +9,7 @@ use std::sync::Arc;
 use crate::bag::Connection;
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{
-    Claim, ClaimRecord, Claims, Degree, EvidenceLine, Name, SourceId,
-};
+use crate::evidence::claim::{Claim, ClaimRecord, Claims, Degree, EvidenceLine, Name, SourceId};
 use crate::evidence::proof::closed::Closed;
 use crate::evidence::rhythm::Rhythm;
 use crate::evidence::times::SeriesId;
@@ -290,9 +288,7 @@ impl<'a> Findings<'a> {
 
     /// How many publishers a topic had when its recording began; `None` if the bag does not tell.
     pub(crate) fn offers(&self, topic: Name) -> Option<u32> {
-        let of_topic = |at: &usize| self.streams.get(*at).is_some_and(|s| s.topic == topic);
-        let offers = self.facts.offers.iter();
-        offers.filter(|(at, _)| of_topic(at)).map(|(_, n)| *n).max()
+        offered(&self.facts.offers, self.streams, topic)
     }
 
     /// The known node that a logger belongs to: the one of its name, or the nearest above it.
@@ -507,6 +503,17 @@ impl<'a> Findings<'a> {
         ends.dedup();
         (signs, ends)
     }
+}
+
+/// How many publishers were offered on a topic, at most in one bag.
+pub(crate) fn offered(
+    offers: &BTreeMap<usize, u32>,
+    streams: &[Stream],
+    topic: Name,
+) -> Option<u32> {
+    let of_topic = |at: &usize| streams.get(*at).is_some_and(|s| s.topic == topic);
+    let counts = offers.iter().filter(|(at, _)| of_topic(at));
+    counts.map(|(_, count)| *count).max()
 }
 
 /// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.

@@ -145,7 +145,10 @@ impl Schema {
     }
 }
 
-#[expect(clippy::unnecessary_wraps, reason = "an arm among others that may fail")]
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "an arm among others that may fail"
+)]
 fn whole(number: impl Into<i128>) -> Result<Value> {
     Ok(Value::Number(Some(number.into())))
 }

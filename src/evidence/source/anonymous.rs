@@ -53,8 +53,14 @@ mod tests {
     #[test]
     fn anonymous_names_hold_their_start() {
         let at = |name| start(name).map(|t| t.0);
-        assert_eq!(at("/probe_9665_1795171273454"), Some(1_795_171_273_454_000_000));
-        assert_eq!(at("/record_1795170682045487216"), Some(1_795_170_682_045_487_216));
+        assert_eq!(
+            at("/probe_9665_1795171273454"),
+            Some(1_795_171_273_454_000_000)
+        );
+        assert_eq!(
+            at("/record_1795170682045487216"),
+            Some(1_795_170_682_045_487_216)
+        );
         assert_eq!(at("/camera_1795171273454"), None);
         assert_eq!(at("/camera_2"), None);
     }

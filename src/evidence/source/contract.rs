@@ -88,10 +88,15 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
                 continue;
             };
             if contract.publishes {
-                publishers.entry(topic).or_default().push((node, contract.clone()));
+                publishers
+                    .entry(topic)
+                    .or_default()
+                    .push((node, contract.clone()));
             } else if !known.knows(Key::Publish(node, topic)) {
                 let what = Key::Subscribe(topic, node);
-                known.infer(source, what, Key::Node(node), |known| words(known, node, &contract));
+                known.infer(source, what, Key::Node(node), |known| {
+                    words(known, node, &contract)
+                });
             }
         }
     }
@@ -102,7 +107,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 
 /// Draws the publishers of a topic, unless there would be more than the bag says there were.
 fn publish(source: SourceId, known: &mut Findings<'_>, topic: Name, nodes: &[(Name, Contract)]) {
-    let all: BTreeSet<Name> = known.publishers(topic).chain(nodes.iter().map(|n| n.0)).collect();
+    let all: BTreeSet<Name> = known
+        .publishers(topic)
+        .chain(nodes.iter().map(|n| n.0))
+        .collect();
     if known.offers(topic).is_some_and(|n| all.len() > n as usize) {
         return;
     }
@@ -112,7 +120,11 @@ fn publish(source: SourceId, known: &mut Findings<'_>, topic: Name, nodes: &[(Na
 }
 
 fn words(known: &Findings<'_>, node: Name, contract: &Contract) -> String {
-    let verb = if contract.publishes { "publishes" } else { "subscribes" };
+    let verb = if contract.publishes {
+        "publishes"
+    } else {
+        "subscribes"
+    };
     format!(
         "{} is taken for the one of package {}, which {verb} {}",
         known.text(node),
@@ -164,20 +176,39 @@ mod tests {
         for (line, row) in rows.iter().skip(1) {
             let contract = contract(row).unwrap_or_else(|| panic!("line {line} has other columns"));
             assert!(row[7].starts_with("https://"), "line {line} has no source");
-            assert!(["publishes", "subscribes"].contains(&&*row[3]), "line {line}");
+            assert!(
+                ["publishes", "subscribes"].contains(&&*row[3]),
+                "line {line}"
+            );
             assert!(["", "1", "2"].contains(&&*contract.ros), "line {line}");
-            assert!(!contract.node.is_empty() || !contract.files.is_empty(), "line {line}");
+            assert!(
+                !contract.node.is_empty() || !contract.files.is_empty(),
+                "line {line}"
+            );
             assert!(contract.kind.matches('/').count() == 1, "line {line}");
         }
     }
 
     #[test]
     fn a_node_of_another_program_is_not_meant() {
-        let row = ["amcl", "amcl_node.cpp", "", "subscribes", "scan", "a/B", "amcl", "https://x"];
+        let row = [
+            "amcl",
+            "amcl_node.cpp",
+            "",
+            "subscribes",
+            "scan",
+            "a/B",
+            "amcl",
+            "https://x",
+        ];
         let contract = contract(&row.map(str::to_owned)).unwrap();
         let files = |file: &str| BTreeSet::from([Arc::from(file)]);
         assert!(is_meant(&contract, "/r1/amcl", None));
-        assert!(is_meant(&contract, "/r1/amcl", Some(&files("amcl_node.cpp"))));
+        assert!(is_meant(
+            &contract,
+            "/r1/amcl",
+            Some(&files("amcl_node.cpp"))
+        ));
         assert!(!is_meant(&contract, "/r1/amcl", Some(&files("node.py"))));
         assert!(!is_meant(&contract, "/r1/amcl_2", None));
     }

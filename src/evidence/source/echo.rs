@@ -63,9 +63,16 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &Schema, payload: &[u8
 /// How to take the messages of a connection apart; `None` for those that hold no words or numbers of their own.
 pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<Schema> {
     let plain = type_name.replacen("/msg/", "/", 1);
-    if ["rosgraph_msgs/", "rcl_interfaces/", "tf2_msgs/", "tf/", "roslib/", "bond/"]
-        .iter()
-        .any(|package| plain.starts_with(package))
+    if [
+        "rosgraph_msgs/",
+        "rcl_interfaces/",
+        "tf2_msgs/",
+        "tf/",
+        "roslib/",
+        "bond/",
+    ]
+    .iter()
+    .any(|package| plain.starts_with(package))
     {
         return None;
     }
@@ -111,10 +118,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
     let echoes = echoes(known, &said, &shown);
     let mut by_node: BTreeMap<Name, Vec<&str>> = BTreeMap::new();
     for text in &said {
-        let owner = known.owner(&text.logger);
-        owner.map(|node| by_node.entry(node).or_default().push(&text.text));
+        if let Some(node) = known.owner(&text.logger) {
+            by_node.entry(node).or_default().push(&text.text);
+        }
     }
-    let enough = echoes.iter().filter(|(_, echo)| echo.values.len() >= FEWEST);
+    let enough = echoes
+        .iter()
+        .filter(|(_, echo)| echo.values.len() >= FEWEST);
     let strong: Vec<_> = enough
         .take(MOST_FORMS)
         .filter(|((node, before, after, _), echo)| {
@@ -176,10 +186,14 @@ fn place(text: &str, value: &str) -> Option<Range<usize>> {
     let start = text.find(value)?;
     let end = start + value.len();
     let is_part = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
-    let (before, after) = (text[..start].chars().next_back(), text[end..].chars().next());
+    let (before, after) = (
+        text[..start].chars().next_back(),
+        text[end..].chars().next(),
+    );
     let more = is_number(value)
-        && (matches!(before, Some('.' | '-')) || text[end..].starts_with(|c| c == '.')
-            && text[end + 1..].starts_with(|c: char| c.is_ascii_digit()));
+        && (matches!(before, Some('.' | '-'))
+            || text[end..].starts_with('.')
+                && text[end + 1..].starts_with(|c: char| c.is_ascii_digit()));
     (!is_part(before) && !is_part(after) && !more).then_some(start..end)
 }
 

@@ -51,7 +51,9 @@ pub(crate) fn is_stamped(connection: &Connection) -> bool {
     let definition = connection.definition.as_deref().unwrap_or_default();
     if definition.trim().is_empty() || is_list(connection) {
         let kind = &connection.type_name;
-        return kind.starts_with("sensor_msgs/") || kind.ends_with("Stamped") || is_list(connection);
+        return kind.starts_with("sensor_msgs/")
+            || kind.ends_with("Stamped")
+            || is_list(connection);
     }
     let fields = outline(definition);
     fields
@@ -119,7 +121,10 @@ struct Flows {
 pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
     let flows = flows(known);
     for (output, flow) in flows.all.iter().enumerate() {
-        let copied = flow.nodes.iter().any(|n| known.copies.contains(&(*n, flow.topic)));
+        let copied = flow
+            .nodes
+            .iter()
+            .any(|n| known.copies.contains(&(*n, flow.topic)));
         if flow.nodes.is_empty() || copied {
             continue;
         }
@@ -149,7 +154,10 @@ fn input(known: &Findings<'_>, flows: &Flows, output: usize) -> Option<usize> {
             && pair.before >= FEWEST
             && pair.before * 100 >= flow.messages * SHARE
             && pair.before * 100 >= pair.equal * ORDERED
-            && !flow.nodes.iter().any(|n| known.knows(Key::Publish(*n, flows.all[*input].topic)))
+            && !flow
+                .nodes
+                .iter()
+                .any(|n| known.knows(Key::Publish(*n, flows.all[*input].topic)))
     });
     let good: Vec<(usize, Pair)> = good.map(|((input, _), pair)| (*input, *pair)).collect();
     let most = good.iter().map(|(_, pair)| pair.before).max()?;
@@ -169,7 +177,7 @@ fn input(known: &Findings<'_>, flows: &Flows, output: usize) -> Option<usize> {
 }
 
 /// Of flows that one publisher sends with one stamp, the one that is meant: of the output's type, else the only one that
-/// is no CameraInfo; `None` if that cannot be told.
+/// is no `CameraInfo`; `None` if that cannot be told.
 fn without_siblings(
     flows: &Flows,
     output: &Flow,
@@ -186,7 +194,9 @@ fn without_siblings(
     for family in families.into_values() {
         let kind = |(at, _): &&(usize, Pair)| flows.all[*at].kind.as_str();
         let same = family.iter().filter(|f| kind(f) == output.kind);
-        let data = family.iter().filter(|f| kind(f) != "sensor_msgs/CameraInfo");
+        let data = family
+            .iter()
+            .filter(|f| kind(f) != "sensor_msgs/CameraInfo");
         let [same, data]: [Vec<_>; 2] = [same.copied().collect(), data.copied().collect()];
         match (&family[..], &same[..], &data[..]) {
             ([one], ..) | (_, [one], _) | (_, [], [one]) => left.push(*one),
@@ -227,7 +237,10 @@ fn flows(known: &mut Findings<'_>) -> Flows {
     let mut pairs: BTreeMap<(usize, usize), Pair> = BTreeMap::new();
     let mut group: Vec<(Timed, usize)> = Vec::new();
     let merged = known.facts.times.merge(&series, |timed| {
-        if group.first().is_some_and(|(first, _)| first.time != timed.time) {
+        if group
+            .first()
+            .is_some_and(|(first, _)| first.time != timed.time)
+        {
             compare(&group, &all, &mut pairs);
             group.clear();
         }
@@ -264,7 +277,10 @@ fn compare(group: &[(Timed, usize)], all: &[Flow], pairs: &mut BTreeMap<(usize, 
     }
     let mut counted = BTreeSet::new();
     for (output, to) in group.iter().filter(|(_, to)| !all[*to].nodes.is_empty()) {
-        for (input, from) in group.iter().filter(|(_, from)| is_other(&all[*from], &all[*to])) {
+        for (input, from) in group
+            .iter()
+            .filter(|(_, from)| is_other(&all[*from], &all[*to]))
+        {
             if !counted.insert((from, to)) {
                 continue;
             }

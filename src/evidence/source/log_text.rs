@@ -28,8 +28,16 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 /// What stands before a topic, what behind it, and whether the speaker publishes it.
 const FORMS: &[(&str, &str, bool)] = &[
     // rclcpp and rclpy: the other end is new, so the speaker has this one.
-    ("New subscription discovered on topic '", "', requesting incompatible QoS", true),
-    ("New publisher discovered on topic '", "', offering incompatible QoS", false),
+    (
+        "New subscription discovered on topic '",
+        "', requesting incompatible QoS",
+        true,
+    ),
+    (
+        "New publisher discovered on topic '",
+        "', offering incompatible QoS",
+        false,
+    ),
     // gazebo_ros_pkgs of ROS 2; camera, depth, points, infrared.
     ("Advertise odometry on [", "]", true),
     ("Advertise wheel state on [", "]", true),
@@ -142,7 +150,10 @@ mod tests {
                 "Creating ROS->GZ Bridge: [/cmd_vel (geometry_msgs/msg/Twist) -> /model/cmd (gz.msgs.Twist)] (Lazy 0)",
                 Some((false, "/cmd_vel")),
             ),
-            ("Setup publisher on chatter [std_msgs/String]", Some((true, "chatter"))),
+            (
+                "Setup publisher on chatter [std_msgs/String]",
+                Some((true, "chatter")),
+            ),
             ("Publishing odom transforms between [odom] and [base]", None),
             ("Subscribed to topic '/map'", None),
         ];

@@ -102,7 +102,15 @@ fn matches(known: &mut Findings<'_>) -> (Vec<Flow>, Matches) {
     let flow_of = |at: &usize| (known.streams[*at].topic, known.streams[*at].publisher);
     let named: BTreeMap<_, Flow> = places
         .iter()
-        .map(|at| ((known.text(flow_of(at).0), flow_of(at).1.map(|n| known.text(n))), flow_of(at)))
+        .map(|at| {
+            (
+                (
+                    known.text(flow_of(at).0),
+                    flow_of(at).1.map(|n| known.text(n)),
+                ),
+                flow_of(at),
+            )
+        })
         .collect();
     let flows: Vec<Flow> = named.into_values().collect();
     let place = |flow: Flow| flows.iter().position(|f| *f == flow).unwrap_or(0);
@@ -155,7 +163,13 @@ impl Walk {
         }
         if !origins.is_empty() {
             origins.sort_unstable();
-            *self.found.origins.entry(flow).or_default().entry(origins).or_default() += 1;
+            *self
+                .found
+                .origins
+                .entry(flow)
+                .or_default()
+                .entry(origins)
+                .or_default() += 1;
         }
         owners.push((time, flow));
         self.queue.push_back((time, hash));
@@ -229,7 +243,14 @@ mod tests {
 
     #[test]
     fn only_different_contents_count() {
-        let found = walked(&[(0, 0, 7), (1, 1, 7), (0, 10, 7), (1, 11, 7), (0, 20, 8), (1, 21, 8)]);
+        let found = walked(&[
+            (0, 0, 7),
+            (1, 1, 7),
+            (0, 10, 7),
+            (1, 11, 7),
+            (0, 20, 8),
+            (1, 21, 8),
+        ]);
         assert_eq!(found.pairs[&(0, 1)].before, 2);
         assert_eq!(found.distinct, [(0, 2), (1, 2)].into());
     }

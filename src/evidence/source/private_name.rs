@@ -20,7 +20,11 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         }
         if let Some(node) = owner(&name, &nodes) {
             known.infer_publisher(source, node, topic, |known| {
-                format!("{} lies below the name of {}", known.text(topic), known.text(node))
+                format!(
+                    "{} lies below the name of {}",
+                    known.text(topic),
+                    known.text(node)
+                )
             });
         }
     }

@@ -54,7 +54,11 @@ mod tests {
             end("qos_overrides./a/scan.subscription_left.history"),
             Some(("/a/scan", false))
         );
-        for other in ["use_sim_time", "qos_overrides./tf.depth", "qos_overrides.tf.x.y"] {
+        for other in [
+            "use_sim_time",
+            "qos_overrides./tf.depth",
+            "qos_overrides.tf.x.y",
+        ] {
             assert_eq!(end(other), None);
         }
     }

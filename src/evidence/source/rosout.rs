@@ -111,7 +111,9 @@ fn is_broadcaster(known: &mut Findings<'_>, node: Name, topic: Name) -> bool {
     let twin = known.facts.known(&twin);
     let names = |twin| {
         let facts = known.facts.list.iter();
-        facts.map(|f| f.claim).any(|c| c == Claim::Lists(node, twin))
+        facts
+            .map(|f| f.claim)
+            .any(|c| c == Claim::Lists(node, twin))
     };
     !told && !twin.is_some_and(names)
 }

@@ -38,7 +38,8 @@ fn families(known: &Findings<'_>) -> BTreeMap<String, Vec<Twin>> {
     let mut families: BTreeMap<String, Vec<Twin>> = BTreeMap::new();
     for (node, topics) in published {
         let name = known.text(node);
-        let Some((space, last)) = name.rsplit_once('/').filter(|(space, _)| !space.is_empty()) else {
+        let Some((space, last)) = name.rsplit_once('/').filter(|(space, _)| !space.is_empty())
+        else {
             continue;
         };
         let own: BTreeSet<String> = topics

@@ -19,7 +19,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         if let Some(twin) = twin.filter(|t| known.kind(*t) == "tf2_msgs/TFMessage") {
             let basis = Key::Subscribe(topic, node);
             known.infer(source, Key::Subscribe(twin, node), basis, |known| {
-                format!("{} subscribes {text}, and tf2 always subscribes both", known.text(node))
+                format!(
+                    "{} subscribes {text}, and tf2 always subscribes both",
+                    known.text(node)
+                )
             });
         }
     }
