@@ -11,6 +11,7 @@
 mod architecture;
 mod cli;
 mod docs;
+mod edges;
 mod encode;
 mod evidence;
 mod layout;

@@ -13,7 +13,7 @@ pub(crate) struct LogRecord<'a> {
 }
 
 impl<'a> LogRecord<'a> {
-    /// Reads the record that begins here, as far as its file.
+    /// Reads a whole record.
     ///
     /// # Errors
     /// If it has another layout.
@@ -31,11 +31,16 @@ impl<'a> LogRecord<'a> {
         } else {
             name.to_owned()
         };
-        Ok(Self {
-            logger,
-            text: payload.string()?,
-            file: payload.string()?,
-        })
+        let (text, file) = (payload.string()?, payload.string()?);
+        payload.skip_string()?;
+        payload.u32()?;
+        if !is_ros2 {
+            for _ in 0..payload.length(4)? {
+                payload.skip_string()?;
+            }
+        }
+        payload.finish()?;
+        Ok(Self { logger, text, file })
     }
 
     /// The file's own name.
