@@ -13,6 +13,8 @@ pub(crate) mod publishers;
 pub(crate) mod rhythm;
 pub(crate) mod source;
 pub(crate) mod spread;
+#[allow(dead_code, reason = "readers of source code need the rest")]
+pub(crate) mod syntax;
 pub(crate) mod texts;
 pub mod times;
 pub mod topology;
@@ -264,7 +266,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "launch",
-        about: "a launch file of the user's, which declares nodes",
+        about: "a launch file of the user's, which declares nodes; in Python, it is read and never run",
         ..NOTHING
     },
 ];

@@ -23,8 +23,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "spread", "texts", "times", "topology"],
-        &["claim"],
+        &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
+        &["claim", "topology"],
         &["kinds", "proof"],
         &["publishers", "source"],
         &["collector"],
