@@ -27,8 +27,8 @@ fn read_bytes(name: &str, bytes: &[u8]) -> (Report, Kept) {
 
 /// Runs the command; answers its exit code and what it said, results first.
 fn bagreel(args: &[&str]) -> (Option<i32>, String) {
-    let run = Command::new(env!("CARGO_BIN_EXE_bagreel")).args(args);
-    said(&run.output().unwrap())
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    said(&command.args(args).output().unwrap())
 }
 
 fn said(output: &Output) -> (Option<i32>, String) {

@@ -12,6 +12,7 @@ mod architecture;
 mod cli;
 mod damaged;
 mod docs;
+mod edges;
 mod encode;
 mod evidence;
 mod figures;

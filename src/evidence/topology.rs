@@ -7,6 +7,7 @@ mod budget;
 mod csv;
 mod dot;
 pub(crate) mod launch;
+pub(crate) mod nearest;
 mod python;
 mod substitution;
 mod tree;
@@ -14,9 +15,10 @@ mod yaml;
 
 use std::path::Path;
 
+use crate::base::budget::USER_TEXT;
 use crate::base::error::{Error, Result};
+use crate::base::file;
 use crate::base::notice::{Notice, NoticeKind};
-use crate::base::{budget, file};
 
 /// An element by its names.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,7 +40,7 @@ pub struct Entry {
     pub element: Element,
     /// From when, in nanoseconds after the mission's start; `None`: from the start.
     pub from_ns: Option<i64>,
-    /// Until when; `None`: to the end.
+    /// Until when, exclusive; `None`: to the end.
     pub to_ns: Option<i64>,
     /// Whether it only declares what should run (a launch file) and does not state what did.
     pub declared: bool,
@@ -102,7 +104,7 @@ pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
 
 /// The text of a file that is not too long.
 fn text(path: &Path) -> Result<String> {
-    let bytes = file::read(path, budget::USER_TEXT)?;
+    let bytes = file::read(path, USER_TEXT)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 

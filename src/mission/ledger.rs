@@ -14,8 +14,7 @@ use std::sync::Arc;
 
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
-use crate::graph::{Element, Elements, NodeId};
-use crate::mission::Window;
+use crate::graph::{Element, NodeId};
 
 pub(crate) use changes::{explain, of_changes};
 pub(crate) use make::{Told, make, sorted};
@@ -178,11 +177,6 @@ pub struct Phase {
 }
 
 impl Ledger {
-    /// What the changes from window to window say, where nothing finer is known.
-    pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Self {
-        from_changes::from_changes(elements, windows)
-    }
-
     /// Entries whose time lies in `span`, with their places, in order.
     pub fn inside(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
         let first = self.entries.partition_point(|e| e.time < span.start);
