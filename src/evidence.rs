@@ -12,6 +12,8 @@ pub(crate) mod proof;
 pub(crate) mod publishers;
 pub(crate) mod rhythm;
 pub(crate) mod source;
+#[allow(dead_code, reason = "readers of source code need the rest")]
+pub(crate) mod syntax;
 pub mod times;
 pub mod topology;
 
@@ -186,7 +188,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "launch",
-        about: "a launch file of the user's, which declares nodes",
+        about: "a launch file of the user's, which declares nodes; in Python, it is read and never run",
         ..NOTHING
     },
 ];

@@ -23,8 +23,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "times", "topology"],
-        &["claim"],
+        &["clock", "message", "rhythm", "syntax", "times"],
+        &["claim", "topology"],
         &["kinds", "proof"],
         &["publishers", "source"],
         &["collector"],

@@ -6,110 +6,271 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
+use super::budget::Budget;
+use super::substitution::{Place, is_true};
 use super::tree::{self, Tree};
-use super::{Element, Entry, Topology, place, resolved, unused};
+use super::{Element, Entry, Topology, place, python, resolved, unused};
 use crate::base::error::Result;
 
 /// Files that include each other deeper than this go in circles.
 const DEEPEST: usize = 16;
 
+/// The work of opening a file, in bytes.
+const FILE: usize = 8 << 10;
+
+/// Groups and files inside each other deeper than this are not followed.
+const NESTED: usize = 200;
+
+/// The work of keeping one thing that a file says, in bytes.
+const ENTRY: usize = 150;
+
+/// A node that a launch file starts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct LaunchedNode {
+    /// The package of its program.
+    pub(crate) package: String,
+    /// Its program: an executable, or the class of a component or nodelet.
+    pub(crate) program: String,
+    /// Its name without namespace; `None` if only its program knows the name.
+    pub(crate) name: Option<String>,
+    /// Its namespace without a slash at the end; empty at the root.
+    pub(crate) namespace: String,
+    /// Topics and what they become, as written.
+    pub(crate) remaps: Vec<(String, String)>,
+    /// The line that starts it, 1..; 0 where not known.
+    pub(crate) line: usize,
+}
+
+/// What to do with a condition that only running the file would decide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Undecided {
+    /// What stands under it is left out, and a notice says so.
+    LeftOut,
+    /// All conditions count as met: every node that the file may start is wanted.
+    Taken,
+}
+
 /// What holds at a place in a file.
 #[derive(Clone, Debug, Default)]
 struct Scope {
     namespace: String,
-    arguments: BTreeMap<String, String>,
-    remaps: Vec<(String, String)>,
+    arguments: Rc<BTreeMap<String, String>>,
+    remaps: Rc<Vec<(String, String)>>,
 }
 
 /// Reads a launch file with all that it includes.
 pub(super) fn read(path: &Path, tree: &Tree) -> Result<Topology> {
-    let mut reader = Launch::default();
-    reader.inside(path, tree, &mut Scope::default(), 0)?;
+    let mut reader = Launch::new(Undecided::LeftOut);
+    reader.stack.extend(path.canonicalize().ok());
+    reader.inside(path, tree, &mut Scope::default())?;
+    if reader.budget.is_spent {
+        let what = "it repeats or includes itself too often; what goes beyond is left out";
+        reader.topology.notices.push(unused(path, 0, what));
+    }
     Ok(reader.topology)
 }
 
-#[derive(Default)]
+#[allow(dead_code, reason = "readers of source code need it")]
+/// Every node that a launch file may start by itself, without what it includes, whatever its conditions say.
+pub(crate) fn nodes(path: &Path, tree: &Tree) -> Vec<LaunchedNode> {
+    let mut reader = Launch::new(Undecided::Taken);
+    // Includes are not followed, and nothing else can fail.
+    let _ = reader.inside(path, tree, &mut Scope::default());
+    reader.nodes
+}
+
 struct Launch {
+    undecided: Undecided,
+    budget: Budget,
+    /// The files that are being read, each included by the one before.
+    stack: Vec<PathBuf>,
+    nested: usize,
     topology: Topology,
+    nodes: Vec<LaunchedNode>,
 }
 
 impl Launch {
+    fn new(undecided: Undecided) -> Self {
+        Self {
+            undecided,
+            budget: Budget::default(),
+            stack: Vec::new(),
+            nested: 0,
+            topology: Topology::default(),
+            nodes: Vec::new(),
+        }
+    }
+
     /// The elements inside one, in order; what they change holds for those after them.
-    fn inside(&mut self, path: &Path, tree: &Tree, scope: &mut Scope, depth: usize) -> Result<()> {
+    fn inside(&mut self, path: &Path, tree: &Tree, scope: &mut Scope) -> Result<()> {
+        if self.nested > NESTED {
+            self.left_out(path, tree, "it nests too deep");
+            return Ok(());
+        }
+        self.nested += 1;
         for child in &tree.children {
-            let value = |name: &str| child.get(name).map(|text| substitute(text, path, scope));
-            let truth = |name| {
-                value(name).map(|text| ["true", "1", "yes"].contains(&&*text.to_lowercase()))
-            };
-            if truth("if") == Some(false) || truth("unless") == Some(true) {
-                continue;
+            if self.is_met(path, child, scope) {
+                self.element(path, child, scope)?;
             }
-            match child.tag.as_str() {
-                "arg" | "let" => {
-                    let name = value("name").unwrap_or_default();
-                    if let Some(fixed) = value("value") {
-                        scope.arguments.insert(name, fixed);
-                    } else if let Some(default) = value("default") {
-                        scope.arguments.entry(name).or_insert(default);
-                    }
-                }
-                "remap" => {
-                    let (from, to) = (
-                        value("from").unwrap_or_default(),
-                        value("to").unwrap_or_default(),
-                    );
-                    scope.remaps.push((from, to));
-                }
-                "push_ros_namespace" | "push-ros-namespace" => {
-                    let space = value("namespace").or(value("value")).unwrap_or_default();
-                    scope.namespace = join(&scope.namespace, &space);
-                }
-                "group" => {
-                    let space = value("ns").unwrap_or_default();
-                    let mut inner = scope.clone();
-                    inner.namespace = join(&scope.namespace, &space);
-                    self.inside(path, child, &mut inner, depth)?;
-                }
-                "include" => {
-                    let space = value("ns").unwrap_or_default();
-                    let file = value("file").unwrap_or_default();
-                    self.include(path, child, &file, &space, scope, depth)?;
-                }
-                "node" | "composable_node" => self.node(path, child, scope),
-                "node_container" => {
-                    self.node(path, child, scope);
-                    self.inside(path, child, &mut scope.clone(), depth)?;
-                }
-                "load_composable_node" => self.inside(path, child, &mut scope.clone(), depth)?,
-                _ => {}
+        }
+        self.nested -= 1;
+        Ok(())
+    }
+
+    fn element(&mut self, path: &Path, child: &Tree, scope: &mut Scope) -> Result<()> {
+        let mut value = |name: &str| self.value(path, child, scope, name);
+        match child.tag.as_str() {
+            "arg" | "let" => {
+                let (name, fixed, default) = (value("name"), value("value"), value("default"));
+                self.argument(scope, name.unwrap_or_default(), fixed, default);
             }
+            "remap" => {
+                if let (Some(from), Some(to)) = (value("from"), value("to")) {
+                    self.copied(scope.remaps.len());
+                    Rc::make_mut(&mut scope.remaps).push((from, to));
+                }
+            }
+            "push_ros_namespace" | "push-ros-namespace" => {
+                let space = value("namespace").or(value("value")).unwrap_or_default();
+                scope.namespace = join(&scope.namespace, &space);
+            }
+            "group" if child.get("scoped").is_some_and(|scoped| !is_true(scoped)) => {
+                self.inside(path, child, scope)?;
+            }
+            "group" => {
+                let space = value("ns").unwrap_or_default();
+                let mut inner = scope.clone();
+                inner.namespace = join(&scope.namespace, &space);
+                self.inside(path, child, &mut inner)?;
+            }
+            "include" => self.include(path, child, scope)?,
+            "node" | "composable_node" => self.node(path, child, scope),
+            "node_container" => {
+                self.node(path, child, scope);
+                self.inside(path, child, &mut scope.clone())?;
+            }
+            "load_composable_node" => self.inside(path, child, &mut scope.clone())?,
+            python::UNREAD => {
+                self.left_out(path, child, "what stands here is only known when it runs");
+            }
+            _ => {}
         }
         Ok(())
     }
 
+    /// An attribute with its substitutions put in; `None` if it is missing or only known when the file runs.
+    fn value(&mut self, path: &Path, tree: &Tree, scope: &Scope, name: &str) -> Option<String> {
+        let arguments = &scope.arguments;
+        Place { path, arguments }.substitute(tree.get(name)?, &mut self.budget)
+    }
+
+    /// Whether the conditions on an element are met.
+    fn is_met(&mut self, path: &Path, tree: &Tree, scope: &Scope) -> bool {
+        if self.undecided == Undecided::Taken {
+            return true;
+        }
+        for (name, wanted) in [("if", true), ("unless", false)] {
+            if tree.get(name).is_none() {
+                continue;
+            }
+            match self.value(path, tree, scope, name) {
+                Some(text) if is_true(&text) == wanted => {}
+                Some(_) => return false,
+                None => {
+                    self.left_out(path, tree, "its condition is only decided when it runs");
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Sets an argument. One whose value is not known is not set, so that nothing is made of it.
+    fn argument(
+        &mut self,
+        scope: &mut Scope,
+        name: String,
+        value: Option<String>,
+        default: Option<String>,
+    ) {
+        self.copied(scope.arguments.len());
+        let arguments = Rc::make_mut(&mut scope.arguments);
+        if let Some(fixed) = value {
+            arguments.insert(name, fixed);
+        } else if let Some(default) = default {
+            arguments.entry(name).or_insert(default);
+        }
+    }
+
+    /// Charges for what a scope must copy before it may change.
+    fn copied(&mut self, entries: usize) {
+        // Refusals are seen where texts are made.
+        let _ = self.budget.spend(entries);
+    }
+
+    fn left_out(&mut self, path: &Path, tree: &Tree, why: &str) {
+        if self.budget.spend(ENTRY).is_some() {
+            let what = format!("{why}, and it is left out");
+            self.topology.notices.push(unused(path, tree.line, &what));
+        }
+    }
+
     fn node(&mut self, path: &Path, tree: &Tree, scope: &Scope) {
-        let value = |name: &str| tree.get(name).map(|text| substitute(text, path, scope));
-        let Some(name) = value("name").filter(|name| !name.is_empty()) else {
-            let what = "a node without a name is left out, for only its program knows the name";
-            self.topology.notices.push(unused(path, tree.line, what));
+        let mut value = |name: &str| self.value(path, tree, scope, name);
+        let own_space = value("ns").or_else(|| value("namespace"));
+        let node = LaunchedNode {
+            package: value("pkg").unwrap_or_default(),
+            program: ["type", "exec", "plugin"]
+                .into_iter()
+                .find_map(&mut value)
+                .unwrap_or_default(),
+            name: value("name").filter(|name| !name.is_empty()),
+            namespace: join(&scope.namespace, &own_space.unwrap_or_default()),
+            remaps: self.remaps(path, tree, scope),
+            line: tree.line,
+        };
+        if self
+            .budget
+            .spend(ENTRY + node.remaps.len() * ENTRY)
+            .is_none()
+        {
+            return;
+        }
+        if self.undecided == Undecided::Taken {
+            self.nodes.push(node);
+            return;
+        }
+        let Some(name) = &node.name else {
+            self.left_out(path, tree, "the node's name is only known to its program");
             return;
         };
-        let space = value("ns").or(value("namespace")).unwrap_or_default();
-        let space = join(&scope.namespace, &space);
-        self.add(path, tree, Element::Node(join(&space, &name)));
-        let own = tree.children.iter().filter(|child| child.tag == "remap");
-        let own = own
-            .filter_map(|child| Some((child.get("from")?.to_owned(), child.get("to")?.to_owned())));
-        for (_, to) in scope.remaps.iter().cloned().chain(own) {
-            let to = substitute(&to, path, scope);
+        let full = join(&node.namespace, name);
+        self.add(path, tree, Element::Node(full.clone()));
+        for (_, to) in &node.remaps {
             // `~x` lies below the node, a plain name in its namespace.
             let topic = match to.strip_prefix('~') {
-                Some(private) => join(&join(&space, &name), private.trim_start_matches('/')),
-                None => join(&space, &to),
+                Some(private) => join(&full, private.trim_start_matches('/')),
+                None => join(&node.namespace, to),
             };
             self.add(path, tree, Element::Topic(topic));
         }
+    }
+
+    /// The remaps that hold for a node: those around it, then its own.
+    fn remaps(&mut self, path: &Path, tree: &Tree, scope: &Scope) -> Vec<(String, String)> {
+        if self.budget.spend(scope.remaps.len() * ENTRY).is_none() {
+            return Vec::new();
+        }
+        let mut all = scope.remaps.to_vec();
+        for child in tree.children.iter().filter(|child| child.tag == "remap") {
+            let mut value = |name: &str| self.value(path, child, scope, name);
+            if let (Some(from), Some(to)) = (value("from"), value("to")) {
+                all.push((from, to));
+            }
+        }
+        all
     }
 
     fn add(&mut self, path: &Path, tree: &Tree, element: Element) {
@@ -122,55 +283,72 @@ impl Launch {
         });
     }
 
-    fn include(
-        &mut self,
-        path: &Path,
-        tree: &Tree,
-        file: &str,
-        space: &str,
-        scope: &Scope,
-        depth: usize,
-    ) -> Result<()> {
-        let found = located(path, file).filter(|_| depth < DEEPEST);
-        let Some(found) = found else {
-            let what = format!("the included file `{file}` was not found");
-            self.topology.notices.push(unused(path, tree.line, &what));
+    fn include(&mut self, path: &Path, tree: &Tree, scope: &Scope) -> Result<()> {
+        if self.undecided == Undecided::Taken {
+            return Ok(());
+        }
+        let space = self.value(path, tree, scope, "ns").unwrap_or_default();
+        let Some(file) = self.value(path, tree, scope, "file") else {
+            self.left_out(path, tree, "the included file is only known when it runs");
             return Ok(());
         };
-        let mut inner = Scope {
-            namespace: join(&scope.namespace, space),
-            arguments: BTreeMap::new(),
-            remaps: scope.remaps.clone(),
+        let Some(found) = located(path, &file) else {
+            self.left_out(
+                path,
+                tree,
+                &format!("the included file `{file}` was not found"),
+            );
+            return Ok(());
         };
-        if tree.get("pass_all_args").is_some_and(|all| all == "true") {
-            inner.arguments.clone_from(&scope.arguments);
-        }
-        for argument in tree
-            .children
-            .iter()
-            .filter(|c| ["arg", "let"].contains(&c.tag.as_str()))
-        {
-            if let (Some(name), Some(value)) = (argument.get("name"), argument.get("value")) {
-                inner
-                    .arguments
-                    .insert(name.to_owned(), substitute(value, path, scope));
-            }
+        if self.stack.contains(&found) || self.stack.len() > DEEPEST {
+            self.left_out(
+                path,
+                tree,
+                &format!("the included file `{file}` includes itself"),
+            );
+            return Ok(());
         }
         let text = super::text(&found)?;
-        let included = match found
-            .extension()
-            .map(|e| e.to_string_lossy().to_lowercase())
-            .as_deref()
-        {
-            Some("py") => {
-                let what = format!("the included file `{file}` is a program and was not run");
-                self.topology.notices.push(unused(path, tree.line, &what));
-                return Ok(());
-            }
-            Some("yaml" | "yml") => tree::of_yaml(&found, &text)?.unwrap_or_default(),
-            _ => tree::of_xml(&found, &text)?,
+        if self.budget.spend(FILE + text.len()).is_none() {
+            return Ok(());
+        }
+        let mut inner = Scope {
+            namespace: join(&scope.namespace, &space),
+            arguments: self.passed(path, tree, scope),
+            remaps: Rc::clone(&scope.remaps),
         };
-        self.inside(&found, &included, &mut inner, depth + 1)
+        let included = tree_of(&found, &text)?.unwrap_or_default();
+        self.stack.push(found.clone());
+        let done = self.inside(&found, &included, &mut inner);
+        self.stack.pop();
+        done
+    }
+
+    /// The arguments that an include hands on.
+    fn passed(&mut self, path: &Path, tree: &Tree, scope: &Scope) -> Rc<BTreeMap<String, String>> {
+        let mut passed = match tree.get("pass_all_args") {
+            Some(all) if is_true(all) => Rc::clone(&scope.arguments),
+            _ => Rc::default(),
+        };
+        let own = |child: &&Tree| ["arg", "let"].contains(&child.tag.as_str());
+        for argument in tree.children.iter().filter(own) {
+            let name = argument.get("name").map(str::to_owned);
+            if let (Some(name), Some(value)) = (name, self.value(path, argument, scope, "value")) {
+                self.copied(passed.len());
+                Rc::make_mut(&mut passed).insert(name, value);
+            }
+        }
+        passed
+    }
+}
+
+/// The tree of a launch file of any form; `None` for YAML that is no launch file.
+pub(crate) fn tree_of(path: &Path, text: &str) -> Result<Option<Tree>> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    match ending.as_deref() {
+        Some("py") => python::of_python(path, text).map(Some),
+        Some("yaml" | "yml") => tree::of_yaml(path, text),
+        _ => tree::of_xml(path, text).map(Some),
     }
 }
 
@@ -179,58 +357,19 @@ fn located(path: &Path, file: &str) -> Option<PathBuf> {
     let file = Path::new(file);
     let folder = path.parent().unwrap_or(Path::new("."));
     let found = folder.join(file);
-    (!file.as_os_str().is_empty() && found.is_file()).then_some(found)
+    (!file.as_os_str().is_empty() && found.is_file())
+        .then(|| found.canonicalize().ok())
+        .flatten()
 }
 
 /// A name in a namespace; a name that begins with a slash stands for itself.
-fn join(space: &str, name: &str) -> String {
+pub(crate) fn join(space: &str, name: &str) -> String {
     match name.strip_prefix('/') {
+        Some(_) if name.trim_matches('/').is_empty() => String::new(),
         Some(_) => resolved(name.trim_end_matches('/')),
         None if name.is_empty() => space.to_owned(),
         None => format!("{space}/{}", name.trim_matches('/')),
     }
-}
-
-/// A text with its substitutions `$(…)` put in; one that would need execution, or is not known, is left out.
-fn substitute(text: &str, path: &Path, scope: &Scope) -> String {
-    let mut done = String::new();
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once("$(") {
-        done.push_str(before);
-        let Some((inside, next)) = after.split_once(')') else {
-            break;
-        };
-        let (verb, words) = inside.trim().split_once(' ').unwrap_or((inside.trim(), ""));
-        let words = words.trim().trim_matches(['\'', '"']);
-        match verb {
-            "arg" | "var" => done.push_str(scope.arguments.get(words).map_or("", String::as_str)),
-            "anon" => done.push_str(words),
-            "optenv" | "env" => {
-                done.push_str(words.split_once(' ').map_or("", |(_, default)| default));
-            }
-            "dirname" => done.push('.'),
-            "find" | "find-pkg-share" | "find-pkg-prefix" => done.push_str(&package(path, words)),
-            _ => {}
-        }
-        rest = next;
-    }
-    done + rest
-}
-
-/// The folder of a package, looked for among the folders above the file and beside those; its name if not found.
-fn package(path: &Path, name: &str) -> String {
-    let above = path.ancestors().skip(1);
-    let found = above
-        .into_iter()
-        .find_map(|folder| match folder.file_name() {
-            Some(own) if own == name => Some(folder.to_owned()),
-            _ => Some(folder.join(name)).filter(|beside| !name.is_empty() && beside.is_dir()),
-        });
-    let absolute = found.and_then(|folder| folder.canonicalize().ok());
-    absolute.map_or_else(
-        || name.to_owned(),
-        |folder| folder.to_string_lossy().into_owned(),
-    )
 }
 
 #[cfg(test)]
@@ -297,6 +436,67 @@ mod tests {
         let topology = crate::evidence::topology::read(&path).unwrap();
         assert_eq!(topology.entries[0].element, Element::Node("/r1/y".into()));
         assert_eq!(topology.notices.len(), 1);
+    }
+
+    #[test]
+    fn a_file_that_includes_itself_is_read_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("self.launch");
+        let include = r#"<include file="self.launch"/>"#.repeat(3);
+        let text = format!(r#"<launch><node pkg="a" type="b" name="n"/>{include}</launch>"#);
+        std::fs::write(&path, text).unwrap();
+        let topology = crate::evidence::topology::read(&path).unwrap();
+        assert_eq!(topology.entries.len(), 1);
+        assert!(
+            topology.notices[0].text.contains("includes itself"),
+            "{:?}",
+            topology.notices
+        );
+    }
+
+    #[test]
+    fn files_that_include_each_other_over_and_over_come_to_an_end() {
+        let folder = tempfile::tempdir().unwrap();
+        for n in 0..12 {
+            let include = format!(r#"<include file="{}.launch"/>"#, n + 1).repeat(10);
+            let text = format!(r#"<launch>{include}<node pkg="a" type="b" name="n{n}"/></launch>"#);
+            std::fs::write(folder.path().join(format!("{n}.launch")), text).unwrap();
+        }
+        std::fs::write(folder.path().join("12.launch"), "<launch/>").unwrap();
+        let topology = crate::evidence::topology::read(&folder.path().join("0.launch")).unwrap();
+        let told = topology
+            .notices
+            .iter()
+            .filter(|n| n.text.contains("too often"));
+        assert_eq!(told.count(), 1);
+    }
+
+    #[test]
+    fn arguments_that_repeat_each_other_do_not_fill_memory() {
+        let grow = |n: usize| {
+            format!(
+                r#"<arg name="a{}" value="{}"/>"#,
+                n + 1,
+                format!("$(arg a{n})").repeat(10)
+            )
+        };
+        let text: String = (0..9).map(grow).collect();
+        let text = format!(
+            r#"<launch><arg name="a0" value="{}"/>{text}<node pkg="a" type="b" name="$(arg a9)"/></launch>"#,
+            "x".repeat(100)
+        );
+        assert_eq!(elements(&text), []);
+    }
+
+    #[test]
+    fn an_undecided_condition_is_said() {
+        let text = r#"<launch><node pkg="a" type="b" name="n" if="$(env SIM)"/></launch>"#;
+        let path = Path::new("x.launch");
+        let topology = read(path, &tree::of_xml(path, text).unwrap()).unwrap();
+        assert!(
+            topology.entries.is_empty()
+                && topology.notices[0].text.contains("line 1: its condition")
+        );
     }
 
     #[test]

@@ -1,18 +1,17 @@
-//! A launch file as a tree of elements, from XML or from the YAML of ROS 2, so that one reader serves both.
+//! A launch file as a tree of elements, from XML or from the YAML of ROS 2, so that one reader serves them and Python.
 
 use std::path::Path;
 
-use quick_xml::events::{BytesStart, Event};
-use quick_xml::{Reader, XmlVersion};
+use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::Value;
 
 use super::bad;
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::base::yaml;
 
 /// An element of a launch file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Tree {
+pub(crate) struct Tree {
     pub(super) tag: String,
     /// Attributes in order.
     pub(super) attributes: Vec<(String, String)>,
@@ -30,70 +29,64 @@ impl Tree {
 }
 
 /// Elements inside elements deeper than this are hostile.
-const DEEPEST: usize = 64;
+pub(super) const DEEPEST: usize = 64;
 const XML_HINT: &str = "a launch file begins with `<launch>`";
 const YAML_HINT: &str = "a launch file begins with `launch:` and a list";
 
 /// The tree of a launch file in XML.
 pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
-    let mut reader = Reader::from_str(text);
-    let mut open: Vec<Tree> = Vec::new();
-    loop {
-        let line = |reader: &Reader<&[u8]>| {
-            let at = usize::try_from(reader.buffer_position())
-                .unwrap_or(0)
-                .min(text.len());
-            text.get(..at).unwrap_or(text).matches('\n').count() + 1
-        };
-        let wrong = |line, reason: String| bad(path, line, reason, XML_HINT);
-        let event = reader
-            .read_event()
-            .map_err(|e| wrong(line(&reader), e.to_string()))?;
-        let here = line(&reader);
-        let done = match event {
-            Event::Start(start) => {
-                if open.len() >= DEEPEST {
-                    return Err(wrong(here, format!("elements nest deeper than {DEEPEST}")));
-                }
-                open.push(element(&start, here).map_err(|e| wrong(here, e))?);
-                None
-            }
-            Event::Empty(start) => Some(element(&start, here).map_err(|e| wrong(here, e))?),
-            Event::End(_) => open.pop(),
-            Event::Eof => {
-                return Err(wrong(
-                    here,
-                    "the element `launch` is missing or not closed".to_owned(),
-                ));
-            }
-            _ => None,
-        };
-        if let Some(tree) = done {
-            match open.last_mut() {
-                Some(parent) => parent.children.push(tree),
-                None if tree.tag == "launch" => return Ok(tree),
-                None => return Err(wrong(tree.line, format!("`{}` is no `launch`", tree.tag))),
-            }
-        }
+    let options = ParsingOptions {
+        nodes_limit: 4_000_000,
+        ..ParsingOptions::default()
+    };
+    let document = Document::parse_with_options(text, options).map_err(|error| {
+        let line = usize::try_from(error.pos().row).unwrap_or(0);
+        bad(path, line, error.to_string(), XML_HINT)
+    })?;
+    let file = Xml {
+        path,
+        lines: text.match_indices('\n').map(|(at, _)| at).collect(),
+    };
+    let root = document.root_element();
+    if root.tag_name().name() != "launch" {
+        let what = format!("`{}` is not `launch`", root.tag_name().name());
+        return Err(file.wrong(root, what));
     }
+    file.element(root, 0)
 }
 
-fn element(start: &BytesStart<'_>, line: usize) -> Result<Tree, String> {
-    let mut attributes = Vec::new();
-    for attribute in start.attributes() {
-        let attribute = attribute.map_err(|e| e.to_string())?;
-        let value = attribute
-            .normalized_value(XmlVersion::Implicit1_0)
-            .map_err(|e| e.to_string())?;
-        let name = attribute.key.local_name();
-        attributes.push((name.as_ref().to_owned(), value.into_owned()));
+struct Xml<'a> {
+    path: &'a Path,
+    /// Where lines end, in bytes.
+    lines: Vec<usize>,
+}
+
+impl Xml<'_> {
+    fn line(&self, node: Node<'_, '_>) -> usize {
+        self.lines.partition_point(|end| *end < node.range().start) + 1
     }
-    Ok(Tree {
-        tag: start.local_name().as_ref().to_owned(),
-        attributes,
-        children: Vec::new(),
-        line,
-    })
+
+    fn wrong(&self, node: Node<'_, '_>, reason: String) -> Error {
+        bad(self.path, self.line(node), reason, XML_HINT)
+    }
+
+    fn element(&self, node: Node<'_, '_>, depth: usize) -> Result<Tree> {
+        if depth >= DEEPEST {
+            return Err(self.wrong(node, format!("elements nest deeper than {DEEPEST}")));
+        }
+        let inside = node.children().filter(Node::is_element);
+        Ok(Tree {
+            tag: node.tag_name().name().to_owned(),
+            attributes: node
+                .attributes()
+                .map(|a| (a.name().to_owned(), a.value().to_owned()))
+                .collect(),
+            children: inside
+                .map(|child| self.element(child, depth + 1))
+                .collect::<Result<_>>()?,
+            line: self.line(node),
+        })
+    }
 }
 
 /// The tree of a launch file in YAML; `None` if the document has no key `launch`.
@@ -103,7 +96,7 @@ pub(super) fn of_yaml(path: &Path, text: &str) -> Result<Option<Tree>> {
         return Ok(None);
     };
     let Value::Array(list) = launch else {
-        return Err(bad(path, 1, "`launch` holds no list".to_owned(), YAML_HINT));
+        return Err(bad(path, 1, "`launch` is not a list".to_owned(), YAML_HINT));
     };
     Ok(Some(Tree {
         tag: "launch".to_owned(),

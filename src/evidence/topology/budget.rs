@@ -1,0 +1,38 @@
+//! The work that a launch file may ask for: files include each other, texts repeat each other, and neither may run away.
+
+/// How much may be done for one file of the user's, in about as many bytes of memory and of text gone through: two
+/// hundred times the largest launch system seen (all of Autoware's), and a second or two of work.
+const WORK: usize = 64 << 20;
+
+/// What is left of the work; told once when it is used up.
+#[derive(Debug)]
+pub(super) struct Budget {
+    left: usize,
+    /// Whether something was refused.
+    pub(super) is_spent: bool,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self {
+            left: WORK,
+            is_spent: false,
+        }
+    }
+}
+
+impl Budget {
+    /// Takes `work` from it; `None` if not as much is left.
+    pub(super) fn spend(&mut self, work: usize) -> Option<()> {
+        match self.left.checked_sub(work) {
+            Some(left) if !self.is_spent => {
+                self.left = left;
+                Some(())
+            }
+            _ => {
+                self.is_spent = true;
+                None
+            }
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Launch files in Python, read and never run: what `generate_launch_description` puts together becomes a tree like that
+//! of the XML form, with `$(…)` for what the launch system would fill in.
+
+mod action;
+mod call;
+mod evaluator;
+mod expression;
+mod value;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::bad;
+use super::tree::Tree;
+use crate::base::error::Result;
+use crate::evidence::syntax::{Language, Parsed};
+use evaluator::Evaluator;
+use value::Value;
+
+/// The tag of something that only running the file would tell.
+pub(super) const UNREAD: &str = "unread";
+
+const HINT: &str = "a launch file in Python defines `generate_launch_description` and returns a `LaunchDescription`";
+
+/// The tree of a launch file in Python.
+pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
+    let Some(parsed) = Parsed::new(Language::Python, text.to_owned()) else {
+        return Err(bad(
+            path,
+            0,
+            "it is too tangled to be read".to_owned(),
+            HINT,
+        ));
+    };
+    let mut evaluator = Evaluator::new(&parsed, BTreeMap::new());
+    match evaluator.launch_description() {
+        Some(actions) => Ok(Tree {
+            tag: "launch".to_owned(),
+            children: action::trees(&actions),
+            ..Tree::default()
+        }),
+        None => Err(bad(
+            path,
+            0,
+            "there is no `generate_launch_description`".to_owned(),
+            HINT,
+        )),
+    }
+}
+
+/// The value of a Python expression as a text (`$(eval …)`, `PythonExpression`) in which `names` stand for texts; `None`
+/// if only running it would tell.
+pub(super) fn evaluate(expression: &str, names: &BTreeMap<String, String>) -> Option<String> {
+    match value(expression, names)? {
+        // XML puts quotes around the whole expression.
+        Value::Text(text) => match value(&text, names) {
+            Some(Value::Bool(is_true)) => Some(word(is_true)),
+            _ => Some(text).filter(|text| !text.contains("$(")),
+        },
+        Value::Bool(is_true) => Some(word(is_true)),
+        other => other.text(),
+    }
+}
+
+fn value(expression: &str, names: &BTreeMap<String, String>) -> Option<Value> {
+    let parsed = Parsed::new(Language::Python, format!("({expression})"))?;
+    let texts = names
+        .iter()
+        .map(|(name, text)| (name.clone(), value::of_text(text)));
+    Evaluator::new(&parsed, texts.collect()).whole()
+}
+
+fn word(is_true: bool) -> String {
+    if is_true { "true" } else { "false" }.to_owned()
+}
+
+#[cfg(test)]
+mod tests;

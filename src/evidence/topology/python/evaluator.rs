@@ -1,0 +1,359 @@
+//! Follows a launch file's statements without running anything: assignments, literal lists, loops over them, functions of
+//! the file. Where a condition is not known both branches count, and what they make is marked as undecided.
+
+use std::collections::BTreeMap;
+
+use super::super::budget::Budget;
+use super::super::substitution::LONGEST;
+use super::value::{DEEPEST, Value};
+use crate::evidence::syntax::{Node, Parsed, children, line};
+
+/// Expressions and calls inside each other deeper than this are not followed.
+const NESTED: usize = 120;
+
+/// The work of one step, in the bytes that budgets count.
+const STEP: usize = 16;
+
+pub(super) struct Evaluator<'a> {
+    pub(super) parsed: &'a Parsed,
+    frames: Vec<Frame>,
+    functions: BTreeMap<String, Node<'a>>,
+    pub(super) budget: Budget,
+    /// How many conditions that are not known stand around the statement.
+    pub(super) undecided: usize,
+    nested: usize,
+}
+
+/// The names of a function that is being followed.
+#[derive(Default)]
+struct Frame {
+    names: BTreeMap<String, Value>,
+    returned: Option<Value>,
+    /// `undecided` where the function was called.
+    undecided: usize,
+}
+
+/// What comes after a statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Flow {
+    Next,
+    Done,
+}
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn new(parsed: &'a Parsed, names: BTreeMap<String, Value>) -> Self {
+        let global = Frame {
+            names,
+            ..Frame::default()
+        };
+        Self {
+            parsed,
+            frames: vec![global],
+            functions: BTreeMap::new(),
+            budget: Budget::default(),
+            undecided: 0,
+            nested: 0,
+        }
+    }
+
+    /// What `generate_launch_description` returns; `None` if there is no such function.
+    pub(super) fn launch_description(&mut self) -> Option<Value> {
+        self.run(self.parsed.root());
+        let function = *self.functions.get("generate_launch_description")?;
+        Some(self.call(function, &[], &[]))
+    }
+
+    /// The value of the file's only expression; `None` where there is none or it is not known.
+    pub(super) fn whole(&mut self) -> Option<Value> {
+        let statement = children(self.parsed.root());
+        let expression = statement.first().and_then(|s| s.named_child(0))?;
+        if self.parsed.root().has_error() || statement.len() != 1 {
+            return None;
+        }
+        Some(self.value(expression)).filter(|value| !matches!(value, Value::Unknown(_)))
+    }
+
+    pub(super) fn text(&self, node: Node<'_>) -> &'a str {
+        self.parsed.text(node)
+    }
+
+    /// Keeps a new value, if it is neither too large nor too deep and there is room.
+    pub(super) fn kept(&mut self, value: Value, at: Node<'_>) -> Value {
+        let (size, depth) = value.measure();
+        let is_small =
+            depth <= DEEPEST && !matches!(&value, Value::Text(text) if text.len() > LONGEST);
+        match self.budget.spend(size) {
+            Some(()) if is_small => value,
+            _ => Value::Unknown(line(at)),
+        }
+    }
+
+    fn run(&mut self, block: Node<'a>) -> Flow {
+        for statement in children(block) {
+            if self.statement(statement) == Flow::Done {
+                return Flow::Done;
+            }
+        }
+        Flow::Next
+    }
+
+    fn statement(&mut self, node: Node<'a>) -> Flow {
+        if self.budget.spend(STEP).is_none() || self.nested > NESTED {
+            return Flow::Done;
+        }
+        self.nested += 1;
+        let flow = match node.kind() {
+            "expression_statement" => {
+                for expression in children(node) {
+                    self.effect(expression);
+                }
+                Flow::Next
+            }
+            "function_definition" => {
+                if let Some(name) = node.child_by_field_name("name") {
+                    self.functions.insert(self.text(name).to_owned(), node);
+                }
+                Flow::Next
+            }
+            "decorated_definition" => {
+                let definition = node.child_by_field_name("definition");
+                definition.map_or(Flow::Next, |inner| self.statement(inner))
+            }
+            "return_statement" => self.returns(node),
+            "if_statement" => self.branches(node),
+            "for_statement" => self.repeats(node),
+            "with_statement" | "try_statement" => {
+                let body = node.child_by_field_name("body");
+                body.map_or(Flow::Next, |body| self.run(body))
+            }
+            _ => Flow::Next,
+        };
+        self.nested -= 1;
+        flow
+    }
+
+    fn returns(&mut self, node: Node<'a>) -> Flow {
+        let value = node.named_child(0).map_or(Value::None, |n| self.value(n));
+        let undecided = self.undecided;
+        let Some(frame) = self.frames.last_mut() else {
+            return Flow::Done;
+        };
+        let is_sure = undecided == frame.undecided;
+        frame.returned = Some(match (frame.returned.take(), value) {
+            (None, value) if is_sure || value.acts() => value,
+            (Some(Value::List(mut before)), after) if after.acts() => {
+                before.push(after);
+                Value::List(before)
+            }
+            (Some(before), after) if before.acts() && after.acts() => {
+                Value::List(vec![before, after])
+            }
+            _ => Value::Unknown(line(node)),
+        });
+        if is_sure { Flow::Done } else { Flow::Next }
+    }
+
+    fn branches(&mut self, node: Node<'a>) -> Flow {
+        let mut cursor = node.walk();
+        let others: Vec<Node<'a>> = node
+            .children_by_field_name("alternative", &mut cursor)
+            .collect();
+        let mut sure = true;
+        let mut flow = Flow::Next;
+        for part in std::iter::once(node).chain(others) {
+            let truth = match part.child_by_field_name("condition") {
+                Some(condition) => self.value(condition).truth(),
+                None => Some(true),
+            };
+            let body = part
+                .child_by_field_name("consequence")
+                .or(part.child_by_field_name("body"));
+            let Some(body) = body.filter(|_| truth != Some(false)) else {
+                continue;
+            };
+            sure &= truth.is_some();
+            self.undecided += usize::from(!sure);
+            flow = self.run(body);
+            self.undecided -= usize::from(!sure);
+            if truth == Some(true) {
+                break;
+            }
+        }
+        if sure { flow } else { Flow::Next }
+    }
+
+    fn repeats(&mut self, node: Node<'a>) -> Flow {
+        let fields = ["left", "right", "body"].map(|name| node.child_by_field_name(name));
+        let [Some(left), Some(right), Some(body)] = fields else {
+            return Flow::Next;
+        };
+        for item in self.items(right) {
+            self.assign(left, item);
+            if self.run(body) == Flow::Done {
+                return Flow::Done;
+            }
+        }
+        Flow::Next
+    }
+
+    /// What a loop goes over, as far as it is known.
+    pub(super) fn items(&mut self, node: Node<'a>) -> Vec<Value> {
+        match self.value(node) {
+            Value::List(list) => list,
+            Value::Dict(map) => map.into_iter().map(|(key, _)| Value::Text(key)).collect(),
+            _ => vec![Value::Unknown(line(node))],
+        }
+    }
+
+    /// An expression that stands by itself: an assignment, a call that changes a list.
+    fn effect(&mut self, node: Node<'a>) {
+        let side = |name| node.child_by_field_name(name);
+        match (node.kind(), side("left"), side("right")) {
+            ("assignment", Some(left), Some(right)) => {
+                let value = self.value(right);
+                self.assign(left, value);
+            }
+            ("augmented_assignment", Some(left), Some(right)) => {
+                let (before, more) = (self.value(left), self.value(right));
+                let sum = self.sum(before, more, node);
+                self.assign(left, sum);
+            }
+            ("call", ..) => {
+                self.value(node);
+            }
+            _ => {}
+        }
+    }
+
+    pub(super) fn assign(&mut self, target: Node<'a>, value: Value) {
+        match (target.kind(), value) {
+            ("identifier", value) => {
+                let name = self.text(target).to_owned();
+                let sure = self
+                    .frames
+                    .last()
+                    .is_some_and(|f| f.undecided == self.undecided);
+                let value = if sure || value.acts() {
+                    value
+                } else {
+                    Value::Unknown(line(target))
+                };
+                if let Some(frame) = self.frames.last_mut() {
+                    frame.names.insert(name, value);
+                }
+            }
+            ("pattern_list" | "tuple_pattern", Value::List(parts)) => {
+                for (target, part) in children(target).into_iter().zip(parts) {
+                    self.assign(target, part);
+                }
+            }
+            ("pattern_list" | "tuple_pattern", _) => {
+                for target in children(target) {
+                    self.assign(target, Value::Unknown(line(target)));
+                }
+            }
+            ("subscript", value) => self.put(target, value),
+            _ => {}
+        }
+    }
+
+    /// `map['key'] = value`
+    fn put(&mut self, target: Node<'a>, value: Value) {
+        let part = |name| target.child_by_field_name(name);
+        let (Some(map), Some(key)) = (part("value"), part("subscript")) else {
+            return;
+        };
+        let key = self.value(key).text();
+        if let (Some(Value::Dict(entries)), Some(key)) = (self.variable(map), key) {
+            entries.retain(|(known, _)| *known != key);
+            entries.push((key, value));
+        }
+    }
+
+    /// The variable that a name stands for, to be changed.
+    pub(super) fn variable(&mut self, node: Node<'a>) -> Option<&mut Value> {
+        let name = self.parsed.text(node);
+        let frames = self.frames.iter_mut().rev();
+        frames
+            .filter(|_| node.kind() == "identifier")
+            .find_map(|f| f.names.get_mut(name))
+    }
+
+    /// A copy of the value of a name.
+    pub(super) fn named(&mut self, node: Node<'a>) -> Value {
+        self.lookup(self.text(node), node)
+    }
+
+    /// A copy of the value that a name stands for at `node`.
+    pub(super) fn lookup(&mut self, name: &str, node: Node<'a>) -> Value {
+        let found = self.frames.iter().rev().find_map(|f| f.names.get(name));
+        match found {
+            Some(value) => {
+                let value = value.clone();
+                self.kept(value, node)
+            }
+            None if self.functions.contains_key(name) => Value::Function(name.to_owned()),
+            None if name == "true" => Value::Bool(true),
+            None if name == "false" => Value::Bool(false),
+            None => Value::Unknown(line(node)),
+        }
+    }
+
+    /// A function of this file by its name.
+    pub(super) fn function(&self, name: &str) -> Option<Node<'a>> {
+        self.functions.get(name).copied()
+    }
+
+    /// What a function of this file returns.
+    pub(super) fn call(
+        &mut self,
+        function: Node<'a>,
+        positional: &[Value],
+        named: &[(String, Value)],
+    ) -> Value {
+        let parts = ["parameters", "body"].map(|name| function.child_by_field_name(name));
+        let [Some(parameters), Some(body)] = parts else {
+            return Value::Unknown(line(function));
+        };
+        if self.nested > NESTED {
+            return Value::Unknown(line(function));
+        }
+        let mut frame = Frame {
+            undecided: self.undecided,
+            ..Frame::default()
+        };
+        for (at, parameter) in children(parameters).into_iter().enumerate() {
+            let name = parameter
+                .child_by_field_name("name")
+                .or(match parameter.kind() {
+                    "identifier" => Some(parameter),
+                    _ => parameter.named_child(0),
+                });
+            let name = name.map_or("", |n| self.text(n)).to_owned();
+            let given = named.iter().find(|(n, _)| *n == name).map(|(_, v)| v);
+            let given = given.or(positional.get(at)).cloned();
+            let default = parameter.child_by_field_name("value");
+            let value = given.or_else(|| default.map(|d| self.value(d)));
+            frame
+                .names
+                .insert(name, value.unwrap_or(Value::Unknown(line(parameter))));
+        }
+        self.frames.push(frame);
+        self.nested += 1;
+        self.run(body);
+        self.nested -= 1;
+        let frame = self.frames.pop();
+        frame.and_then(|f| f.returned).unwrap_or(Value::None)
+    }
+
+    /// The value of an expression.
+    pub(super) fn value(&mut self, node: Node<'a>) -> Value {
+        if self.nested > NESTED || self.budget.spend(STEP).is_none() {
+            return Value::Unknown(line(node));
+        }
+        self.nested += 1;
+        let value = self.expression(node);
+        self.nested -= 1;
+        value
+    }
+}
