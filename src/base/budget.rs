@@ -15,6 +15,10 @@ pub(crate) const SPAN_DAYS: i64 = 36_525;
 /// The longest style, topology or file of captions, in bytes: a hundred times the largest we know.
 pub(crate) const USER_TEXT: u64 = 16 << 20;
 
+/// How much may be done for one launch file, in about as many bytes of memory and of text gone through: two hundred times
+/// the largest launch system seen (all of Autoware's), and a second or two of work.
+pub(crate) const LAUNCH_WORK: usize = 64 << 20;
+
 /// The longest font file, in bytes: collections of Chinese, Japanese and Korean have 20 MB.
 pub(crate) const FONT: u64 = 64 << 20;
 
