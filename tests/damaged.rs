@@ -160,7 +160,7 @@ fn a_record_of_a_false_kind_does_not_end_the_file() {
         if *byte != 7 || len < 22 || len > 6 + 16 * truth as u64 || (len - 6) % 16 != 0 {
             continue;
         }
-        for kind in [0, 2, 6, 0x0f] {
+        for kind in [0, 2, 6, 12, 0x0f] {
             let mut bytes = bytes.clone();
             bytes[at] = kind;
             let (_, kept) = read_bytes("x.mcap", &bytes);
@@ -169,6 +169,31 @@ fn a_record_of_a_false_kind_does_not_end_the_file() {
         }
     }
     assert!(seen > 8, "{seen}");
+}
+
+#[test]
+fn the_index_of_a_chunk_that_is_none_any_more_answers_for_it() {
+    let truth = short().messages.len();
+    for bytes in [unsummed(None), unsummed(Some(::mcap::Compression::Zstd))] {
+        let bytes = &bytes;
+        let is_chunk = |at: &usize| {
+            let number =
+                |at: usize| Some(u64::from_le_bytes(bytes.get(at..at + 8)?.try_into().ok()?));
+            let name = bytes.get(at + 37).map_or(0, |n| usize::from(*n));
+            let head = 40 + name as u64;
+            bytes[*at] == 6 && number(at + 1) == number(at + 41 + name).map(|n| n + head)
+        };
+        let chunks: Vec<usize> = (0..bytes.len()).filter(is_chunk).collect();
+        assert!(chunks.len() > 2, "{chunks:?}");
+        // The first one describes the connections.
+        for at in &chunks[1..] {
+            let mut bytes = bytes.clone();
+            bytes[*at] = 12;
+            let (report, kept) = read_bytes("x.mcap", &bytes);
+            assert_eq!(kept.stamps.len(), truth, "{:?}", kept.notices);
+            assert!(!report.complete);
+        }
+    }
 }
 
 #[test]

@@ -104,6 +104,17 @@ impl Gather {
         run.map_or(0, |run| run.0.len() as u64)
     }
 
+    /// Whether exactly these are held of a connection, in any order.
+    pub(crate) fn holds(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
+        let held = self.runs.get(id.0 as usize).map_or(&[][..], |run| &run.0);
+        let sorted = |stamps: &[Stamp]| {
+            let mut stamps = stamps.to_vec();
+            stamps.sort_unstable();
+            stamps
+        };
+        held == stamps || held.len() == stamps.len() && sorted(held) == sorted(stamps)
+    }
+
     /// Forgets what is held of a connection; answers how much that was, or nothing if some has been handed over.
     pub(crate) fn take(&mut self, id: ConnectionId) -> Option<u64> {
         if self.spilled {

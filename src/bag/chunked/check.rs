@@ -20,6 +20,8 @@ pub(super) struct Told {
     pub(super) messages: u64,
     /// The chunk is damaged, so that its index is believed instead.
     doubtful: bool,
+    /// Another record stood behind the chunk: it may have been a chunk, and what follows its index.
+    interrupted: bool,
     /// Index records that disagree with the chunk.
     behind: Vec<Behind>,
     /// How many messages the index has that the chunk has not, and the other way round.
@@ -42,10 +44,21 @@ impl Told {
         }
     }
 
+    /// Takes note that a record stands behind the chunk that is none of its index.
+    pub(super) fn interrupt(&mut self) {
+        self.interrupted = true;
+    }
+
     /// Whether the times of an index record of `count` messages are worth reading.
     pub(super) fn wants_stamps(&self, id: ConnectionId, count: u32) -> bool {
         let found = self.gather.count(id);
-        found < u64::from(count) || self.doubtful && found != u64::from(count)
+        let differs = self.doubtful && found != u64::from(count);
+        self.interrupted || differs || found < u64::from(count)
+    }
+
+    /// Whether an index record belongs to another chunk than the last, one that was not seen.
+    pub(super) fn is_of_another(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
+        self.interrupted && !self.gather.holds(id, stamps)
     }
 
     /// Takes note of an index record.
@@ -76,7 +89,8 @@ impl Told {
             }
         }
         self.gather.flush(sink);
-        (self.missing, self.surplus, self.doubtful) = (0, 0, false);
+        (self.missing, self.surplus) = (0, 0);
+        (self.doubtful, self.interrupted) = (false, false);
         witnessed
     }
 }

@@ -103,6 +103,9 @@ impl<G: Grammar> Forward<'_, G> {
             self.ended = false;
             self.damage("messages stand behind what should be the end of the data");
         }
+        if matches!(record, Record::Other { .. }) {
+            self.told.interrupt();
+        }
         match record {
             Record::Chunk(head) => self.chunk(stream, &head),
             Record::Message { raw, time, size } => {
@@ -196,6 +199,9 @@ impl<G: Grammar> Forward<'_, G> {
         } else {
             Vec::new()
         };
+        if self.told.is_of_another(id, &stamps) {
+            self.settle();
+        }
         self.told.behind(Behind { id, count, stamps });
         pass(stream, len)
     }

@@ -116,8 +116,11 @@ fn chunk(stream: &mut Stream<'_>, len: u64) -> Result<ChunkHead, Stop> {
     let mut read = || {
         let (first, last, plain) = (cursor.u64()?, cursor.u64()?, cursor.u64()?);
         let crc = cursor.u32()?;
-        let how = Compression::named(cursor.bytes()?);
-        let packed = cursor.u64()?;
+        let name = cursor.bytes()?;
+        // What calls its compression by no word is no chunk.
+        let is_word = name.len() <= 16 && name.iter().all(u8::is_ascii_graphic);
+        let how = Compression::named(name);
+        let packed = cursor.u64().filter(|_| is_word)?;
         let times = (Stamp::from_nanos(first), Stamp::from_nanos(last));
         Some((times, plain, crc, how, packed))
     };
