@@ -25,7 +25,7 @@ pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Ledger {
         }
     }
     Ledger {
-        entries: sorted(entries),
+        entries: sorted(&entries),
         phases: Vec::new(),
     }
 }
@@ -40,7 +40,7 @@ fn whole(entries: &[Entry], mut at: EntryId) -> usize {
 }
 
 /// Sorted by time, then kind, then element, which is an order of names; parts still know what they are part of.
-fn sorted(entries: Vec<Entry>) -> Vec<Entry> {
+fn sorted(entries: &[Entry]) -> Vec<Entry> {
     let mut order: Vec<usize> = (0..entries.len()).collect();
     order.sort_by_key(|at| (entries[*at].time, entries[*at].kind, entries[*at].what, *at));
     let mut places = vec![0; entries.len()];
@@ -188,7 +188,7 @@ impl<'a> Owners<'a> {
             let node = moved.get(&Element::Node(*node));
             return node.or_else(|| moved.get(edge)).copied();
         }
-        let listeners = moved.iter().filter_map(|(what, _)| match what {
+        let listeners = moved.keys().filter_map(|what| match what {
             Element::Subscribe(_) => self.edge(*what).filter(|edge| edge.topic == topic),
             _ => None,
         });
