@@ -81,10 +81,10 @@ impl News {
                     self.add(viewed, topic, &sign);
                 }
             }
-            (Detail::Rates { .. }, Element::Topic(_)) => {
-                if viewed.has_single_sender(entry.what) || !viewed.pairs.is_empty() {
-                    self.add_carriers(viewed, entry.what, &sign);
-                }
+            (Detail::Rates { .. }, Element::Topic(_))
+                if viewed.has_single_sender(entry.what) || !viewed.pairs.is_empty() =>
+            {
+                self.add_carriers(viewed, entry.what, &sign);
             }
             _ => {}
         }

@@ -23,12 +23,12 @@ struct Life {
 pub(crate) fn settle(
     frames: &mut [Frame],
     count: usize,
-    list: impl Fn(&mut Frame) -> &mut Vec<Shown>,
+    shown_of: impl Fn(&mut Frame) -> &mut Vec<Shown>,
 ) {
     let mut lives = vec![Life::default(); count];
     for (at, frame) in (1..).zip(frames.iter_mut()) {
         let length = frame.span.nanos() as f64;
-        for shown in list(frame) {
+        for shown in shown_of(frame) {
             if let Some(life) = lives.get_mut(shown.id as usize) {
                 life.forward(at, shown, length);
             }
@@ -38,7 +38,7 @@ pub(crate) fn settle(
     let mut lives = vec![Life::default(); count];
     let last = frames.len();
     for (at, frame) in frames.iter_mut().rev().enumerate() {
-        for shown in list(frame) {
+        for shown in shown_of(frame) {
             if let Some(life) = lives.get_mut(shown.id as usize) {
                 life.backward(last - at, shown);
             }

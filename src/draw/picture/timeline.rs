@@ -156,7 +156,7 @@ impl<'a> Timeline<'a> {
                 let mut times: Vec<f64> = of_lane.map(|h| self.x(h.time)).collect();
                 times.sort_by(f64::total_cmp);
                 for (at, some) in times.chunk_by(|a, b| b - a < 2.0 * radius).enumerate() {
-                    let x = (some[0] + some[some.len() - 1]) / 2.0;
+                    let x = f64::midpoint(some[0], some[some.len() - 1]);
                     groups.push(self.mark((window, lane, at), x, radius, some.len()));
                 }
             }
