@@ -1,8 +1,11 @@
 //! Edges that no header names: hand-made missions, and what is concluded from each.
 
+use std::collections::BTreeSet;
+
 use bagreel::bag::{Connection, ConnectionId, Encoding, Message, Sink as _};
-use bagreel::base::time::Stamp;
-use bagreel::evidence::collector::{Collector, Options};
+use bagreel::base::time::{Span, Stamp};
+use bagreel::evidence::collector::{Collected, Collector, Options};
+use bagreel::evidence::topology::{Element, Entry, Topology};
 use bagreel::evidence::{Degree, EvidenceLine};
 use bagreel::graph::{self, Built};
 
@@ -11,8 +14,8 @@ use crate::support::{ORIGIN, Recording};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// What is concluded from a recording, with the pieces of evidence on `why`.
-fn concluded(bag: &Recording, options: Options) -> (Built, Vec<EvidenceLine>) {
+/// Everything that is collected from a recording.
+fn collected(bag: &Recording, options: Options) -> Collected {
     let mut collector = Collector::new(options);
     let mut progress = |_, _| ();
     let mut sink = collector.bag(&mut progress);
@@ -45,7 +48,12 @@ fn concluded(bag: &Recording, options: Options) -> (Built, Vec<EvidenceLine>) {
             size: u32::try_from(data.len()).unwrap(),
         });
     }
-    let mut collected = collector.finish().unwrap();
+    collector.finish().unwrap()
+}
+
+/// What is concluded from a recording, with the pieces of evidence on `why`.
+fn concluded(bag: &Recording, options: Options) -> (Built, Vec<EvidenceLine>) {
+    let mut collected = collected(bag, options);
     let span = collected.span.unwrap();
     let built = graph::build(&mut collected, &[span], &graph::Options::default()).unwrap();
     (built, collected.why())
@@ -532,7 +540,109 @@ fn conclusions_are_among_the_evidence_of_those_who_ask_why() {
         texts,
         [(
             "payload",
-            "30 of 30 different messages of /image_slow are byte by byte messages of /image just before"
+            "30 of 30 different messages of /image_slow are byte by byte those of /image just before"
         )]
     );
+}
+
+/// A robot of two nodes, with what the user tells of it besides.
+fn told(entries: Vec<Entry>, windows: &[(i64, i64)]) -> Built {
+    let mut bag = Recording::default();
+    let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
+    bag.send(scan, (0, 10_001), 100, &[1; 8]);
+    let mut collected = collected(&bag, Options::default());
+    let second = |s: i64| collected.span.unwrap().start.plus(s * SECOND);
+    let windows: Vec<Span> = windows
+        .iter()
+        .map(|(from, to)| Span {
+            start: second(*from),
+            end: second(*to),
+        })
+        .collect();
+    let topology = Topology {
+        entries,
+        notices: Vec::new(),
+    };
+    let options = graph::Options {
+        topology,
+        ..graph::Options::default()
+    };
+    graph::build(&mut collected, &windows, &options).unwrap()
+}
+
+fn entry(element: Element, to_s: Option<i64>) -> Entry {
+    Entry {
+        element,
+        from_ns: to_s.map(|_| 0),
+        to_ns: to_s.map(|s| s * SECOND),
+        declared: false,
+        place: "robot.csv line 2".to_owned(),
+    }
+}
+
+#[test]
+fn the_end_that_the_user_gives_is_exclusive() {
+    let node = || Element::Node("/slam".to_owned());
+    let there = |end| {
+        let built = told(vec![entry(node(), Some(end))], &[(0, 5), (5, 10)]);
+        let nodes = built.graphs.iter().map(|g| g.nodes.len());
+        nodes.collect::<Vec<_>>()
+    };
+    assert_eq!(there(5), [2, 1]);
+    assert_eq!(there(6), [2, 2]);
+}
+
+#[test]
+fn names_of_the_users_that_the_bag_does_not_know_are_told_with_the_nearest() {
+    let entries = vec![
+        entry(
+            Element::Subscribe("/slam".to_owned(), "/scna".to_owned()),
+            None,
+        ),
+        entry(Element::Node("/lidra".to_owned()), None),
+        entry(
+            Element::Subscribe("/viewer".to_owned(), "/scan".to_owned()),
+            None,
+        ),
+    ];
+    let built = told(entries, &[(0, 10)]);
+    let notices: Vec<_> = built.notices.iter().map(|n| n.text).collect();
+    assert_eq!(
+        notices,
+        [
+            "robot.csv line 2: no node of the bag is called `/lidra`; the nearest name is `/lidar`",
+            "robot.csv line 2: no topic of the bag is called `/scna`; the nearest name is `/scan`"
+        ]
+    );
+}
+
+#[test]
+fn what_the_user_states_and_headers_say_is_among_the_evidence() {
+    let mut bag = Recording::default();
+    let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
+    bag.send(scan, (0, 1000), 100, &[1; 8]);
+    let options = Options {
+        why: vec!["/scan".to_owned()],
+        ..Options::default()
+    };
+    let mut collected = collected(&bag, options);
+    let whole = collected.span.unwrap();
+    let topology = Topology {
+        entries: vec![entry(
+            Element::Subscribe("/slam".to_owned(), "/scan".to_owned()),
+            None,
+        )],
+        notices: Vec::new(),
+    };
+    let options = graph::Options {
+        topology,
+        ..graph::Options::default()
+    };
+    graph::build(&mut collected, &[whole], &options).unwrap();
+    let sources: BTreeSet<_> = collected
+        .why()
+        .into_iter()
+        .map(|piece| piece.source)
+        .collect();
+    assert_eq!(sources, ["connection", "topology"].into());
 }

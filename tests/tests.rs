@@ -17,6 +17,7 @@ mod encode;
 mod evidence;
 mod figures;
 mod hostile;
+mod info;
 mod layout;
 mod pages;
 mod phases;

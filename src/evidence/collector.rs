@@ -29,7 +29,8 @@ pub struct Options {
     pub why: Vec<String>,
     /// Infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
     pub infer_stamps: bool,
-    /// Payloads are compared, and with log texts, up to this many bytes of them; 0: none, and none is read for it.
+    /// The beginnings of payloads are compared with each other and with log texts, up to this many bytes of them; 0: none,
+    /// and none is read for it.
     pub payload_bytes: u64,
 }
 
@@ -141,10 +142,10 @@ impl Collector {
 
     /// Keeps what a payload has in common with others, as long as the budget lasts.
     fn compare(&mut self, place: usize, message: &Message<'_>) {
-        if self.options.payload_bytes == 0 || message.data.len() != message.size as usize {
-            return;
-        }
-        self.compared += message.data.len() as u64 + PAYLOAD_ENTRY;
+        let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
+        self.compared = self
+            .compared
+            .saturating_add(beginning.len() as u64 + PAYLOAD_ENTRY);
         if self.compared > self.options.payload_bytes {
             return;
         }
@@ -155,9 +156,11 @@ impl Collector {
             source: 0,
             time: Some(message.time),
         };
-        payload::hear(&mut heard, message.data);
-        if let Some(schema) = &self.schemas[place] {
-            echo::hear(&mut heard, schema, message.data);
+        payload::hear(&mut heard, beginning, message.size);
+        if let Some(schema) = &self.schemas[place]
+            && beginning.len() == message.size as usize
+        {
+            echo::hear(&mut heard, schema, beginning);
         }
     }
 
@@ -249,8 +252,9 @@ impl Sink for BagSink<'_> {
         }
         let stamped = all.options.infer_stamps && equal_stamps::is_stamped(connection);
         let compared = all.options.payload_bytes > 0;
-        let want = match (readers.is_empty() && !compared, stamped, all.options.sizes) {
+        let want = match (readers.is_empty(), stamped, all.options.sizes) {
             (false, ..) => Want::Payload,
+            _ if compared => Want::Head(payload::HEAD),
             (true, true, _) => Want::Head(equal_stamps::HEAD),
             (true, false, true) => Want::Sizes,
             (true, false, false) => Want::Stamps,

@@ -54,8 +54,8 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &Schema, payload: &[u8
     if let (Ok(value), Some(time)) = (value, heard.time) {
         let mut values = Vec::new();
         collect(&value, &mut values);
-        for value in values {
-            heard.facts.spoken.show(time, heard.place, &value);
+        for (field, value) in values.iter().enumerate() {
+            heard.facts.spoken.show(time, (heard.place, field), value);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Messages passed on byte by byte (relay, throttle, mux, drop, republish): whoever publishes the copies subscribes the
 //! topic that had them first.
 //!
-//! Compared are length and content, by a hash; a content that comes again in its own topic (an empty message, a
+//! Compared are length and the first bytes, by a hash; a content that comes again in its own topic (an empty message, a
 //! constant) says nothing and is counted once.
 
 use std::collections::hash_map::DefaultHasher;
@@ -25,10 +25,14 @@ const RECENT_NS: i64 = 2_000_000_000;
 /// Log records are passed on by a node that is known anyway.
 const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 
-/// Keeps the hash of a payload.
-pub(crate) fn hear(heard: &mut SourceContext<'_>, payload: &[u8]) {
+/// Bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
+pub(crate) const HEAD: usize = 16 << 10;
+
+/// Keeps the hash of a payload of `size` bytes that begins so.
+pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
     let mut hasher = DefaultHasher::new();
-    hasher.write(payload);
+    hasher.write_u32(size);
+    hasher.write(beginning);
     let [a, b, c, d, ..] = hasher.finish().to_le_bytes();
     if let Some(time) = heard.time {
         let hash = u32::from_le_bytes([a, b, c, d]);
@@ -76,7 +80,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
                 let count = matches.pairs[&(input, *output)].before;
                 let [from, to] = [topic, basis].map(|n| known.text(n));
                 format!(
-                    "{count} of {total} different messages of {to} are byte by byte messages of {from} just before"
+                    "{count} of {total} different messages of {to} are byte by byte those of {from} just before"
                 )
             });
         }

@@ -5,9 +5,24 @@ use std::sync::Arc;
 use crate::evidence::claim::{Name, SourceId};
 use crate::evidence::proof::Findings;
 
-/// Ends of names that others publish: goals for an action, commands.
-const TAKEN: [&str; 8] = [
-    "goal", "cancel", "command", "commands", "cmd", "cmd_vel", "set", "input",
+/// Beginnings of the last part of names that others publish: goals for an action, commands for a controller.
+const TAKEN: [&str; 16] = [
+    "goal",
+    "cancel",
+    "cmd",
+    "command",
+    "set",
+    "input",
+    "target",
+    "desired",
+    "reference",
+    "request",
+    "trigger",
+    "enable",
+    "disable",
+    "reset",
+    "joint_trajectory",
+    "sub_",
 ];
 
 pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
@@ -15,7 +30,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
     for topic in known.topics_of(|_| true) {
         let name = known.text(topic);
         let last = name.rsplit('/').next().unwrap_or_default();
-        if known.publishers(topic).next().is_some() || TAKEN.contains(&last) || is_hidden(&name) {
+        let is_taken = TAKEN.iter().any(|taken| last.starts_with(taken));
+        if known.publishers(topic).next().is_some() || is_taken || is_hidden(&name) {
             continue;
         }
         if let Some(node) = owner(&name, &nodes) {
