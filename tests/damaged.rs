@@ -406,8 +406,7 @@ fn a_second_reader_that_stops_verifies_nothing() {
     let data_end = bytes.len() - 8 - 29;
     let last = last
         .map(|(at, _)| at)
-        .filter(|at| bytes[at - 41] == 6 && *at < data_end)
-        .last();
+        .rfind(|at| bytes[at - 41] == 6 && *at < data_end);
     bytes[last.unwrap() - 5] ^= 1;
     let (_dir, path) = placed("x.mcap", &bytes);
     let (code, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
