@@ -1,6 +1,7 @@
 //! The map: who talks to whom over the whole mission, and in which phases everyone lives.
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 
 use super::band::{self, Axis};
 use super::canvas::{Canvas, HAIRLINE, Type, ink};
@@ -168,10 +169,10 @@ fn below(
         text.push_str("Arrow: topics, thicker = more Hz, dashed = inferred. ");
     }
     if !alone.is_empty() {
-        text.push_str(&format!("Without a known partner: {}. ", alone.join(", ")));
+        let _ = write!(text, "Without a known partner: {}. ", alone.join(", "));
     }
     if left_out > 0 {
-        text.push_str(&format!("{left_out} of {many} topic names left out."));
+        let _ = write!(text, "{left_out} of {many} topic names left out.");
     }
     if text.is_empty() {
         return y;

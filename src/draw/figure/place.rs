@@ -41,11 +41,8 @@ pub(crate) fn place(
         .iter()
         .map(|part| candidates(&part.plan(plan), &part.labels(labels), width, engine))
         .collect();
-    let mut best: Option<(f64, Vec<(usize, Point)>, Size)> = None;
-    for share in SHARES {
-        let chosen: Option<Vec<usize>> =
-            tried.iter().map(|all| choice(all, width * share)).collect();
-        let chosen = chosen?;
+    let mut best: Option<Choice> = None;
+    for chosen in choices(&tried, width)? {
         let sizes: Vec<Size> = chosen
             .iter()
             .zip(&tried)
@@ -58,11 +55,16 @@ pub(crate) fn place(
             .map(|(at, all)| all[*at].left_out)
             .sum();
         let cost = size.h + lost as f64 * LOST;
-        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-            best = Some((cost, chosen.into_iter().zip(corners).collect(), size));
+        if best.as_ref().is_none_or(|b| cost < b.cost) {
+            let parts = chosen.into_iter().zip(corners).collect();
+            best = Some(Choice { cost, parts, size });
         }
     }
-    let (_, chosen, size) = best?;
+    let Choice {
+        parts: chosen,
+        size,
+        ..
+    } = best?;
     let mut whole = Placed::empty(plan, labels.len(), size);
     for ((part, all), (at, corner)) in parts.iter().zip(tried).zip(chosen) {
         if let Some(placed) = all.into_iter().nth(at) {
@@ -72,10 +74,39 @@ pub(crate) fn place(
     Some(whole)
 }
 
-/// How wide a part may be, as shares of the whole width, tried in turn.
-const SHARES: [f64; 5] = [1.0, 0.7, 0.52, 0.42, 0.32];
+/// A drawing for every part, by place among its candidates, and where it stands.
+struct Choice {
+    cost: f64,
+    parts: Vec<(usize, Point)>,
+    size: Size,
+}
+
+/// Ways to take one candidate of every part: for each of the largest part the others beside it, where they fit.
+fn choices(tried: &[Vec<Placed>], width: f64) -> Option<Vec<Vec<usize>>> {
+    let area = |all: &Vec<Placed>| all.iter().map(|p| p.size.w * p.size.h).fold(0.0, f64::max);
+    let order = |a: &usize, b: &usize| area(&tried[*a]).total_cmp(&area(&tried[*b])).then(b.cmp(a));
+    let Some(largest) = (0..tried.len()).max_by(order) else {
+        return Some(vec![Vec::new()]);
+    };
+    let mut ways = Vec::new();
+    for at in 0..tried[largest].len() {
+        let beside = width - tried[largest][at].size.w - PARTED;
+        for most in [beside, width] {
+            let way = tried.iter().enumerate().map(|(part, all)| {
+                if part == largest {
+                    Some(at)
+                } else {
+                    choice(all, most)
+                }
+            });
+            ways.push(way.collect::<Option<Vec<usize>>>()?);
+        }
+    }
+    Some(ways)
+}
+
 /// What a label that is left out costs, in millimetres of height.
-const LOST: f64 = 4.0;
+const LOST: f64 = 5.0;
 /// The room between parts.
 const PARTED: f64 = 3.0;
 
@@ -318,10 +349,8 @@ impl Placed {
                 .then(a.cmp(b))
         });
         for at in order {
-            let tries = labels[at].iter().enumerate();
-            let found = tries
-                .filter_map(|(k, size)| Some((self.spot(at, *size, &taken, width)?, k)))
-                .next();
+            let mut tries = labels[at].iter().enumerate();
+            let found = tries.find_map(|(k, size)| Some((self.spot(at, *size, &taken, width)?, k)));
             self.labels[at] = found;
             match found {
                 Some((spot, k)) => {
@@ -341,7 +370,7 @@ impl Placed {
         let mut best: Option<(f64, Point)> = None;
         for (k, part) in STATIONS.into_iter().enumerate() {
             let (on, normal) = along(route, part)?;
-            let reach = (normal.x.abs() * size.w + normal.y.abs() * size.h) / 2.0 + 0.35;
+            let reach = f64::midpoint(normal.x.abs() * size.w, normal.y.abs() * size.h) + 0.35;
             for (aside, penalty) in [(0.0, 0.0), (reach, 0.8), (-reach, 0.8)] {
                 let centre = Point::new(on.x + normal.x * aside, on.y + normal.y * aside);
                 let rect = Rect::around(centre, size);
@@ -373,7 +402,9 @@ impl Placed {
             }
         }
         for route in &mut self.routes {
-            route.iter_mut().for_each(|p| *p = point(*p));
+            for p in route {
+                *p = point(*p);
+            }
         }
         for (label, _) in self.labels.iter_mut().flatten() {
             *label = point(*label);

@@ -193,7 +193,9 @@ impl Studio<'_> {
         ]);
         let mut vertex: Vec<Option<usize>> = vec![None; self.tracks.len()];
         for (k, (_, members)) in boxes.iter().enumerate() {
-            members.iter().for_each(|at| vertex[*at] = Some(k));
+            for at in members {
+                vertex[*at] = Some(k);
+            }
         }
         let changed = boxes.len();
         let linked = self.neighbours(k, &mut boxes, &mut vertex, (before, after));
@@ -273,7 +275,7 @@ impl Studio<'_> {
                 continue;
             }
             let mut spaces: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-            for at in own.iter() {
+            for at in *own {
                 spaces
                     .entry(namespace(&self.tracks[*at].name))
                     .or_default()
@@ -314,7 +316,7 @@ impl Studio<'_> {
                 .iter()
                 .filter_map(|at| links.get(at).map(|n| (*n, std::cmp::Reverse(*at))))
                 .max();
-            let Some((_, std::cmp::Reverse(named))) = most else {
+            let Some((_, std::cmp::Reverse(best))) = most else {
                 continue;
             };
             let free: Vec<usize> = group
@@ -326,7 +328,7 @@ impl Studio<'_> {
             for at in &free {
                 vertex[*at] = Some(boxes.len());
             }
-            linked.insert(boxes.len(), named);
+            linked.insert(boxes.len(), best);
             boxes.push((Fate::Neighbour, free));
         }
         linked
@@ -451,6 +453,15 @@ impl Studio<'_> {
         let mut items: Vec<Item> = Vec::new();
         if !sheet.options.is_bare {
             let text = "+ solid: began. − dashed: ended. Double: its topic changed hands. Thin: who is linked to them.";
+            items.push(sentence(ink::QUIET, text));
+        }
+        let lost: usize = panels
+            .iter()
+            .filter_map(|p| p.placed.as_ref())
+            .map(|p| p.left_out)
+            .sum();
+        if lost > 0 {
+            let text = format!("{} left out.", words::count(lost, "topic name"));
             items.push(sentence(ink::QUIET, text));
         }
         if left > 0 {
