@@ -288,7 +288,7 @@ pub(super) struct LookArgs {
 pub(super) struct FigureArgs {
     /// A figure for a paper, `--width` wide (88mm), with text of 6 pt at least: what lives when, who talks to whom, or
     /// the reconfigurations one by one. For `.pdf`, `.svg`, `.png`, `.webp`; `.tex` includes it.
-    #[arg(long, value_name = "lives", value_parser = ["lives"], conflicts_with_all = [
+    #[arg(long, value_name = "lives|map|steps", value_parser = ["lives", "map", "steps"], conflicts_with_all = [
         "strip", "style", "size", "fit", "orientation", "layout", "layout_from", "mode", "hide", "group", "collapse",
         "expand", "rqt_defaults", "show_recorder", "title",
     ])]

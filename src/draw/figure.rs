@@ -10,10 +10,14 @@ pub(crate) mod incidents;
 mod legend;
 pub(crate) mod levels;
 pub(crate) mod lives;
+mod map;
 pub(crate) mod notes;
 mod page;
+mod place;
 pub(crate) mod rows;
 pub(crate) mod source;
+mod steps;
+mod talks;
 mod tex;
 pub(crate) mod tracks;
 

@@ -35,7 +35,8 @@ impl Axis {
 
 /// A moment as figures write it: `4:56`, `1:02:03`.
 pub(crate) fn clock(nanos: i64) -> String {
-    let text = words::offset_seconds(nanos);
+    // To the nearest second.
+    let text = words::offset_seconds(nanos.saturating_add(500_000_000));
     text.strip_prefix('0').map_or(text.clone(), str::to_owned)
 }
 

@@ -28,8 +28,11 @@ pub(crate) mod ink {
     pub(crate) const TINT: Color = Color::of([0xee, 0xf1, 0xf5]);
     pub(crate) const RULE: Color = Color::of([0xa3, 0xab, 0xb8]);
     pub(crate) const ADDED: Color = Color::of([0x00, 0x79, 0x5c]);
+    pub(crate) const ADDED_FILL: Color = Color::of([0xe3, 0xf2, 0xec]);
     pub(crate) const REMOVED: Color = Color::of([0xc4, 0x49, 0x00]);
     pub(crate) const CHANGED: Color = Color::of([0x6a, 0x35, 0xc9]);
+    pub(crate) const CHANGED_FILL: Color = Color::of([0xef, 0xe9, 0xfb]);
+    pub(crate) const GROUND: Color = Color::of([0xf6, 0xf8, 0xfb]);
 }
 
 /// What a text is, which decides its size and weight.
@@ -186,6 +189,13 @@ impl<'a> Canvas<'a> {
     pub(crate) fn fill(&mut self, rect: Rect, color: Color) {
         let form = Form::Rect(self.scaled(rect), 0.0);
         self.shape(Shape::filled(form, color));
+    }
+
+    /// A rectangle with round corners, a line around and a filling.
+    pub(crate) fn frame(&mut self, rect: Rect, radius: f64, fill: Color, stroke: &Stroke) {
+        let form = Form::Rect(self.scaled(rect), radius * self.scale);
+        let stroke = stroke.scaled(self.scale);
+        self.shape(Shape { form, fill, stroke });
     }
 
     /// A disc with a line around.

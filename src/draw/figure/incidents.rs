@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::source::Source;
-use super::tracks::{Track, steps};
+use super::source::{Source, merged};
+use super::tracks::{Bar, Track, steps};
 use crate::base::name::{last_part, namespace};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
@@ -14,6 +14,10 @@ use crate::mission::phases::{Configuration, configuration_of};
 const STEP: (f64, f64) = (1.5, 0.3);
 /// The most letters, and the most arrows.
 const MOST: (usize, usize) = (10, 6);
+/// Silences up to one part in so many of the mission may be a slow rate.
+const BRIDGED: i64 = 20;
+/// So many messages on both sides make a step.
+const COUNTED: f64 = 3.0;
 /// A silence of a topic row that is marked: this many times what interrupts a bar.
 const PAUSE: i64 = 2;
 
@@ -89,9 +93,10 @@ const SECOND: i64 = 1_000_000_000;
 /// Steps of the rates of single publications, or of the topic that the row is.
 fn rates(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
     let mut all = Vec::new();
+    let bridged = source.span().nanos() / BRIDGED;
     if let Some(topic) = track.topic {
         let sent = source.topic_sent(topic);
-        for stretch in source.topic_sending(topic) {
+        for stretch in merged(source.topic_sending(topic), bridged) {
             all.extend(stepped(
                 source,
                 at,
@@ -110,7 +115,7 @@ fn rates(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
             last_part(&track.name),
             relative(source.topic(of.topic), &track.name)
         );
-        for stretch in source.sending(edge) {
+        for stretch in merged(source.sending(edge), bridged) {
             all.extend(stepped(source, at, (stretch, &sent), &what));
         }
     }
@@ -127,7 +132,8 @@ fn stepped(
     let pairs = bars.windows(2).filter_map(|pair| {
         let (from, to) = (pair[0].share, pair[1].share);
         let factor = (from / to).max(to / from);
-        let is_marked = factor >= STEP.0 && (from - to).abs() >= STEP.1;
+        let counted = |b: &Bar| b.share * b.span.nanos() as f64 / 1e9 >= COUNTED;
+        let is_marked = pair.iter().all(counted) && factor >= STEP.0 && (from - to).abs() >= STEP.1;
         let change = words::rate_change(words::significant(from, 2), words::significant(to, 2));
         is_marked.then(|| Incident {
             at: pair[1].span.start,

@@ -6,6 +6,7 @@ use super::lives::{Lives, Place, WIDE, sign};
 use super::notes::{Item, Run, flow, sentence};
 use super::rows::Row;
 use super::source::Source;
+use super::tracks::Track;
 use super::{Kind, MOST_HEIGHT, Options, Rows, legend};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
@@ -30,7 +31,8 @@ impl<'a> Sheet<'a> {
     pub(crate) fn draw(&self) -> Result<(Scene, Vec<String>)> {
         match self.options.kind {
             Kind::Lives => self.lives(),
-            Kind::Map | Kind::Steps => Err(Error::usage("not yet", "lives")),
+            Kind::Map => super::map::draw(self),
+            Kind::Steps => super::steps::draw(self),
         }
     }
 
@@ -111,8 +113,9 @@ impl<'a> Sheet<'a> {
         let canvas = self.canvas();
         let width = self.options.width_mm;
         if lives_place(lives, &canvas, width).is_none() {
-            let names = lives.names_width(&canvas, WIDE.0);
-            let enough = libm::ceil(names + SHORTEST_AXIS + 6.0);
+            let wider = (0..100).map(|mm| libm::ceil(width) + f64::from(mm));
+            let enough = wider.filter(|w| lives_place(lives, &canvas, *w).is_some());
+            let enough = enough.take(1).next().unwrap_or(88.0);
             return Error::usage(
                 format!("{width} mm leave no room for time beside the names"),
                 format!("`--width {enough}mm` would do"),
@@ -125,25 +128,12 @@ impl<'a> Sheet<'a> {
             reason = "72 rows or so"
         )]
         let most = ((MOST_HEIGHT - 30.0) / self.sizes.pitch()) as usize;
-        let mut spaces: Vec<(&str, usize)> = Vec::new();
-        for track in &lives.tracks {
-            let top = top_space(&track.name);
-            match spaces.iter_mut().find(|(name, _)| *name == top) {
-                Some((_, many)) => *many += 1,
-                None => spaces.push((top, 1)),
-            }
-        }
-        let fitting = spaces.iter().filter(|(_, many)| *many <= most);
-        let best = fitting.max_by_key(|(name, many)| (*many, std::cmp::Reverse(*name)));
         let flag = if lives.is_of_topics() {
             "--topic-filter"
         } else {
             "--ns-filter"
         };
-        let hint = best.map_or_else(
-            || format!("at most {most} rows fit; narrow it with `{flag}`"),
-            |(name, many)| format!("`{flag} '{name}/.*'` leaves {many} rows; at most {most} fit"),
-        );
+        let hint = filter_that_fits(&lives.tracks, most, flag, "row");
         let rows = words::count(lives.rows.len(), "row");
         Error::usage(
             format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm"),
@@ -152,10 +142,30 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// The namespace below the root that a name is in.
-fn top_space(name: &str) -> &str {
-    let end = name.get(1..).and_then(|rest| rest.find('/'));
-    end.map_or(name, |at| &name[..=at])
+/// The filter that leaves as many tracks as fit: the largest namespace that is not too large.
+pub(crate) fn filter_that_fits(tracks: &[Track], most: usize, flag: &str, word: &str) -> String {
+    let mut spaces: Vec<(&str, usize)> = Vec::new();
+    for top in tracks.iter().filter_map(|t| top_space(&t.name)) {
+        match spaces.iter_mut().find(|(name, _)| *name == top) {
+            Some((_, many)) => *many += 1,
+            None => spaces.push((top, 1)),
+        }
+    }
+    let fitting = spaces.iter().filter(|(_, many)| *many <= most);
+    let best = fitting.max_by_key(|(name, many)| (*many, std::cmp::Reverse(*name)));
+    let most = words::count(most, word);
+    match best {
+        None => format!("at most {most} fit; choose some with `{flag}`"),
+        Some((name, many)) => {
+            format!("`{flag} '{name}/.*'` leaves {many}; at most {most} fit")
+        }
+    }
+}
+
+/// The namespace below the root that a name is in, if it is in one.
+fn top_space(name: &str) -> Option<&str> {
+    let end = name.get(1..)?.find('/')?;
+    name.get(..=end)
 }
 
 pub(crate) fn nothing() -> Error {

@@ -80,7 +80,7 @@ fn escaped(text: &str) -> String {
             '−' => out.push_str("$-$"),
             '→' => out.push_str("$\\rightarrow$"),
             '←' => out.push_str("$\\leftarrow$"),
-            '…' => out.push_str("\\ldots{}"),
+            '\u{2026}' => out.push_str("\\ldots{}"),
             '<' => out.push_str("\\textless{}"),
             '>' => out.push_str("\\textgreater{}"),
             _ => out.push(c),
