@@ -201,16 +201,15 @@ impl<'a> Timeline<'a> {
         let most = (self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
         let step = nice(total / most.max(1));
         let end = self.plot.right() - width(&last) * 1.4;
-        let mut at = 0;
-        while at < total {
+        // Counted, not added up: a span may be as long as a number can say.
+        for at in (0..=total / step).map(|tick| tick * step) {
             let text = words::offset(at);
             let wide = width(&text);
             let x = self.x(self.span.start.plus(at)) - wide / 2.0;
             let x = x.max(self.plot.x);
-            if x + wide <= end || at == 0 {
+            if x + wide <= end {
                 group.text(self.tick(x, Anchor::Start, text));
             }
-            at += step;
         }
         group.text(self.tick(self.plot.right(), Anchor::End, last));
         group
@@ -311,5 +310,13 @@ mod tests {
         assert_eq!(nice(100 * SECOND), 120 * SECOND);
         assert_eq!(nice(100_000 * SECOND), 172_800 * SECOND);
         assert!(nice(i64::MAX) > 0);
+    }
+
+    #[test]
+    fn the_longest_span_has_a_few_ticks_too() {
+        for total in [1, 1_000_000_000, i64::MAX] {
+            let step = nice(total / 12);
+            assert!(total / step <= 12, "{total}: {step}");
+        }
     }
 }
