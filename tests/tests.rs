@@ -14,6 +14,7 @@ mod docs;
 mod edges;
 mod encode;
 mod evidence;
+mod hostile;
 mod info;
 mod layout;
 mod pages;
