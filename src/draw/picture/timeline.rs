@@ -202,12 +202,12 @@ impl<'a> Timeline<'a> {
         let step = nice(total / most.max(1));
         let end = self.plot.right() - width(&last) * 1.4;
         // Counted, not added up: a span may be as long as a number can say.
-        for at in (0..=(total - 1) / step).map(|tick| tick * step) {
+        for at in (0..=total / step).map(|tick| tick * step) {
             let text = words::offset(at);
             let wide = width(&text);
             let x = self.x(self.span.start.plus(at)) - wide / 2.0;
             let x = x.max(self.plot.x);
-            if x + wide <= end || at == 0 {
+            if x + wide <= end {
                 group.text(self.tick(x, Anchor::Start, text));
             }
         }

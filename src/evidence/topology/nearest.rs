@@ -10,7 +10,7 @@ pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> O
     let apart = known.map(|other| (distance(name, other), other));
     let (distance, other) = apart.min()?;
     // Of a short name two letters are too much.
-    let most = MOST.min(name.chars().count() / 3);
+    let most = MOST.min(name.chars().count().div_ceil(3));
     (1..=most).contains(&distance).then_some(other)
 }
 
