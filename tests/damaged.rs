@@ -27,8 +27,8 @@ fn read_bytes(name: &str, bytes: &[u8]) -> (Report, Kept) {
 
 /// Runs the command; answers its exit code and what it said, results first.
 fn bagreel(args: &[&str]) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    said(&command.args(args).output().unwrap())
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    said(&run.args(args).output().unwrap())
 }
 
 fn said(output: &Output) -> (Option<i32>, String) {
@@ -132,7 +132,9 @@ fn a_flipped_bit_costs_no_message_in_silence_and_makes_none() {
 fn the_index_behind_a_chunk_answers_for_what_the_chunk_has_lost() {
     let bytes = unsummed(Some(::mcap::Compression::Zstd));
     let truth = short().messages.len();
-    let chunk = bytes.windows(4).position(|w| w == b"zstd").unwrap();
+    // The first one describes the connections.
+    let mut chunks = bytes.windows(4).enumerate().filter(|(_, w)| w == b"zstd");
+    let chunk = chunks.nth(1).unwrap().0;
     let mut lost = 0;
     for at in (chunk + 12..chunk + 200).step_by(3) {
         let mut bytes = bytes.clone();
@@ -406,7 +408,8 @@ fn a_second_reader_that_stops_verifies_nothing() {
     let data_end = bytes.len() - 8 - 29;
     let last = last
         .map(|(at, _)| at)
-        .rfind(|at| bytes[at - 41] == 6 && *at < data_end);
+        .filter(|at| bytes[at - 41] == 6 && *at < data_end)
+        .last();
     bytes[last.unwrap() - 5] ^= 1;
     let (_dir, path) = placed("x.mcap", &bytes);
     let (code, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
@@ -538,7 +541,7 @@ fn bombs() -> Vec<(&'static str, Vec<u8>)> {
 #[test]
 fn a_bomb_is_given_up_wherever_it_is_opened() {
     for (name, bytes) in bombs() {
-        assert!(bytes.len() < 200_000, "{name}");
+        assert!(bytes.len() < 1_000_000, "{name}");
         let (_dir, path) = placed("bomb.bag", &bytes);
         let (report, _) = read(&path, Want::Payload).unwrap();
         assert!(!report.complete, "{name}");

@@ -160,11 +160,8 @@ impl Folder {
         let mut said: Vec<String> = self.notices.iter().map(|n| n.text.clone()).collect();
         if said.is_empty() {
             let (_, links) = storage_and_links(path);
-            said.extend(
-                links
-                    .iter()
-                    .map(|link| metadata::leads_out(&file_name(link))),
-            );
+            let names = links.iter().filter_map(|link| link.file_name());
+            said.extend(names.map(|name| metadata::leads_out(&name.to_string_lossy())));
         }
         if said.is_empty() {
             return explain(path, &[], true);

@@ -207,7 +207,7 @@ pub fn unindexed(bag: &[u8]) -> Vec<u8> {
     cut
 }
 
-/// Small bags that unfold to a hundred gigabytes: where a chunk was never closed, where its index is wrong, and where a
+/// Small bags that unfold to twenty gigabytes: where a chunk was never closed, where its index is wrong, and where a
 /// message is said to lie deep in it.
 pub fn bombs(recording: &Recording) -> Vec<(&'static str, Vec<u8>)> {
     // A record that is nearly as long as one can be, and zeros: 64 MB in each of many streams.
@@ -215,7 +215,7 @@ pub fn bombs(recording: &Recording) -> Vec<(&'static str, Vec<u8>)> {
     let at = long.len() - 4;
     long[at..].fill(0xff);
     let mut behind = packed(Pack::Bz2, &long).1;
-    behind.extend(packed(Pack::Bz2, &vec![0; 64 << 20]).1.repeat(1500));
+    behind.extend(packed(Pack::Bz2, &vec![0; 64 << 20]).1.repeat(300));
     let bag = write_with(recording, Pack::Bz2, 1 << 20, &behind);
     let behind_field = |name: &[u8], nth: usize| {
         let mut found = bag

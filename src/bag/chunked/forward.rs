@@ -159,6 +159,9 @@ impl<G: Grammar> Forward<'_, G> {
     fn chunk(&mut self, stream: &mut Stream<'_>, head: &ChunkHead) -> Result<(), Stop> {
         self.settle();
         self.found.compression.extend(head.how);
+        if head.misnamed {
+            self.damage("a chunk is marked as a record of another kind, and was read all the same");
+        }
         if head.unclosed {
             return Err(self.tail(stream, head.how.unwrap_or(Compression::None)));
         }

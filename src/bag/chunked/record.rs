@@ -44,6 +44,8 @@ pub(crate) struct ChunkHead {
     pub(crate) crc: Option<u32>,
     /// The first and the last time in it, if it states them.
     pub(crate) times: Option<(Stamp, Stamp)>,
+    /// It is marked as a record of another kind.
+    pub(crate) misnamed: bool,
     /// The recorder was killed before it wrote the lengths; the body goes on to the end.
     pub(crate) unclosed: bool,
 }

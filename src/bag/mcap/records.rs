@@ -27,6 +27,15 @@ const DATA_END: u64 = 4;
 /// Takes the head of the next record.
 pub(super) fn next(stream: &mut Stream<'_>) -> Result<Record<Described>, Stop> {
     let (kind, len) = head(stream)?;
+    // One flipped bit makes a chunk an index, or the end of the file.
+    let is_common = matches!(kind, op::MESSAGE | op::SCHEMA | op::CHANNEL | op::CHUNK);
+    if !is_common && is_chunk_of(stream.peek(CHUNK_HEAD + 32)?, len) {
+        let chunk = chunk(stream, len)?;
+        return Ok(Record::Chunk(ChunkHead {
+            misnamed: true,
+            ..chunk
+        }));
+    }
     Ok(match kind {
         // Zeros where the disk was full.
         0 => return Err(Stop::Broken),
@@ -140,6 +149,7 @@ fn chunk(stream: &mut Stream<'_>, len: u64) -> Result<ChunkHead, Stop> {
         plain,
         crc: (crc != 0).then_some(crc),
         times: (last_is_known(times)).then_some(times),
+        misnamed: false,
         unclosed: false,
     })
 }
@@ -149,16 +159,18 @@ fn last_is_known((first, last): (Stamp, Stamp)) -> bool {
     first <= last && last > Stamp(0)
 }
 
-/// Whether a chunk begins here: its two lengths agree.
+/// Whether a chunk begins here.
 pub(super) fn is_chunk(bytes: &[u8]) -> bool {
     if bytes.first() != Some(&op::CHUNK) {
         return false;
     }
     let mut cursor = Cursor(&bytes[1..]);
-    let Some(len) = cursor.u64() else {
-        return false;
-    };
-    let mut rest = Cursor(cursor.0.get(CHUNK_HEAD..).unwrap_or_default());
+    cursor.u64().is_some_and(|len| is_chunk_of(cursor.0, len))
+}
+
+/// Whether a record of `len` bytes that begin so is a chunk: its two lengths agree.
+fn is_chunk_of(bytes: &[u8], len: u64) -> bool {
+    let mut rest = Cursor(bytes.get(CHUNK_HEAD..).unwrap_or_default());
     let Some(name) = rest.bytes() else {
         return false;
     };

@@ -80,6 +80,7 @@ fn chunk(compression: &[u8], size: u32, len: u64) -> ChunkHead {
         plain: u64::from(size),
         crc: None,
         times: None,
+        misnamed: false,
         unclosed: size == 0 && len == 0 && how.is_some_and(|how| how != Compression::None),
     }
 }

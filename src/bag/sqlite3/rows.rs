@@ -26,6 +26,8 @@ pub(super) struct Rows<'a> {
     wants: &'a [Want],
     /// Whether the sizes of all payloads are told.
     sized: bool,
+    /// Rows come in the order of their ids: not by the index of times, which a range may use.
+    in_order: bool,
     /// For payloads that are compressed one by one.
     allowance: Arc<Allowance>,
 }
@@ -50,6 +52,8 @@ struct Reading<'a, 's> {
     rows: &'a Rows<'a>,
     /// What has not been told.
     left: Part,
+    /// A row came that had been told: the pages of a damaged table can form a ring.
+    repeated: bool,
     lost: Lost,
     gather: Gather,
     sink: &'s mut dyn Sink,
@@ -60,18 +64,20 @@ const MOST_RETRIES: u64 = 1000;
 
 impl Reading<'_, '_> {
     /// Tells the rows that are left, from one end on. Of a row whose payload is damaged the time is told.
-    fn on(&mut self, way: Way) -> Result<(), Refusal> {
+    fn on(&mut self, way: Way) -> Result<(), String> {
         let order = match way {
             // SQLite goes through the rows in their order unless there is a range, which has an index.
             Way::Up if !self.rows.bag.ready.damaged => "",
             Way::Up => " ORDER BY rowid",
             Way::Down => " ORDER BY rowid DESC",
         };
-        let db = Db::open(&self.rows.bag.ready)?;
+        let db = Db::open(&self.rows.bag.ready).map_err(|e| e.to_string())?;
         loop {
             let told = self.some(&db, &format!("{}{order}", self.rows.sql), way);
-            let Err(refusal) = told else {
-                return Ok(());
+            let refusal = match told {
+                Ok(()) if self.repeated => return Err("they come again and again".to_owned()),
+                Ok(()) => return Ok(()),
+                Err(refusal) => refusal,
             };
             let before = self.left;
             let bare = format!(
@@ -81,7 +87,7 @@ impl Reading<'_, '_> {
             );
             let again = self.lost.payloads < MOST_RETRIES && self.some(&db, &bare, way).is_ok();
             if !again || self.left == before {
-                return Err(refusal);
+                return Err(refusal.to_string());
             }
             self.lost.payloads += 1;
         }
@@ -89,8 +95,15 @@ impl Reading<'_, '_> {
 
     /// Tells the rows of a query, and narrows what is left.
     fn some(&mut self, db: &Db, sql: &str, way: Way) -> Result<(), Refusal> {
+        let in_order = self.rows.in_order;
+        self.repeated = false;
         db.each(sql, &[self.left.0, self.left.1], |row| {
-            match (row.integer(0), way) {
+            let id = row.integer(0);
+            if in_order && id.is_some_and(|id| !(self.left.0..=self.left.1).contains(&id)) {
+                self.repeated = true;
+                return ControlFlow::Break(());
+            }
+            match (id, way) {
                 (Some(id), Way::Up) => self.left.0 = id.saturating_add(1),
                 (Some(id), Way::Down) => self.left.1 = id.saturating_sub(1),
                 (None, _) => {}
@@ -120,6 +133,7 @@ impl<'a> Rows<'a> {
             bare: sql(bag, "0", range),
             wants,
             sized,
+            in_order: range.is_none() || bag.ready.damaged,
             allowance: Arc::default(),
         }
     }
@@ -131,6 +145,7 @@ impl<'a> Rows<'a> {
         let mut reading = Reading {
             rows: self,
             left: part,
+            repeated: false,
             lost: Lost::default(),
             gather,
             sink,
