@@ -15,10 +15,7 @@ mod docs;
 mod edges;
 mod encode;
 mod evidence;
-<<<<<<< HEAD
 mod figures;
-=======
->>>>>>> tell
 mod hostile;
 mod info;
 mod layout;
