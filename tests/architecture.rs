@@ -30,7 +30,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["collector"],
     ]),
     ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
-    ("mission", &[&["activity", "ledger"], &["events", "json", "phases"], &["info"]]),
+    ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "filter", "names", "runs", "union"],
         &["options"],

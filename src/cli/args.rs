@@ -29,7 +29,7 @@ pub(super) enum Command {
     Render(Box<RenderArgs>),
     /// Tell what a bag holds, which evidence it has, and what cannot be known; over a folder, one row per bag.
     Info(Box<InfoArgs>),
-    /// Print the reconfiguration log: what appeared, vanished, changed rate or hands, and when.
+    /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
     /// List the built-in styles, or print one to start your own from.
     Styles {
@@ -93,6 +93,15 @@ pub(super) struct EventsArgs {
     /// How to print it.
     #[arg(long, value_enum, default_value_t)]
     pub(super) format: EventsFormat,
+    /// Tell below each entry what it implies: the topics and connections of a node.
+    #[arg(long)]
+    pub(super) parts: bool,
+    /// Tell of housekeeping and of the recorder too.
+    #[arg(long)]
+    pub(super) all: bool,
+    /// Tell where each phase of the mission begins.
+    #[arg(long)]
+    pub(super) phases: bool,
     #[command(flatten)]
     pub(super) time: TimeArgs,
     #[command(flatten)]

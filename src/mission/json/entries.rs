@@ -76,6 +76,20 @@ pub(crate) fn entries<'a>(
     })
 }
 
+/// Every entry of a ledger as an object on one line.
+pub(crate) fn rows<'a>(
+    ledger: &'a Ledger,
+    elements: &'a Elements,
+) -> impl Iterator<Item = String> + 'a {
+    // Only maps with keys that are no strings fail, and there are none.
+    entries(ledger, elements).map(|row| serde_json::to_string(&row).unwrap_or_default())
+}
+
+/// A text in quotes.
+pub(crate) fn text(text: &str) -> String {
+    serde_json::to_string(text).unwrap_or_default()
+}
+
 /// The role of the node that an entry is about.
 fn role(what: Element, elements: &Elements) -> Option<&str> {
     let (node, _) = elements.ends(what);
