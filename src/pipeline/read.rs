@@ -106,7 +106,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
     let mut mission = read_json(&text, path)?;
     drop(text);
-    if mission.ledger.entries.is_empty() {
+    if !mission.knows_lives() {
         mission.find_changes(reading.rate_change, &[]);
     }
     mission.activity = Activity::of_windows(&mission);

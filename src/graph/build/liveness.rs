@@ -78,10 +78,9 @@ impl Pulse {
 
     /// The longest silence that says nothing.
     fn patience(&self) -> i64 {
-        let pauses = if self.is_even { 1 } else { UNUSUAL };
         self.period
             .saturating_mul(if self.is_even { BREAK } else { BREAK * UNUSUAL })
-            .max(self.pause.saturating_mul(pauses))
+            .max(self.pause.saturating_mul(UNUSUAL))
             .max(BREAK_NS)
     }
 }
