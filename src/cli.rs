@@ -22,12 +22,13 @@ use crate::export::Output;
 use crate::graph;
 use crate::graph::window::{Division, Length};
 use crate::mission::Mission;
+use crate::mission::events::{LogFormat, LogOptions, log};
 use crate::mission::info::{SurveyRow, json, survey_csv, survey_text};
 use crate::pipeline::{
     Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
 };
 use args::{
-    Command, EventsArgs, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs,
+    Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs,
     TimeArgs, Typed,
 };
 
@@ -304,13 +305,18 @@ fn default_output(inputs: &[Input]) -> String {
 
 fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     let mission = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
-    for event in crate::mission::events::events(&mission) {
-        terminal.results(&format!(
-            "{:>12}  {}\n",
-            event.at(&mission),
-            event.sentence()
-        ))?;
-    }
+    let options = LogOptions {
+        parts: args.parts,
+        all: args.all,
+        phases: args.phases,
+    };
+    let format = match args.format {
+        EventsFormat::Text => LogFormat::Text,
+        EventsFormat::Csv => LogFormat::Csv,
+        EventsFormat::Ndjson => LogFormat::Ndjson,
+        EventsFormat::Markdown => LogFormat::Markdown,
+    };
+    terminal.results(&log(&mission, format, options))?;
     terminal.notices(&mission.notices);
     Ok(code(&mission))
 }

@@ -137,6 +137,13 @@ impl Mission {
         }
     }
 
+    /// Whether it is known when elements lived, not only which windows show them.
+    pub(crate) fn knows_lives(&self) -> bool {
+        let all = &self.elements;
+        all.topics.iter().any(|t| !t.runs.is_empty())
+            || all.nodes.iter().any(|n| !n.runs.is_empty())
+    }
+
     /// Nanoseconds from the mission's start to `at`.
     pub fn offset(&self, at: Stamp) -> i64 {
         at.since(self.span.start)

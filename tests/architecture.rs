@@ -37,7 +37,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["collector"],
     ]),
     ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
-    ("mission", &[&["activity", "ledger"], &["events", "json", "phases"], &["info"]]),
+    ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "counts", "filter", "lives", "names", "runs", "settle", "union"],
         &["options"],

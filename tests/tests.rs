@@ -24,6 +24,7 @@ mod phases;
 mod properties;
 mod reading;
 mod ros2_example;
+mod story;
 mod support;
 mod tables;
 mod warehouse;

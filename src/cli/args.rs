@@ -33,7 +33,7 @@ pub(super) enum Command {
     /// Write the messages themselves as tables: a row per message, or a table per topic with every field.
     #[command(after_help = EXTRACT_HELP)]
     Extract(Box<ExtractArgs>),
-    /// Print the reconfiguration log: what appeared, vanished, changed rate or hands, and when.
+    /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
     /// List the built-in styles, or print one to start your own from.
     Styles {
@@ -99,6 +99,15 @@ pub(super) struct EventsArgs {
     /// How to print it.
     #[arg(long, value_enum, default_value_t)]
     pub(super) format: EventsFormat,
+    /// Tell below each entry what it implies: the topics and connections of a node.
+    #[arg(long)]
+    pub(super) parts: bool,
+    /// Tell of housekeeping and of the recorder too.
+    #[arg(long)]
+    pub(super) all: bool,
+    /// Tell where each phase of the mission begins.
+    #[arg(long)]
+    pub(super) phases: bool,
     #[command(flatten)]
     pub(super) time: TimeArgs,
     #[command(flatten)]

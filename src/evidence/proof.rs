@@ -104,6 +104,8 @@ pub(crate) enum Validity {
     Like(Key),
     /// For the whole mission, unless signs tell when.
     Whole,
+    /// From the first sign to the mission's end: it writes the bag.
+    Unending,
     /// For the whole mission, whatever signs there are.
     Always,
 }

@@ -178,6 +178,7 @@ impl<'a> Builder<'a> {
                     let ends = together(ends, &deaths);
                     track.bound_all(signs, &ends);
                 }
+                Validity::Unending => track.unending = true,
                 Validity::Like(_) => {}
                 Validity::Whole => track.extent = track.extent.max(Extent::Whole),
                 Validity::Always => track.extent = Extent::Always,

@@ -1,129 +1,293 @@
-//! The reconfiguration log: every change of a mission as one row with its time, in order.
+//! The log of a mission: its ledger as lines for people, or as rows for programs. It depends on no window.
 
-use crate::base::name::last_part;
+mod sentence;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use self::sentence::sentence;
+use super::json::entries::rows;
+use crate::base::csv::table;
 use crate::base::time::Stamp;
-use crate::base::words;
-use crate::graph::diff::Change;
-use crate::graph::{Edge, Element};
+use crate::base::words::{self, visible};
+use crate::graph::Element;
 use crate::mission::Mission;
+use crate::mission::ledger::{Detail, Entry, EntryId, Phase};
 
-/// One reconfiguration.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Event {
-    /// When, as exactly as the bag tells; the start of the window where it does not.
-    pub time: Stamp,
-    /// Whether `time` is the exact moment, not only the window's start.
-    pub exact: bool,
-    /// The window that shows it, 0...
-    pub window: usize,
-    /// What happened: the word of the change in JSON.
-    pub kind: &'static str,
-    /// To what: `node`, `topic`, `publish` or `subscribe`.
-    pub what: &'static str,
-    /// Its name; of an edge the node's.
-    pub name: String,
-    /// The topic of an edge.
-    pub topic: Option<String>,
-    /// Before: a rate in Hz, nodes, a value.
-    pub from: Option<String>,
-    /// After.
-    pub to: Option<String>,
+/// How a log is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LogFormat {
+    /// A line per entry, for people.
+    #[default]
+    Text,
+    /// A table with a head, times in nanoseconds since 1970.
+    Csv,
+    /// An object per line, as in the ledger of an evolution.
+    Ndjson,
+    /// A table for a pull request or a report.
+    Markdown,
 }
 
-/// Every change of the mission, sorted by time, then as the windows list them.
-pub fn events(mission: &Mission) -> Vec<Event> {
-    let all = mission.windows.iter().flat_map(|window| {
-        window
-            .changes
-            .iter()
-            .map(|change| event(mission, window.index, window.span.start, change))
-    });
-    let mut events: Vec<Event> = all.collect();
-    events.sort_by_key(|e| (e.window, e.time));
-    events
+/// Which entries are told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LogOptions {
+    /// Each headline's parts too, below it.
+    pub parts: bool,
+    /// Housekeeping and the recorder's too.
+    pub all: bool,
+    /// A line before the first entry of each phase.
+    pub phases: bool,
 }
 
-fn event(mission: &Mission, window: usize, start: Stamp, change: &Change) -> Event {
-    let names = |nodes: &[u32]| {
-        let names: Vec<&str> = nodes
-            .iter()
-            .map(|n| mission.elements.nodes[*n as usize].name.as_str())
-            .collect();
-        Some(names.join(" "))
-    };
-    let (what, time, from, to) = match change {
-        Change::Added { what, time } | Change::Removed { what, time } => (*what, *time, None, None),
-        Change::Restarted { node, time } => (Element::Node(*node), Some(*time), None, None),
-        Change::Rate {
-            what,
-            from_hz,
-            to_hz,
-        } => (
-            *what,
-            None,
-            Some(words::number(*from_hz)),
-            Some(words::number(*to_hz)),
-        ),
-        Change::HandedOver { topic, from, to } => {
-            (Element::Topic(*topic), None, names(from), names(to))
-        }
-        Change::Value { what, from, to, .. } => {
-            (*what, None, Some(from.to_string()), Some(to.to_string()))
-        }
-    };
-    let (name, topic) = named(mission, what);
-    Event {
-        time: time.unwrap_or(start),
-        exact: time.is_some(),
-        window,
-        kind: change.word(),
-        what: what.word(),
-        name,
-        topic,
-        from,
-        to,
+/// A row of the log, in order.
+enum Row<'a> {
+    Phase(usize, &'a Phase),
+    Entry(EntryId, &'a Entry),
+    Part(EntryId, &'a Entry),
+}
+
+/// The log of a mission; ends in a new line unless it is empty. Names are made visible: what would steer a terminal or
+/// turn the direction of text is written as an escape.
+pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String {
+    let rows = chosen(mission, options);
+    match format {
+        LogFormat::Text => text(mission, &rows),
+        LogFormat::Csv => csv(mission, &rows),
+        LogFormat::Ndjson => ndjson(mission, &rows),
+        LogFormat::Markdown => markdown(mission, &rows),
     }
 }
 
-/// The name of a node or topic; the node and topic of an edge.
-fn named(mission: &Mission, what: Element) -> (String, Option<String>) {
-    let elements = &mission.elements;
-    let node = |id: u32| elements.nodes[id as usize].name.to_string();
-    let topic = |id: u32| elements.topics[id as usize].name.to_string();
-    let edge = |edge: &Edge| (node(edge.node), Some(topic(edge.topic)));
-    match what {
-        Element::Node(id) => (node(id), None),
-        Element::Topic(id) => (topic(id), None),
-        Element::Publish(id) => edge(&elements.publishes[id as usize]),
-        Element::Subscribe(id) => edge(&elements.subscribes[id as usize]),
+fn chosen(mission: &Mission, options: LogOptions) -> Vec<Row<'_>> {
+    let ledger = &mission.ledger;
+    let parts = if options.parts {
+        ledger.all_parts()
+    } else {
+        BTreeMap::new()
+    };
+    let phases = ledger.phases.iter().enumerate();
+    let mut phases = phases.filter(|_| options.phases).peekable();
+    let mut rows = Vec::new();
+    for (id, entry) in (0..).zip(&ledger.entries) {
+        while let Some((at, phase)) = phases.next_if(|(_, p)| p.span.start <= entry.time) {
+            rows.push(Row::Phase(at, phase));
+        }
+        if entry.part_of.is_some() || entry.quiet && !options.all {
+            continue;
+        }
+        rows.push(Row::Entry(id, entry));
+        let own = parts.get(&id).into_iter().flatten();
+        let own =
+            own.filter_map(|part| Some(Row::Part(*part, ledger.entries.get(*part as usize)?)));
+        rows.extend(own);
+    }
+    rows.extend(phases.map(|(at, phase)| Row::Phase(at, phase)));
+    rows
+}
+
+/// Less doubt than this is not worth a word, in nanoseconds: a recorder looks for new topics once a second.
+const SURE_NS: i64 = 4_000_000_000;
+/// Up to so much doubt a time is "about", beyond it lies somewhere between two.
+const ABOUT_NS: i64 = 10_000_000_000;
+
+/// When it happened, counted from the mission's start: `00:37.9`, `~00:37`, or `00:35–00:58`.
+fn at(mission: &Mission, entry: &Entry) -> String {
+    let second = |time: Stamp| words::offset_seconds(mission.offset(time));
+    match entry.latest.since(entry.earliest) {
+        doubt if doubt <= SURE_NS => words::offset_tenths(mission.offset(entry.time)),
+        doubt if doubt <= ABOUT_NS => format!("~{}", second(entry.time)),
+        _ => format!("{}–{}", second(entry.earliest), second(entry.latest)),
     }
 }
 
-impl Event {
-    /// The event as one sentence without a period: `/planner appeared`, `/scan 15 → 7.4 Hz`.
-    pub fn sentence(&self) -> String {
-        let (from, to) = (
-            self.from.as_deref().unwrap_or(""),
-            self.to.as_deref().unwrap_or(""),
-        );
-        let name = match &self.topic {
-            Some(topic) if self.what == "publish" => format!("{} → {topic}", self.name),
-            Some(topic) => format!("{topic} → {}", self.name),
-            None => self.name.clone(),
+/// What a phase is called in the log.
+fn title(at: usize, phase: &Phase) -> String {
+    format!("phase {}: {}", at + 1, visible(&phase.name))
+}
+
+fn text(mission: &Mission, rows: &[Row<'_>]) -> String {
+    let mut all = String::new();
+    for row in rows {
+        let (when, words) = match row {
+            Row::Phase(at, phase) => {
+                let when = words::offset_tenths(mission.offset(phase.span.start));
+                (when, format!("── {} ──", title(*at, phase)))
+            }
+            Row::Entry(id, entry) => (at(mission, entry), sentence(mission, *id, entry)),
+            Row::Part(id, entry) => {
+                let words = format!("  {}", sentence(mission, *id, entry));
+                (at(mission, entry), words)
+            }
         };
-        match self.kind {
-            "added" => format!("{name} appeared"),
-            "removed" => format!("{name} vanished"),
-            "rate" => format!("{name} {from} → {to} Hz"),
-            "handed_over" => format!("{name} handed over from {from} to {to}"),
-            "restarted" => format!("{name} restarted"),
-            kind => format!("{name} {kind} {} → {}", last_part(from), last_part(to)),
+        // Writing into a string does not fail.
+        let _ = writeln!(all, "{when:>13}  {words}");
+    }
+    all
+}
+
+fn markdown(mission: &Mission, rows: &[Row<'_>]) -> String {
+    let mut all = "| when | what |\n|---:|---|\n".to_owned();
+    for row in rows {
+        let (when, words) = match row {
+            Row::Phase(at, phase) => {
+                let when = words::offset_tenths(mission.offset(phase.span.start));
+                (when, format!("**{}**", escaped(&title(*at, phase))))
+            }
+            Row::Entry(id, entry) => {
+                let words = sentence(mission, *id, entry);
+                (at(mission, entry), escaped(&words))
+            }
+            Row::Part(id, entry) => {
+                let words = sentence(mission, *id, entry);
+                (at(mission, entry), format!("· {}", escaped(&words)))
+            }
+        };
+        let _ = writeln!(all, "| {when} | {words} |");
+    }
+    all
+}
+
+/// Text that Markdown shows as it is.
+fn escaped(text: &str) -> String {
+    let mut all = String::with_capacity(text.len());
+    for c in text.chars() {
+        if matches!(
+            c,
+            '\\' | '|' | '`' | '*' | '_' | '[' | ']' | '<' | '>' | '~' | '&' | '@' | '#'
+        ) {
+            all.push('\\');
+        }
+        all.push(c);
+    }
+    all
+}
+
+const COLUMNS: [&str; 16] = [
+    "id",
+    "kind",
+    "what",
+    "name",
+    "topic",
+    "time_ns",
+    "earliest_ns",
+    "latest_ns",
+    "until_ns",
+    "before",
+    "after",
+    "degree",
+    "evidence",
+    "part_of",
+    "quiet",
+    "weight",
+];
+
+fn csv(mission: &Mission, rows: &[Row<'_>]) -> String {
+    table(
+        &COLUMNS,
+        rows.iter().map(|row| match row {
+            Row::Phase(at, phase) => phase_cells(*at, phase),
+            Row::Entry(id, entry) | Row::Part(id, entry) => cells(mission, *id, entry),
+        }),
+    )
+}
+
+fn cells(mission: &Mission, id: EntryId, entry: &Entry) -> Vec<String> {
+    let elements = &mission.elements;
+    let (node, topic) = elements.ends(entry.what);
+    let node = node.map(|id| visible(elements.nodes[id as usize].name.as_str()).into_owned());
+    let topic = topic.map(|id| visible(elements.topics[id as usize].name.as_str()).into_owned());
+    let (name, topic) = match entry.what {
+        Element::Topic(_) => (topic, None),
+        _ => (node, topic),
+    };
+    let (before, after) = values(mission, entry);
+    vec![
+        id.to_string(),
+        entry.kind.word().to_owned(),
+        entry.what.word().to_owned(),
+        name.unwrap_or_default(),
+        topic.unwrap_or_default(),
+        entry.time.0.to_string(),
+        entry.earliest.0.to_string(),
+        entry.latest.0.to_string(),
+        entry.until.map_or_else(String::new, |t| t.0.to_string()),
+        before,
+        after,
+        entry.degree.word().to_owned(),
+        entry.evidence.words().collect::<Vec<_>>().join(" "),
+        entry.part_of.map_or_else(String::new, |of| of.to_string()),
+        entry.quiet.to_string(),
+        entry.weight.to_string(),
+    ]
+}
+
+/// What an entry says of before and after: numbers, names or values.
+fn values(mission: &Mission, entry: &Entry) -> (String, String) {
+    let names = |nodes: &[u32]| {
+        let name =
+            |id: &u32| visible(mission.elements.nodes[*id as usize].name.as_str()).into_owned();
+        nodes.iter().map(name).collect::<Vec<_>>().join(" ")
+    };
+    match &entry.detail {
+        Detail::None => (String::new(), String::new()),
+        Detail::Rates { from_hz, to_hz } => (from_hz.to_string(), to_hz.to_string()),
+        Detail::Senders { from, to } => (names(from), names(to)),
+        Detail::Values { from, to } => (visible(from).into_owned(), visible(to).into_owned()),
+    }
+}
+
+fn phase_cells(at: usize, phase: &Phase) -> Vec<String> {
+    let mut cells = vec![String::new(); COLUMNS.len()];
+    cells[0] = (at + 1).to_string();
+    "phase".clone_into(&mut cells[1]);
+    cells[3] = visible(&phase.name).into_owned();
+    cells[5] = phase.span.start.0.to_string();
+    cells[8] = phase.span.end.0.to_string();
+    cells
+}
+
+fn ndjson(mission: &Mission, rows: &[Row<'_>]) -> String {
+    let entries = rows_of(mission);
+    let mut all = String::new();
+    for row in rows {
+        match row {
+            Row::Phase(at, phase) => all.push_str(&phase_line(*at, phase)),
+            Row::Entry(id, _) | Row::Part(id, _) => {
+                all.push_str(entries.get(*id as usize).map_or("{}", String::as_str));
+            }
+        }
+        all.push('\n');
+    }
+    all
+}
+
+/// Every entry as an object on one line.
+fn rows_of(mission: &Mission) -> Vec<String> {
+    rows(&mission.ledger, &mission.elements)
+        .map(|row| harmless(&row))
+        .collect()
+}
+
+fn phase_line(at: usize, phase: &Phase) -> String {
+    let (start, end) = (phase.span.start.0, phase.span.end.0);
+    let name = crate::mission::json::entries::text(&phase.name);
+    let number = at + 1;
+    harmless(&format!(
+        "{{\"kind\":\"phase\",\"number\":{number},\"name\":{name},\"time_ns\":{start},\"until_ns\":{end}}}"
+    ))
+}
+
+/// JSON whose texts show what they hold: characters that cannot be seen are escapes.
+fn harmless(json: &str) -> String {
+    let mut all = String::with_capacity(json.len());
+    for c in json.chars() {
+        if words::is_invisible(c) {
+            for unit in c.encode_utf16(&mut [0; 2]) {
+                let _ = write!(all, "\\u{unit:04x}");
+            }
+        } else {
+            all.push(c);
         }
     }
-
-    /// When it happened, counted from the mission's start, such as `07:10.2`; `~` in front where only the window is known.
-    pub fn at(&self, mission: &Mission) -> String {
-        let about = if self.exact { "" } else { "~" };
-        format!("{about}{}", words::offset(mission.offset(self.time)))
-    }
+    all
 }

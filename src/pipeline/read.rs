@@ -121,7 +121,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
             hint: "times are nanoseconds since 1970".to_owned(),
         });
     }
-    if mission.ledger.entries.is_empty() {
+    if !mission.knows_lives() {
         mission.find_changes(reading.rate_change, &[]);
     }
     mission.activity = Activity::of_windows(&mission);

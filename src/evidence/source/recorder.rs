@@ -35,6 +35,14 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
     let nodes = known.nodes().iter().copied();
     let named = nodes.filter(|node| is_recorder(&known.text(*node)));
     let recorders: BTreeSet<Name> = told.chain(named).collect();
+    for recorder in &recorders {
+        known.prove(Proof {
+            what: Key::Node(*recorder),
+            source,
+            degree: Degree::Stated,
+            when: Validity::Unending,
+        });
+    }
     if recorders.len() != 1 {
         return;
     }

@@ -78,10 +78,9 @@ impl Pulse {
 
     /// The longest silence that says nothing.
     fn patience(&self) -> i64 {
-        let pauses = if self.is_even { 1 } else { UNUSUAL };
         self.period
             .saturating_mul(if self.is_even { BREAK } else { BREAK * UNUSUAL })
-            .max(self.pause.saturating_mul(pauses))
+            .max(self.pause.saturating_mul(UNUSUAL))
             .max(BREAK_NS)
     }
 }
@@ -108,6 +107,8 @@ pub(crate) struct Liveness {
     pub(crate) senders: (u32, u32),
     /// Whether it is known by more than latched messages.
     pub(crate) speaks: bool,
+    /// Whether it lives to the end, whatever its signs say.
+    pub(crate) unending: bool,
     /// Whether it is there for the whole mission.
     pub(crate) extent: Extent,
     pub(crate) lives: Vec<Lifetime>,
@@ -126,6 +127,7 @@ impl Default for Liveness {
             pulses: Vec::new(),
             senders: (0, 0),
             speaks: false,
+            unending: false,
             extent: Extent::Signs,
             lives: Vec::new(),
         }
@@ -236,7 +238,7 @@ impl Liveness {
 
     /// Where a rhythm broke off for good, if one did.
     fn end(&self, mission: Stamp) -> Option<Bound> {
-        let heard = self.heard?;
+        let heard = self.heard.filter(|_| !self.unending)?;
         let silence = mission.since(heard);
         let broken = self.pulses.iter().filter(|p| {
             // A rhythm that was over long before the last sign tells nothing of the silence after it.

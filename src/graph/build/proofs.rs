@@ -141,7 +141,10 @@ fn explain(known: &mut Findings<'_>, messages: &Stamps) {
                 (None, text)
             }
             Validity::Always => (None, format!("{} ({})", told(proof.what), source.about)),
-            Validity::Signs { .. } | Validity::Begins { .. } | Validity::Whole => continue,
+            Validity::Signs { .. }
+            | Validity::Begins { .. }
+            | Validity::Unending
+            | Validity::Whole => continue,
         };
         pieces.push(EvidenceLine {
             time,

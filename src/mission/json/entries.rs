@@ -5,10 +5,10 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::write::{Named, words};
-use crate::base::time::Stamp;
+use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, Elements, NodeId};
-use crate::mission::ledger::{Detail, Entry, Kind, Ledger, sorted};
+use crate::mission::ledger::{Detail, Entry, Kind, Ledger, Phase, sorted};
 
 /// An entry as it is written.
 #[derive(Serialize)]
@@ -74,6 +74,67 @@ pub(crate) fn entries<'a>(
         quiet: entry.quiet,
         weight: entry.weight,
     })
+}
+
+/// A phase, written and read.
+#[derive(Deserialize, Serialize)]
+pub(crate) struct PhaseRow {
+    start_ns: i64,
+    end_ns: i64,
+    #[serde(default)]
+    name: String,
+    #[serde(default)]
+    nodes_added: u32,
+    #[serde(default)]
+    nodes_removed: u32,
+    #[serde(default)]
+    ramp: bool,
+    #[serde(rename = "as")]
+    same_as: Option<u32>,
+}
+
+impl From<&Phase> for PhaseRow {
+    fn from(phase: &Phase) -> Self {
+        Self {
+            start_ns: phase.span.start.0,
+            end_ns: phase.span.end.0,
+            name: phase.name.to_string(),
+            nodes_added: phase.nodes_added,
+            nodes_removed: phase.nodes_removed,
+            ramp: phase.is_ramp,
+            same_as: phase.same_as,
+        }
+    }
+}
+
+/// The phases of rows that were read; one that names a later phase as its like names none.
+pub(crate) fn phases(rows: Vec<PhaseRow>) -> Vec<Phase> {
+    let phase = |(at, row): (u32, PhaseRow)| Phase {
+        span: Span {
+            start: Stamp(row.start_ns),
+            end: Stamp(row.end_ns.max(row.start_ns)),
+        },
+        name: row.name.into(),
+        nodes_added: row.nodes_added,
+        nodes_removed: row.nodes_removed,
+        is_ramp: row.ramp,
+        same_as: row.same_as.filter(|earlier| *earlier < at),
+    };
+    (0..).zip(rows).map(phase).collect()
+}
+
+/// Every entry of a ledger as an object on one line.
+pub(crate) fn rows<'a>(
+    ledger: &'a Ledger,
+    elements: &'a Elements,
+) -> impl Iterator<Item = String> + 'a {
+    // Only maps with keys that are no strings fail, and there are none.
+    entries(ledger, elements).map(|row| serde_json::to_string(&row).unwrap_or_default())
+}
+
+/// A text in quotes.
+pub(crate) fn text(text: &str) -> String {
+    serde_json::to_string(text).unwrap_or_default()
 }
 
 /// The role of the node that an entry is about.

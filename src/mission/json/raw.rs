@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::entries::RawEntry;
+use super::entries::{PhaseRow, RawEntry};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{EdgeState, State};
@@ -19,6 +19,8 @@ pub(crate) struct Raw {
     pub(crate) step_ns: Option<i64>,
     pub(crate) windows: Vec<RawWindow>,
     pub(crate) ledger: Option<Vec<RawEntry>>,
+    #[serde(default)]
+    pub(crate) phases: Vec<PhaseRow>,
     pub(crate) layout: Option<RawLayout>,
     #[serde(default)]
     pub(crate) notices: Vec<RawNotice>,

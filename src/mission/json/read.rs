@@ -33,6 +33,7 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     }
     let spans = spans(&raw).map_err(|reason| bad(0, reason))?;
     let ledger = raw.ledger.take();
+    let phases = super::entries::phases(std::mem::take(&mut raw.phases));
     let mut mission = build(raw, &spans);
     if let Some(rows) = ledger {
         let entries = super::entries::read(&rows, &mission.elements);
@@ -43,6 +44,7 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
             )
         };
         mission.ledger.entries = entries.ok_or_else(nothing)?;
+        mission.ledger.phases = phases;
         mission.explain();
     }
     Ok(mission)

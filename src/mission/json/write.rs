@@ -5,7 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 use serde::ser::{SerializeMap as _, SerializeSeq as _, Serializer};
 
-use super::entries::entries;
+use super::entries::{PhaseRow, entries};
 use super::lines::Lines;
 use crate::bag::Report;
 use crate::base::time::{Span, Stamp};
@@ -45,6 +45,8 @@ impl Serialize for Mission {
             elements: &self.elements,
         });
         map.serialize_entry("ledger", &List(entries(&self.ledger, &self.elements)))?;
+        let phases = self.ledger.phases.iter().map(PhaseRow::from);
+        map.serialize_entry("phases", &List(phases))?;
         map.serialize_entry("windows", &List(windows))?;
         if let Some(places) = &self.layout {
             map.serialize_entry("layout", &LayoutRow::new(places))?;

@@ -143,14 +143,20 @@ fn tell_edge(
 ) {
     for (turn, at) in turns(known) {
         let of_node = wholes.nodes.get(&(edge.node, turn)).into_iter().flatten();
+        // Near its node's turn; or it may have been, for all that is known.
+        let may = |node: &Bound| {
+            let since = node.time.plus(WITH_ITS_NODE_NS);
+            turn == Turn::Begins && at.earliest <= since && node.time <= at.time
+        };
         let near = of_node
-            .map(|(node, id)| (at.time.since(node.time), *id))
-            .filter(|(late, _)| (-WITH_ITS_NODE_NS..=WITH_ITS_NODE_NS).contains(late))
-            .min_by_key(|(late, _)| late.abs());
+            .map(|(node, id)| (at.time.since(node.time).abs(), node, *id))
+            .filter(|(far, node, _)| *far <= WITH_ITS_NODE_NS || may(node))
+            .min_by_key(|(far, _, _)| *far)
+            .map(|(_, _, id)| id);
         let mut entry = told.entry(kind(turn), what, at);
-        entry.part_of = near.map(|(_, id)| id);
+        entry.part_of = near;
         let id = drafts.add(entry);
-        let whole = near.map_or(id, |(_, id)| id);
+        let whole = near.unwrap_or(id);
         wholes
             .topics
             .entry((edge.topic, turn, at.time))

@@ -14,6 +14,7 @@ type Silence = (Stamp, Option<Stamp>);
 /// Tells of all silences.
 pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
     let pauses = Pauses::new(&told.lives.voices);
+    let gone = Gone::new(drafts);
     let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EntryId)>> = BTreeMap::new();
     for (node, voices) in by(told, |v| v.node.filter(|_| !v.is_latched)) {
         let what = Element::Node(node);
@@ -30,9 +31,38 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
             let mut entry = entry(told, Element::Topic(topic), silence, &voices);
             let nodes = voices.iter().filter_map(|v| of_nodes.get(&v.node?));
             let whole = nodes.flatten().find(|(of, _)| meet(*of, silence));
-            entry.part_of = whole.map(|(_, id)| *id);
+            let whole = whole.map(|(_, id)| *id);
+            entry.part_of = whole.or_else(|| gone.at(&voices, silence.0));
             drafts.add(entry);
         }
+    }
+}
+
+/// So long before or after its sender's end a topic falls silent because of it.
+const WITH_ITS_SENDER_NS: i64 = 5_000_000_000;
+
+/// When nodes ended, and the entries that tell of it.
+struct Gone(BTreeMap<NodeId, Vec<(Stamp, EntryId)>>);
+
+impl Gone {
+    fn new(drafts: &Drafts) -> Self {
+        let mut gone: BTreeMap<NodeId, Vec<(Stamp, EntryId)>> = BTreeMap::new();
+        for (id, entry) in (0..).zip(&drafts.list) {
+            let whole = entry.part_of.unwrap_or(id);
+            if let (Element::Node(node), Kind::Stopped | Kind::Restarted) = (entry.what, entry.kind)
+            {
+                gone.entry(node).or_default().push((entry.time, whole));
+            }
+        }
+        Self(gone)
+    }
+
+    /// The entry that tells of the end of one of these senders at that time.
+    fn at(&self, voices: &[&Voice], time: Stamp) -> Option<EntryId> {
+        let of = voices.iter().filter_map(|v| self.0.get(&v.node?));
+        of.flatten()
+            .find(|(end, _)| end.since(time).abs() <= WITH_ITS_SENDER_NS)
+            .map(|(_, id)| *id)
     }
 }
 
