@@ -179,6 +179,86 @@ fn what_makes_no_sense_is_refused() {
     refused(&["-o", WAREHOUSE, "--format", "csv"], "overwrite an input");
 }
 
+/// A folder of recordings of every kind, mixed: a folder of rosbag2 with a stranger in it, parts without their
+/// metadata, loose files, broken ones, folders below.
+fn mixed(folder: &Path) {
+    let mcap = fs::read(COURIER).unwrap();
+    let put = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    };
+    put("loose.mcap", &mcap);
+    put("a.bag", b"#ROSBAG V2.0\n");
+    put("broken.db3", b"");
+    put("deep/er/b.bag", b"");
+    let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_0.mcap\n";
+    put("ros2/metadata.yaml", metadata.as_bytes());
+    put("ros2/run_0.mcap", &mcap);
+    put("ros2/stranger.bag", b"");
+    put("ros2/below/c.mcap", &mcap);
+    put("parts/run_0.mcap", &mcap);
+    put("parts/run_1.mcap", &mcap);
+    put("notes.txt", b"no bag");
+}
+
+#[test]
+fn a_survey_loses_no_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    mixed(dir.path());
+    let output = bagreel(dir.path(), &["info", ".", "--format", "csv"]);
+    fs::write(dir.path().join("survey.csv"), &output.stdout).unwrap();
+    let rows = csv(&dir.path().join("survey.csv"));
+    let paths: Vec<&str> = rows[1..].iter().map(|r| r[0].as_str()).collect();
+    let expected = [
+        "a.bag",
+        "broken.db3",
+        "deep/er/b.bag",
+        "loose.mcap",
+        "parts",
+        "ros2",
+        "ros2/below/c.mcap",
+        "ros2/stranger.bag",
+    ];
+    assert_eq!(paths, expected);
+    let error = rows[0].iter().position(|c| c == "error").unwrap();
+    let failed: Vec<&str> = rows[1..]
+        .iter()
+        .filter(|r| !r[error].is_empty())
+        .map(|r| r[0].as_str())
+        .collect();
+    assert_eq!(
+        failed,
+        ["a.bag", "broken.db3", "deep/er/b.bag", "ros2/stranger.bag"]
+    );
+    // A recording with nothing beside it is no survey.
+    let one = bagreel(dir.path(), &["info", "parts"]);
+    assert!(String::from_utf8(one.stdout).unwrap().contains("messages"));
+}
+
+#[test]
+fn a_recorder_is_no_subscriber() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = bagreel(dir.path(), &["info", WAREHOUSE, "--format", "json"]);
+    let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let degrees = info["subscribes_by_degree"].as_object().unwrap();
+    let counted: u64 = degrees.values().map(|n| n.as_u64().unwrap()).sum();
+    let subscribers = |topic: &serde_json::Value| {
+        let all = topic["subscribers"].as_array().unwrap().clone();
+        all.iter()
+            .filter(|s| s.as_str().unwrap().starts_with("/record_"))
+            .count()
+    };
+    let topics = info["topics"].as_array().unwrap();
+    let all: usize = topics
+        .iter()
+        .map(|t| t["subscribers"].as_array().unwrap().len())
+        .sum();
+    let recorders: usize = topics.iter().map(subscribers).sum();
+    assert!(recorders > 50, "the recorder's log says what it listens to");
+    assert_eq!(counted, (all - recorders) as u64);
+}
+
 #[cfg(feature = "parquet")]
 mod parquet {
     use std::fs::File;

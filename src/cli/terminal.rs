@@ -84,8 +84,13 @@ impl Terminal {
 
     /// Prints results on standard output, as they are. A closed pipe ends nothing: the reader has what it wanted.
     pub fn results(&mut self, text: &str) {
+        self.result_bytes(text.as_bytes());
+    }
+
+    /// As [`Terminal::results`], of any bytes.
+    pub fn result_bytes(&mut self, bytes: &[u8]) {
         let mut out = io::stdout().lock();
-        let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        let _ = out.write_all(bytes).and_then(|()| out.flush());
     }
 
     /// Prints something worth knowing unless quiet.

@@ -8,13 +8,15 @@ mod why;
 use serde::Serialize;
 
 pub use advice::advice;
-pub use survey::{SurveyRow, survey_csv, survey_text};
+pub(crate) use survey::survey_table;
+pub use survey::{SurveyRow, survey_text};
 pub use text::text;
 pub use why::why;
 
 use crate::evidence::{Degree, Evidence};
-use crate::graph::{Element, NodeId};
+use crate::graph::{Edge, Element, NodeId};
 use crate::mission::Mission;
+use crate::mission::activity::records;
 
 /// All that `bagreel info` tells of one mission. Written as JSON with these names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -157,7 +159,7 @@ pub fn info(mission: &Mission) -> Info {
     let sent = sent(mission);
     let topics = topics(mission);
     let nodes = elements.nodes.iter().enumerate().map(|(id, node)| {
-        let own = |edge: &&crate::graph::Edge| edge.node as usize == id;
+        let own = |edge: &&Edge| edge.node as usize == id;
         let subscribed = || elements.subscribes.iter().filter(own);
         let received = subscribed()
             .map(|edge| topics[edge.topic as usize].count)
@@ -174,9 +176,11 @@ pub fn info(mission: &Mission) -> Info {
             received: (subscribed().count() > 0).then_some(received),
         }
     });
+    let heard = heard(mission);
     let silent_ears = topics
         .iter()
-        .filter(|t| t.count > 0 && t.subscribers.is_empty())
+        .zip(heard)
+        .filter(|(topic, heard)| topic.count > 0 && !heard)
         .count();
     Info {
         schema: "bagreel.info/1",
@@ -187,7 +191,7 @@ pub fn info(mission: &Mission) -> Info {
         messages: mission.messages,
         nodes_by_degree: counted(&best.nodes),
         publishes_by_degree: counted(&best.publishes),
-        subscribes_by_degree: counted(&best.subscribes),
+        subscribes_by_degree: counted(&best.of_listeners(mission)),
         topics_without_subscriber: silent_ears,
         evidence: evidence(mission),
         nodes: nodes.collect(),
@@ -249,6 +253,28 @@ impl BestDegrees {
         }
         best
     }
+
+    /// Of the subscriptions, those that are no recorder's.
+    fn of_listeners(&self, mission: &Mission) -> Vec<Degree> {
+        let edges = mission.elements.subscribes.iter().zip(&self.subscribes);
+        let own = edges.filter(|(edge, _)| !is_recorders(mission, edge));
+        own.map(|(_, degree)| *degree).collect()
+    }
+}
+
+/// Whether an edge belongs to a recorder or a player, which listen to everything and are no part of the robot.
+fn is_recorders(mission: &Mission, edge: &Edge) -> bool {
+    records(&mission.elements.nodes[edge.node as usize])
+}
+
+/// Whether each topic has a subscriber that is no recorder.
+fn heard(mission: &Mission) -> Vec<bool> {
+    let mut heard = vec![false; mission.elements.topics.len()];
+    let edges = mission.elements.subscribes.iter();
+    for edge in edges.filter(|edge| !is_recorders(mission, edge)) {
+        heard[edge.topic as usize] = true;
+    }
+    heard
 }
 
 fn better(best: &mut Degree, degree: Degree) {
