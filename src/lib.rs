@@ -8,16 +8,20 @@
 //!
 //! ```
 //! use bagreel::bag::Input;
-//! use bagreel::pipeline::{Reading, Unwatched, read};
+//! use bagreel::{Output, Reading, Render, read, render};
 //!
+//! # let folder = tempfile::tempdir().map_err(bagreel::Error::io("make", std::path::Path::new("a folder")))?;
+//! # let page = folder.path().join("courier.html").display().to_string();
 //! let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 //! let reading = Reading { inputs: vec![Input::Path(bag.into())], ..Reading::default() };
-//! let mission = read(&reading, &mut Unwatched)?;
+//! let mission = read(&reading)?;
 //! for window in &mission.windows {
 //!     println!("{}: {} nodes, {} changes", window.index, window.graph.nodes.len(), window.changes.len());
 //! }
 //! # assert!(mission.windows.len() >= 5 && mission.elements.nodes.len() > 5);
-//! # Ok::<(), bagreel::base::error::Error>(())
+//! let job = Render::new(reading, vec![Output::parse(&page, None)?])?;
+//! assert_eq!(render(&job)?.written[0].files, 1);
+//! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
@@ -73,3 +77,28 @@ pub mod export;
 pub mod pipeline;
 
 pub mod cli;
+
+pub use base::error::{Error, Result};
+pub use draw::style::Style;
+pub use export::Output;
+pub use graph::Graph;
+pub use graph::diff::Change;
+pub use mission::{Ledger, Mission, Window};
+pub use pipeline::{Reading, Render, Rendered};
+
+/// Reads bags, or a mission's own JSON, into a mission.
+///
+/// # Errors
+/// Where an input cannot be read at all or none holds a message, and for times that make no sense. What is damaged is
+/// left out and told in [`Mission::notices`].
+pub fn read(reading: &Reading) -> Result<Mission> {
+    pipeline::read(reading, &mut pipeline::Unwatched)
+}
+
+/// Reads, draws and writes every output, each whole or not at all.
+///
+/// # Errors
+/// As [`read`], and where an output cannot be written or an option makes no sense.
+pub fn render(job: &Render) -> Result<Rendered> {
+    pipeline::render(job, &mut pipeline::Unwatched)
+}

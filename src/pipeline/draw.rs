@@ -34,6 +34,25 @@ pub struct Drawing {
     pub kept: Option<Places>,
 }
 
+impl Drawing {
+    /// The light style on a page of 1280×720 that may grow, as the command line has it.
+    ///
+    /// # Errors
+    /// None that a user can cause: the built-in style is tested.
+    pub fn new() -> crate::base::error::Result<Self> {
+        Ok(Self {
+            view: ViewOptions::default(),
+            style: Style::builtin("light")?,
+            fonts: Fonts::bundled(),
+            page: PageOptions::default(),
+            is_sized: false,
+            is_fitted: true,
+            engine: crate::layout::ENGINES[0].1,
+            kept: None,
+        })
+    }
+}
+
 /// The smallest text that `--fit auto` accepts, in pixels.
 const READABLE: f64 = 9.0;
 

@@ -35,6 +35,23 @@ pub struct Render {
     pub is_filtered: bool,
 }
 
+impl Render {
+    /// Reads so and writes these, everything else as the command line has it.
+    ///
+    /// # Errors
+    /// As [`Drawing::new`].
+    pub fn new(reading: Reading, outputs: Vec<Output>) -> Result<Self> {
+        Ok(Self {
+            reading,
+            drawing: Drawing::new()?,
+            sequence: options::Options::default(),
+            outputs,
+            captions: None,
+            is_filtered: false,
+        })
+    }
+}
+
 /// What came of it.
 #[derive(Debug)]
 pub struct Rendered {

@@ -1,0 +1,33 @@
+//! Prints the graph of each window of a bag: how many nodes talk, and what changed against the window before.
+//!
+//! `cargo run --release --example windows -- examples/courier.mcap`
+
+#![expect(clippy::print_stdout, reason = "an example prints what it finds")]
+
+use bagreel::bag::Input;
+use bagreel::{Reading, read};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let bag = std::env::args().nth(1).ok_or("name a bag")?;
+    let reading = Reading {
+        inputs: vec![Input::Path(bag.into())],
+        ..Reading::default()
+    };
+    let mission = read(&reading)?;
+    println!(
+        "{} messages, windows of {}",
+        mission.messages, mission.period
+    );
+    for window in &mission.windows {
+        let graph = &window.graph;
+        println!(
+            "{:>4}  {:>3} nodes  {:>3} topics  {:>3} edges  {:>3} changes",
+            window.index,
+            graph.nodes.len(),
+            graph.topics.len(),
+            graph.publishes.len() + graph.subscribes.len(),
+            window.changes.len()
+        );
+    }
+    Ok(())
+}
