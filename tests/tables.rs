@@ -259,6 +259,37 @@ fn a_recorder_is_no_subscriber() {
     assert_eq!(counted, (all - recorders) as u64);
 }
 
+#[test]
+fn graphs_of_other_tools_hold_every_element_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let outputs = ["-o", "x.gexf", "-o", "x.graphml", "-o", "x.json"];
+    ends(
+        dir.path(),
+        &[&["render", WAREHOUSE][..], &outputs].concat(),
+        0,
+    );
+    let read = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
+    let mission: serde_json::Value = serde_json::from_str(&read("x.json")).unwrap();
+    let names = |list: &str| -> BTreeSet<String> {
+        let windows = mission["windows"].as_array().unwrap();
+        let elements = windows.iter().flat_map(|w| w[list].as_array().unwrap());
+        let name = |e: &serde_json::Value, key: &str| e[key].as_str().unwrap_or("").to_owned();
+        elements
+            .map(|e| name(e, "name") + &name(e, "node") + " " + &name(e, "topic"))
+            .collect()
+    };
+    let nodes = names("nodes").len() + names("topics").len();
+    let edges = names("publishes").len() + names("subscribes").len();
+    for text in [read("x.gexf"), read("x.graphml")] {
+        assert_eq!(text.matches("<node id=").count(), nodes);
+        assert_eq!(text.matches("<edge id=").count(), edges);
+    }
+    let gexf = read("x.gexf");
+    assert!(gexf.matches("<spell ").count() >= nodes + edges);
+    // What comes after the first window has a spell that says so.
+    assert!(gexf.contains("<spell start=\"60\""), "{}", &gexf[..2000]);
+}
+
 #[cfg(feature = "parquet")]
 mod parquet {
     use std::fs::File;
