@@ -311,9 +311,14 @@ mod parquet {
     #[test]
     fn parquet_holds_what_csv_holds() {
         let dir = tempfile::tempdir().unwrap();
-        for name in ["m.csv", "m.parquet"] {
+        for name in ["m.csv", "m.parquet", "again.parquet"] {
             ends(dir.path(), &["extract", WAREHOUSE, "-o", name], 0);
         }
+        let bytes = |name: &str| fs::read(dir.path().join(name)).unwrap();
+        assert!(
+            bytes("m.parquet") == bytes("again.parquet"),
+            "same bag, same bytes"
+        );
         let rows = csv(&dir.path().join("m.csv"));
         let batches = read(&dir.path().join("m.parquet"));
         assert_eq!(batches.len(), 1);

@@ -81,7 +81,9 @@ fn attributes(xml: &mut Xml, class: &str) {
             .close();
     };
     mode(xml, "static");
-    ATTRIBUTES.iter().for_each(|a| one(xml, *a));
+    for attribute in ATTRIBUTES {
+        one(xml, attribute);
+    }
     xml.close();
     mode(xml, "dynamic");
     one(xml, ("4", "hz", "double"));

@@ -1,4 +1,4 @@
-//! The union of all windows as one graph in GraphML (<http://graphml.graphdrawing.org>).
+//! The union of all windows as one graph in `GraphML` (<http://graphml.graphdrawing.org>).
 
 use super::encoder::AtOnce;
 use super::spells::{Part, parts};
