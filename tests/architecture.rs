@@ -16,7 +16,12 @@ const STATIONS: &[&str] = &[
 /// known to all.
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
-    ("base", &[&["words"], &["digest", "error", "geometry", "name", "notice", "time", "yaml"], &["table"], &["csv"]]),
+    ("base", &[
+        &["budget", "leftovers", "words"],
+        &["digest", "error", "geometry", "name", "notice", "time", "yaml"],
+        &["file", "table"],
+        &["csv"],
+    ]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "index", "input"],
@@ -50,7 +55,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["report", "run", "tables"],
     ]),
     ("pipeline", &[&["captions", "draw", "read"], &["export", "extract", "survey"]]),
-    ("cli", &[&["args", "terminal"], &["extract", "look"]]),
+    ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
