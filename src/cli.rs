@@ -23,9 +23,9 @@ use crate::graph;
 use crate::graph::window::{Division, Length};
 use crate::mission::Mission;
 use crate::mission::events::{LogFormat, LogOptions, log};
-use crate::mission::info::{SurveyRow, json, survey_csv, survey_text};
+use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::pipeline::{
-    Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
+    Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey, survey_file,
 };
 use args::{
     Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs,
@@ -331,11 +331,11 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
         && is_survey(input)
     {
         let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
-        terminal.results(&match args.format {
-            InfoFormat::Text => survey_text(&rows),
-            InfoFormat::Csv => survey_csv(&rows),
-            InfoFormat::Json => json(&rows),
-        })?;
+        match args.format {
+            InfoFormat::Text => terminal.results(&survey_text(&rows))?,
+            InfoFormat::Json => terminal.results(&json(&rows))?,
+            table => terminal.table(&survey_file(&rows, table.of_table())?)?,
+        }
         return Ok(if skipped { SKIPPED } else { DONE });
     }
     if !args.why.is_empty() {
@@ -348,22 +348,21 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     }
     let mission = read(&reading, terminal)?;
     let info = crate::mission::info::info(&mission);
-    terminal.results(&match args.format {
-        InfoFormat::Text => crate::mission::info::text(&info),
-        InfoFormat::Json => json(&info),
-        InfoFormat::Csv => {
-            let path = mission
-                .bags
-                .first()
-                .map(|b| b.name.clone())
-                .unwrap_or_default();
-            survey_csv(&[SurveyRow {
-                path,
+    match args.format {
+        InfoFormat::Text => terminal.results(&crate::mission::info::text(&info))?,
+        InfoFormat::Json => terminal.results(&json(&info))?,
+        table => {
+            let row = SurveyRow {
+                path: mission
+                    .bags
+                    .first()
+                    .map_or_else(String::new, |b| b.name.clone()),
                 error: None,
                 info: Some(info),
-            }])
+            };
+            terminal.table(&survey_file(&[row], table.of_table())?)?;
         }
-    })?;
+    }
     terminal.notices(&mission.notices);
     Ok(code(&mission))
 }

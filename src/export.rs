@@ -5,7 +5,9 @@ mod apng;
 pub mod check;
 pub mod dot;
 pub(crate) mod encoder;
+mod gexf;
 mod gif;
+mod graphml;
 pub mod html;
 mod json;
 pub mod mermaid;
@@ -19,6 +21,7 @@ pub mod report;
 pub mod run;
 pub mod sequence;
 pub mod sink;
+mod spells;
 mod svg;
 pub mod tables;
 pub mod target;
@@ -140,6 +143,18 @@ pub const FORMATS: &[Format] = &[
         what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
         check: Some(tables::check),
         start: tables::start_parquet,
+        ..DATA
+    },
+    Format {
+        word: "gexf",
+        what: "one dynamic graph for Gephi: who is there from when to when",
+        start: gexf::start,
+        ..DATA
+    },
+    Format {
+        word: "graphml",
+        what: "the union graph for yEd, networkx and others",
+        start: graphml::start,
         ..DATA
     },
 ];

@@ -13,7 +13,7 @@ pub use export::{Render, Rendered, check, render, show};
 pub use extract::{Extract, Extracted, extract};
 pub use figure::Phases;
 pub use read::{Reading, explain, read};
-pub use survey::{Survey, is_survey, survey};
+pub use survey::{Survey, is_survey, survey, survey_file};
 
 /// A part of the work, as progress and timings tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -52,11 +52,12 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["animated_svg", "apng", "dot", "gif", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
+        &["spells"],
+        &["animated_svg", "apng", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
         &["report", "run", "tables"],
     ]),
     ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
-    ("cli", &[&["args", "stop"], &["extract", "look", "terminal"]]),
+    ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.

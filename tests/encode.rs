@@ -244,12 +244,14 @@ fn two_runs_write_the_same_bytes() {
         "d.json",
         "t.csv",
         "e.pdf",
+        "g.gexf",
+        "h.graphml",
     ];
     for folder in &folders {
         show(folder.path(), &outputs, Options::default()).unwrap();
     }
     let files = names(folders[0].path());
-    assert_eq!(files.len(), 3 + 3 * 8 + 1 + 5);
+    assert_eq!(files.len(), 3 + 3 * 8 + 1 + 7 + 2);
     assert_eq!(files, names(folders[1].path()));
     for file in files {
         let [a, b] = folders

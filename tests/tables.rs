@@ -179,6 +179,118 @@ fn what_makes_no_sense_is_refused() {
     refused(&["-o", WAREHOUSE, "--format", "csv"], "overwrite an input");
 }
 
+/// A folder of recordings of every kind, mixed: a folder of rosbag2 with a stranger in it, parts without their
+/// metadata, loose files, broken ones, folders below.
+fn mixed(folder: &Path) {
+    let mcap = fs::read(COURIER).unwrap();
+    let put = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    };
+    put("loose.mcap", &mcap);
+    put("a.bag", b"#ROSBAG V2.0\n");
+    put("broken.db3", b"");
+    put("deep/er/b.bag", b"");
+    let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_0.mcap\n";
+    put("ros2/metadata.yaml", metadata.as_bytes());
+    put("ros2/run_0.mcap", &mcap);
+    put("ros2/stranger.bag", b"");
+    put("ros2/below/c.mcap", &mcap);
+    put("parts/run_0.mcap", &mcap);
+    put("parts/run_1.mcap", &mcap);
+    put("notes.txt", b"no bag");
+}
+
+#[test]
+fn a_survey_loses_no_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    mixed(dir.path());
+    let output = bagreel(dir.path(), &["info", ".", "--format", "csv"]);
+    fs::write(dir.path().join("survey.csv"), &output.stdout).unwrap();
+    let rows = csv(&dir.path().join("survey.csv"));
+    let paths: Vec<&str> = rows[1..].iter().map(|r| r[0].as_str()).collect();
+    let expected = [
+        "a.bag",
+        "broken.db3",
+        "deep/er/b.bag",
+        "loose.mcap",
+        "parts",
+        "ros2",
+        "ros2/below/c.mcap",
+        "ros2/stranger.bag",
+    ];
+    assert_eq!(paths, expected);
+    let error = rows[0].iter().position(|c| c == "error").unwrap();
+    let failed: Vec<&str> = rows[1..]
+        .iter()
+        .filter(|r| !r[error].is_empty())
+        .map(|r| r[0].as_str())
+        .collect();
+    assert_eq!(
+        failed,
+        ["a.bag", "broken.db3", "deep/er/b.bag", "ros2/stranger.bag"]
+    );
+    // A recording with nothing beside it is no survey.
+    let one = bagreel(dir.path(), &["info", "parts"]);
+    assert!(String::from_utf8(one.stdout).unwrap().contains("messages"));
+}
+
+#[test]
+fn a_recorder_is_no_subscriber() {
+    let dir = tempfile::tempdir().unwrap();
+    let nodes = "Name,Publish,Subscribe\n/record_12345,[],['/scan']\n/mapper,[],['/scan']\n";
+    fs::write(dir.path().join("nodes.csv"), nodes).unwrap();
+    let args = [
+        "info",
+        COURIER,
+        "--topology",
+        "nodes.csv",
+        "--format",
+        "json",
+    ];
+    let output = bagreel(dir.path(), &args);
+    let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let degrees = info["subscribes_by_degree"].as_object().unwrap();
+    let counted: u64 = degrees.values().map(|n| n.as_u64().unwrap()).sum();
+    assert_eq!(counted, 1);
+    // It is listed all the same.
+    let topics = info["topics"].as_array().unwrap();
+    let scan = topics.iter().find(|t| t["name"] == "/scan").unwrap();
+    assert_eq!(scan["subscribers"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn graphs_of_other_tools_hold_every_element_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let outputs = ["-o", "x.gexf", "-o", "x.graphml", "-o", "x.json"];
+    ends(
+        dir.path(),
+        &[&["render", WAREHOUSE][..], &outputs].concat(),
+        0,
+    );
+    let read = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
+    let mission: serde_json::Value = serde_json::from_str(&read("x.json")).unwrap();
+    let names = |list: &str| -> BTreeSet<String> {
+        let windows = mission["windows"].as_array().unwrap();
+        let elements = windows.iter().flat_map(|w| w[list].as_array().unwrap());
+        let name = |e: &serde_json::Value, key: &str| e[key].as_str().unwrap_or("").to_owned();
+        elements
+            .map(|e| name(e, "name") + &name(e, "node") + " " + &name(e, "topic"))
+            .collect()
+    };
+    let nodes = names("nodes").len() + names("topics").len();
+    let edges = names("publishes").len() + names("subscribes").len();
+    for text in [read("x.gexf"), read("x.graphml")] {
+        assert_eq!(text.matches("<node id=").count(), nodes);
+        assert_eq!(text.matches("<edge id=").count(), edges);
+    }
+    let gexf = read("x.gexf");
+    assert!(gexf.matches("<spell ").count() >= nodes + edges);
+    // What comes after the first window has a spell that says so.
+    assert!(gexf.contains("<spell start=\"60\""), "{}", &gexf[..2000]);
+}
+
 #[cfg(feature = "parquet")]
 mod parquet {
     use std::fs::File;
@@ -200,9 +312,14 @@ mod parquet {
     #[test]
     fn parquet_holds_what_csv_holds() {
         let dir = tempfile::tempdir().unwrap();
-        for name in ["m.csv", "m.parquet"] {
+        for name in ["m.csv", "m.parquet", "again.parquet"] {
             ends(dir.path(), &["extract", WAREHOUSE, "-o", name], 0);
         }
+        let bytes = |name: &str| fs::read(dir.path().join(name)).unwrap();
+        assert!(
+            bytes("m.parquet") == bytes("again.parquet"),
+            "same bag, same bytes"
+        );
         let rows = csv(&dir.path().join("m.csv"));
         let batches = read(&dir.path().join("m.parquet"));
         assert_eq!(batches.len(), 1);

@@ -132,20 +132,6 @@ fn text(texts: &Texts, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result
     Ok(())
 }
 
-/// A table as text: the names of the columns, then a row a line.
-pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut writer = WriterBuilder::new()
-        .terminator(Terminator::Any(b'\n'))
-        .from_writer(Vec::new());
-    // Writing to memory cannot fail, and rows are as long as the head.
-    let _ = writer.write_record(columns);
-    for row in rows {
-        let _ = writer.write_record(row);
-    }
-    let bytes = writer.into_inner().unwrap_or_default();
-    String::from_utf8_lossy(&bytes).into_owned()
-}
-
 /// A row with its line, 1...
 pub(crate) type Record = (usize, Vec<String>);
 
@@ -174,13 +160,16 @@ pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::table::Cell;
 
     #[test]
     fn cells_are_quoted_where_they_must_be() {
-        let text = table(
-            &["a", "b"],
-            [vec!["x,y".to_owned(), "say \"hi\"".to_owned()]],
-        );
-        assert_eq!(text, "a,b\n\"x,y\",\"say \"\"hi\"\"\"\n");
+        let mut batch = Batch::new(&[("a", Kind::Text), ("b", Kind::Text), ("c", Kind::F64)]);
+        batch.push(&[Cell::text("x,y"), Cell::text("say \"hi\""), Cell::Null]);
+        batch.push(&[Cell::Null, Cell::text(""), Cell::Float(1e300)]);
+        let mut rows = Rows::new(Vec::new(), &batch).unwrap();
+        rows.write(&batch).unwrap();
+        let text = String::from_utf8(rows.finish().unwrap()).unwrap();
+        assert_eq!(text, "a,b,c\n\"x,y\",\"say \"\"hi\"\"\",\n,,1e300\n");
     }
 }

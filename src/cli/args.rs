@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::base::time::{Moment, Period, parse_nanos};
 use crate::export::FORMATS;
+use crate::export::tables::TableFormat;
 use crate::graph::window::{Align, Length};
 
 /// See how a robot's software reconfigures during a mission, straight from its bag files.
@@ -149,6 +150,19 @@ pub(super) enum InfoFormat {
     Text,
     Json,
     Csv,
+    #[cfg(feature = "parquet")]
+    Parquet,
+}
+
+impl InfoFormat {
+    /// The format of a table; CSV for what is none.
+    pub(super) fn of_table(self) -> TableFormat {
+        match self {
+            #[cfg(feature = "parquet")]
+            Self::Parquet => TableFormat::Parquet,
+            _ => TableFormat::Csv,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

@@ -23,10 +23,32 @@ struct Tables<'a> {
     format: TableFormat,
 }
 
+/// Whether several files can be made of this name.
+///
+/// # Errors
+/// [`Error::Usage`] for standard output, devices, and a name with `{n}`.
+pub(crate) fn check(target: &Target) -> Result<()> {
+    let what = match target {
+        Target::Stdout => "standard output is one".to_owned(),
+        Target::Path(path) if is_special(path) => format!("`{}` is one", path.display()),
+        Target::Path(_) => return target.must_be_one("the tables hold all windows"),
+    };
+    Err(Error::usage(
+        format!("a mission is several tables, {what}"),
+        "name a file: `-o x.csv` writes `x.edges.csv` and others",
+    ))
+}
+
+/// The files of all tables.
+pub(crate) fn files(target: &Target, word: &str) -> Vec<Target> {
+    let file = |table: &Table| target.with_word(table.word, word);
+    TABLES.iter().map(file).collect()
+}
+
 /// Begins the tables as CSV.
 ///
 /// # Errors
-/// [`Error::Usage`] for standard output and for a name with `{n}`.
+/// As [`check`].
 pub(crate) fn start_csv<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
@@ -84,7 +106,8 @@ fn start<'a>(
 impl Encoder for Tables<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let each = TABLES.iter().zip(files(&self.target, self.format.word()));
-        let write = |(table, file): (_, Target)| write(self.mission, table, &file, self.format);
+        let write =
+            |(table, file): (&Table, Target)| write(self.mission, table, &file, self.format);
         // All of them are whole before the first one gets its name.
         let sinks: Vec<Sink> = each.map(write).collect::<Result<_>>()?;
         let mut written = Written::to(&self.target);

@@ -8,7 +8,8 @@ mod why;
 use serde::Serialize;
 
 use advice::advice;
-pub use survey::{SurveyRow, survey_csv, survey_text};
+pub(crate) use survey::survey_table;
+pub use survey::{SurveyRow, survey_text};
 pub use text::text;
 pub use why::why;
 
@@ -16,6 +17,7 @@ use crate::base::name::is_recorder;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, NodeId};
 use crate::mission::Mission;
+use crate::mission::activity::records;
 
 /// All that `bagreel info` tells of one mission. Written as JSON with these names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -271,6 +273,11 @@ impl BestDegrees {
         }
         best
     }
+}
+
+/// Whether an edge belongs to a recorder or a player, which listen to everything and are no part of the robot.
+fn is_recorders(mission: &Mission, edge: &Edge) -> bool {
+    records(&mission.elements.nodes[edge.node as usize])
 }
 
 fn better(best: &mut Degree, degree: Degree) {

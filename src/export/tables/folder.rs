@@ -8,12 +8,15 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::base::error::{Error, Result};
+use crate::base::leftovers::Leftover;
 
 /// Files that appear together in a folder. Dropped without [`Folder::commit`], they leave no trace.
 #[derive(Debug)]
 pub(crate) struct Folder {
     path: PathBuf,
     hidden: TempDir,
+    /// Removed when a signal ends us too.
+    _left: Leftover,
     names: Vec<String>,
 }
 
@@ -32,6 +35,7 @@ impl Folder {
             .map_err(Error::io("write into", path))?;
         Ok(Self {
             path: path.to_owned(),
+            _left: Leftover::at(hidden.path()),
             hidden,
             names: Vec::new(),
         })

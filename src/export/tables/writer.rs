@@ -1,6 +1,7 @@
 //! Where the rows of a table go: CSV or Parquet, into anything that takes bytes.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use crate::base::csv;
 use crate::base::error::{Error, Result};
@@ -49,6 +50,19 @@ impl TableFormat {
             )
         })
     }
+}
+
+/// A whole small table as bytes.
+///
+/// # Errors
+/// [`Error::Io`] if the format cannot hold it.
+pub(crate) fn whole(format: TableFormat, table: &Batch) -> Result<Vec<u8>> {
+    let write = || {
+        let mut writer = Writer::new(format, Vec::new(), table, &[])?;
+        writer.write(table)?;
+        writer.finish()
+    };
+    write().map_err(Error::io("write", Path::new("-")))
 }
 
 /// A table being written.
