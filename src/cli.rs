@@ -12,6 +12,7 @@ use clap::{CommandFactory as _, Parser as _};
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::cli::terminal::Terminal;
+use crate::evidence::code::{SourceCode, Version};
 use crate::evidence::collector;
 use crate::evidence::topology;
 use crate::export::Output;
@@ -87,16 +88,43 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
         skip_unchanged: time.skip_unchanged,
         collect: collector::Options {
             sizes: graph.bytes,
-            infer_stamps: graph.infer.is_some(),
+            infer_stamps: graph.infer.iter().any(|word| word == "stamps"),
             ..collector::Options::default()
         },
         graph: graph::Options {
             grace: graph.grace.unwrap_or(0) as usize,
             roles: graph.roles,
             topology: topology::read_all(&graph.topology)?,
+            code: None,
         },
+        code: source_code(graph)?,
         rate_change: graph.rate_change,
     })
+}
+
+/// Which source code to read, if any.
+fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
+    let infers = graph.infer.iter().any(|word| word == "source");
+    let Some(folder) = graph.source.clone() else {
+        return if infers {
+            Err(Error::usage(
+                "`--infer source` has no source code to read",
+                "add `--source DIR`, a workspace or repository",
+            ))
+        } else {
+            Ok(None)
+        };
+    };
+    let version = match graph.source_at.as_deref() {
+        None => Version::Recording,
+        Some("worktree") => Version::Worktree,
+        Some(commit) => Version::Commit(commit.to_owned()),
+    };
+    Ok(Some(SourceCode {
+        folder,
+        version,
+        infers,
+    }))
 }
 
 fn input(path: &Path) -> Input {

@@ -26,7 +26,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["clock", "message", "rhythm", "syntax", "times"],
         &["claim", "topology"],
         &["kinds", "proof"],
-        &["publishers", "source"],
+        &["code", "publishers", "source"],
         &["collector"],
     ]),
     ("graph", &[&["build", "diff", "sending", "window"]]),

@@ -19,5 +19,6 @@ mod phases;
 mod properties;
 mod reading;
 mod ros2_example;
+mod source;
 mod support;
 mod warehouse;

@@ -12,6 +12,7 @@ pub(crate) mod windows;
 
 use std::collections::BTreeMap;
 use std::io;
+use std::sync::Arc;
 
 use self::assemble::{Traffic, assemble};
 use self::liveness::{Extent, Liveness};
@@ -23,9 +24,10 @@ use self::values::Values;
 use self::windows::Windows;
 use super::{Elements, Graph, NodeId};
 use crate::base::error::Result;
-use crate::base::notice::Notices;
+use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
+use crate::evidence::code::Code;
 use crate::evidence::collector::{Collected, spool_error};
 use crate::evidence::proof::{Key, Proof, Validity};
 use crate::evidence::topology::Topology;
@@ -40,6 +42,8 @@ pub struct Options {
     pub roles: bool,
     /// Nodes and edges that the user knows of.
     pub topology: Topology,
+    /// What source code declares.
+    pub code: Option<Arc<Code>>,
 }
 
 /// The graphs of a mission.
@@ -77,11 +81,13 @@ struct Builder<'a> {
     rates: Traffic,
     restarts: Restarts,
     values: Values,
+    /// What is worth saying about what was proved.
+    notices: Vec<Notice>,
 }
 
 impl<'a> Builder<'a> {
     fn new(collected: &mut Collected, windows: &'a [Span], options: &Options) -> io::Result<Self> {
-        let (proofs, values) = prove(collected, options)?;
+        let (proofs, values, notices) = prove(collected, options)?;
         let start = collected.span.map_or(Stamp(0), |s| s.start);
         let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
         Ok(Self {
@@ -92,6 +98,7 @@ impl<'a> Builder<'a> {
             rates: BTreeMap::new(),
             restarts: Restarts::new(),
             values,
+            notices,
         })
     }
 
@@ -108,7 +115,9 @@ impl<'a> Builder<'a> {
                 grace: options.grace,
             },
         );
+        let notices = std::mem::take(&mut self.notices);
         let mut built = self.assemble(collected);
+        built.notices.extend(notices);
         built
             .notices
             .extend(options.topology.notices.iter().cloned());

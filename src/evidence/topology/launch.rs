@@ -72,7 +72,6 @@ pub(super) fn read(path: &Path, tree: &Tree) -> Result<Topology> {
     Ok(reader.topology)
 }
 
-#[allow(dead_code, reason = "readers of source code need it")]
 /// Every node that a launch file may start by itself, without what it includes, whatever its conditions say.
 pub(crate) fn nodes(path: &Path, tree: &Tree) -> Vec<LaunchedNode> {
     let mut reader = Launch::new(Undecided::Taken);

@@ -6,8 +6,10 @@ use std::io;
 use super::Options;
 use super::roles::role;
 use super::values::Values;
+use crate::base::notice::Notice;
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
+use crate::evidence::code::matching;
 use crate::evidence::collector::Collected;
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
 use crate::evidence::times::Stamps;
@@ -18,7 +20,7 @@ use crate::evidence::{Degree, EvidenceLine, SOURCES};
 pub(crate) fn prove(
     collected: &mut Collected,
     options: &Options,
-) -> io::Result<(Vec<Proof>, Values)> {
+) -> io::Result<(Vec<Proof>, Values, Vec<Notice>)> {
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
     let mut known = Findings::new(&collected.streams, &mut collected.facts, end);
@@ -31,6 +33,8 @@ pub(crate) fn prove(
     for entry in &options.topology.entries {
         told(&mut known, entry, (start, end));
     }
+    let code = options.code.as_ref();
+    let notices = code.map_or(Vec::new(), |code| matching::conclude(code, &mut known));
     explain(&mut known, &collected.messages);
     if let Some(error) = known.failed {
         return Err(error);
@@ -54,7 +58,7 @@ pub(crate) fn prove(
         stream.speaker = stream.publisher.map(role);
     }
     let values = Values::new(&mut collected.facts, role)?;
-    Ok((proofs, values))
+    Ok((proofs, values, notices))
 }
 
 /// Puts into words what rests on no single message, for elements that somebody asked about.
@@ -74,6 +78,10 @@ fn explain(known: &mut Findings<'_>, messages: &Stamps) {
         ) else {
             continue;
         };
+        // The place in the code says more.
+        if source.word.starts_with("source") {
+            continue;
+        }
         let (time, text) = match &proof.when {
             Validity::Messages(at) | Validity::First(at) => {
                 let times = known.streams[*at].times;
