@@ -19,7 +19,9 @@ fn bag(topics: &[(&str, &str)], nodes: &[&str]) -> Vec<u8> {
     bag.publishers[rosout].definition = definition("rcl_interfaces/msg/Log");
     for node in nodes {
         let name = node.trim_start_matches('/').replace('/', ".");
-        for second in 0..10 {
+        // A node of this name starts in the middle.
+        let first = if name.ends_with("late") { 5 } else { 0 };
+        for second in first..10 {
             let at = ORIGIN + second * 1_000_000_000;
             let log = Cdr::default().time(at).u8(20).text(&name).text("up");
             let log = log.text("x.cpp").text("f").u32(1).done();
@@ -392,6 +394,129 @@ fn a_hostile_repository_does_nothing() {
     }
     assert_eq!(edges(folder.path(), &[]), set(&["/n -> /out"]));
     assert!(!folder.path().join("sprung").exists(), "something was run");
+}
+
+/// What `info` says with the workspace, on both streams.
+fn said(folder: &Path, more: &[&str]) -> String {
+    let output = bagreel(
+        folder,
+        &[&["info", "run.mcap", "--source", "ws"], more].concat(),
+    );
+    assert!(output.status.success());
+    [output.stdout, output.stderr]
+        .map(|text| String::from_utf8_lossy(&text).into_owned())
+        .concat()
+}
+
+#[test]
+fn the_only_place_that_can_be_meant_is_inferred_when_asked_for() {
+    let folder = folder(
+        &[("/out", STRING), ("/in", STRING)],
+        &[],
+        &[PACKAGE, ("p/p/talker.py", &node("talker", "out", "in"))],
+    );
+    assert_eq!(edges(folder.path(), &[]), set(&[]));
+    let text = said(folder.path(), &[]);
+    assert!(
+        text.contains(
+            "/talker publishes /out (p/p/talker.py:5  create_publisher(String, 'out', 1))"
+        ),
+        "{text}"
+    );
+    assert!(
+        text.contains("`--infer source` draws it") && text.contains("2 places not drawn"),
+        "{text}"
+    );
+    let inferred = set(&["/talker ? -> /out", "/in -> /talker ?"]);
+    assert_eq!(edges(folder.path(), &["--infer", "source"]), inferred);
+    let text = said(folder.path(), &["--infer", "source"]);
+    assert!(
+        text.contains("0 nodes, 0 publications, 0 subscriptions"),
+        "{text}"
+    );
+    let events = bagreel(
+        folder.path(),
+        &[
+            "events", "run.mcap", "--source", "ws", "--infer", "source", "-p", "1",
+        ],
+    );
+    assert!(
+        !String::from_utf8_lossy(&events.stdout).contains("talker"),
+        "{events:?}"
+    );
+}
+
+#[test]
+fn what_speaks_against_a_place_is_told() {
+    let logging = node("talker", "out", "in").replace(
+        "        self.create_pub",
+        "        self.get_logger().info('x')\n        self.create_pub",
+    );
+    let many = node("talker", "out", "in")
+        + &"        self.create_publisher(String, 'x', 1)\n".replace('x', "y");
+    let many = many.replace("def main", "class M(Node):\n    def __init__(self):\n        super().__init__('m')\n        self.create_publisher(String, 'out', 1)\n\ndef main");
+    let few = node("talker", "out", "gone").replace(
+        "\n\ndef",
+        "\n        self.create_publisher(String, 'more', 1)\n\ndef",
+    );
+    for (nodes, code, says) in [
+        (&["/other"][..], &logging, "its node would have logged"),
+        (&[], &many, "several places can be meant"),
+        (&[], &few, "most of its node's topics are not in the bag"),
+    ] {
+        let folder = folder(
+            &[("/out", STRING), ("/in", STRING)],
+            nodes,
+            &[PACKAGE, ("p/p/talker.py", code)],
+        );
+        let found = edges(folder.path(), &["--infer", "source"]);
+        assert!(!found.contains("/talker ? -> /out"), "{says}: {found:?}");
+        let text = said(folder.path(), &["--infer", "source"]);
+        assert!(text.contains(says), "{says}: {text}");
+    }
+}
+
+#[test]
+fn what_else_the_code_tells_is_listed() {
+    let code =
+        node("talker", "out", "in") + &node("talker", "lost", "x").replace("class N", "class O(N)");
+    let code = code.replace("class O(N)(Node)", "class O(N)");
+    let folder = folder(
+        &[("/out", STRING), ("/in", "std_msgs/msg/Int8")],
+        &["/talker", "/stranger"],
+        &[PACKAGE, ("p/p/talker.py", &code)],
+    );
+    let text = said(folder.path(), &[]);
+    for says in [
+        "no code was found for /stranger",
+        "/in is std_msgs/Int8 in the bag and std_msgs/String in the code of /talker (p/p/talker.py:6)",
+        "/talker publishes /lost by its code (p/p/talker.py:14), which is not recorded: record it too",
+    ] {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+}
+
+#[test]
+fn events_do_not_tell_what_only_the_code_says() {
+    let folder = folder(
+        &[("/out", STRING), ("/in", STRING)],
+        &["/talker_late"],
+        &[
+            PACKAGE,
+            ("p/p/talker.py", &node("talker_late", "out", "in")),
+        ],
+    );
+    assert_eq!(edges(folder.path(), &[]).len(), 2);
+    let events = bagreel(
+        folder.path(),
+        &["events", "run.mcap", "--source", "ws", "-p", "1"],
+    );
+    let text = String::from_utf8_lossy(&events.stdout).into_owned();
+    assert!(text.contains("/talker_late"), "{text}");
+    assert!(
+        !text.contains("publishes") && !text.contains("subscribes"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod declaration;
 mod files;
 mod git;
 pub(crate) mod matching;
+mod only;
 mod packages;
 mod python;
 mod texts;
@@ -23,7 +24,7 @@ use crate::base::time::Stamp;
 use crate::evidence::topology::launch;
 use declaration::FileCode;
 use files::{FileKind, Files, SourceFile};
-use workspace::{Instance, Workspace};
+use workspace::{Instance, Placed, Workspace};
 
 /// Which code to read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,6 +53,8 @@ pub enum Version {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Code {
     instances: Vec<Instance>,
+    /// Every place in the code that declares something.
+    places: Vec<Placed>,
     files: usize,
     packages: usize,
     /// Which commit was read, in words.
@@ -88,6 +91,7 @@ pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
     let workspace = workspace(&files);
     Ok(Code {
         instances: workspace.instances(),
+        places: workspace.places(),
         files: files.list.len(),
         packages: workspace.packages.len(),
         version,

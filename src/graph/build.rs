@@ -24,10 +24,10 @@ use self::values::Values;
 use self::windows::Windows;
 use super::{Elements, Graph, NodeId};
 use crate::base::error::Result;
-use crate::base::notice::{Notice, Notices};
+use crate::base::notice::Notices;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
-use crate::evidence::code::Code;
+use crate::evidence::code::{Code, matching};
 use crate::evidence::collector::{Collected, spool_error};
 use crate::evidence::proof::{Key, Proof, Validity};
 use crate::evidence::topology::Topology;
@@ -59,6 +59,8 @@ pub struct Built {
     pub restarts: Vec<(NodeId, Stamp)>,
     /// What went wrong without stopping us.
     pub notices: Notices,
+    /// What source code offers and was not drawn, a line each.
+    pub undrawn: Vec<String>,
 }
 
 /// Builds the graph of each window. Windows are sorted by start, none inside another; they may overlap.
@@ -81,13 +83,13 @@ struct Builder<'a> {
     rates: Traffic,
     restarts: Restarts,
     values: Values,
-    /// What is worth saying about what was proved.
-    notices: Vec<Notice>,
+    /// What source code told.
+    code: matching::Outcome,
 }
 
 impl<'a> Builder<'a> {
     fn new(collected: &mut Collected, windows: &'a [Span], options: &Options) -> io::Result<Self> {
-        let (proofs, values, notices) = prove(collected, options)?;
+        let (proofs, values, code) = prove(collected, options)?;
         let start = collected.span.map_or(Stamp(0), |s| s.start);
         let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
         Ok(Self {
@@ -98,7 +100,7 @@ impl<'a> Builder<'a> {
             rates: BTreeMap::new(),
             restarts: Restarts::new(),
             values,
-            notices,
+            code,
         })
     }
 
@@ -115,9 +117,10 @@ impl<'a> Builder<'a> {
                 grace: options.grace,
             },
         );
-        let notices = std::mem::take(&mut self.notices);
+        let code = std::mem::take(&mut self.code);
         let mut built = self.assemble(collected);
-        built.notices.extend(notices);
+        built.notices.extend(code.notices);
+        built.undrawn = code.undrawn;
         built
             .notices
             .extend(options.topology.notices.iter().cloned());

@@ -47,6 +47,8 @@ pub struct Info {
     pub nodes: Vec<NodeInfo>,
     /// What would have told more, and how to record it; empty if nothing is missing.
     pub advice: Vec<String>,
+    /// What source code offers and was not drawn, and what else it tells; a line each.
+    pub undrawn: Vec<String>,
     /// What went wrong without stopping us.
     pub notices: Vec<String>,
 }
@@ -185,14 +187,21 @@ pub fn info(mission: &Mission) -> Info {
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: counted(&best.nodes),
-        publishes_by_degree: counted(&best.publishes),
-        subscribes_by_degree: counted(&best.subscribes),
+        nodes_by_degree: counted(&best.nodes, elements.nodes.iter().map(|e| e.evidence)),
+        publishes_by_degree: counted(
+            &best.publishes,
+            elements.publishes.iter().map(|e| e.evidence),
+        ),
+        subscribes_by_degree: counted(
+            &best.subscribes,
+            elements.subscribes.iter().map(|e| e.evidence),
+        ),
         topics_without_subscriber: silent_ears,
         evidence: evidence(mission),
         nodes: nodes.collect(),
         topics,
         advice: advice(mission, silent_ears),
+        undrawn: mission.undrawn.clone(),
         notices: mission.notices.iter().map(|n| n.text).collect(),
     }
 }
@@ -255,9 +264,11 @@ fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
-fn counted(degrees: &[Degree]) -> Degrees {
+/// How many elements are known how well, without those that only might be meant by the code.
+fn counted(degrees: &[Degree], evidence: impl Iterator<Item = Evidence>) -> Degrees {
+    let guessed = Evidence::of("source_only");
     let mut all = Degrees::default();
-    for degree in degrees {
+    for (degree, _) in degrees.iter().zip(evidence).filter(|(_, e)| *e != guessed) {
         all.add(*degree);
     }
     all

@@ -278,6 +278,7 @@ fn graphs(
         windows: list,
         ledger: crate::mission::Ledger::default(),
         activity: Activity::default(),
+        undrawn: built.undrawn,
         layout: None,
         notices,
     };

@@ -8,36 +8,47 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Code;
 use super::declaration::{Role, type_key};
+use super::only;
 use super::workspace::{Instance, Placed};
 use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::words::{count, some_of};
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Degree, EvidenceLine, Name, SourceId};
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
 
 /// An edge that the code declares for a node of the bag.
 #[derive(Clone, Debug)]
-struct Match<'a> {
-    role: Role,
-    topic: Name,
-    instance: &'a Instance,
-    placed: &'a Placed,
+pub(super) struct Match<'a> {
+    pub(super) role: Role,
+    pub(super) topic: Name,
+    pub(super) instance: &'a Instance,
+    pub(super) placed: &'a Placed,
 }
 
 /// The topics of the bag.
-struct Recorded {
+pub(super) struct Recorded {
     /// By name: the topic and its types.
     topics: BTreeMap<String, (Name, BTreeSet<String>)>,
     /// Topics whose messages name their publishers.
-    told: BTreeSet<Name>,
+    pub(super) told: BTreeSet<Name>,
     /// What is known already, by more than a declaration.
     proved: BTreeSet<Key>,
     /// How many publishers each topic was offered by, where that was recorded.
     offered: BTreeMap<Name, usize>,
 }
 
-/// Adds what the code says of the nodes that the bag names; tells in words how much that was.
-pub(crate) fn conclude(code: &Code, known: &mut Findings<'_>) -> Vec<Notice> {
+/// What came of reading the code.
+#[derive(Debug, Default)]
+pub(crate) struct Outcome {
+    /// How much was read and found.
+    pub(crate) notices: Vec<Notice>,
+    /// Places in the code that may belong to the bag and were not drawn, and what else is worth knowing; a line each.
+    pub(crate) undrawn: Vec<String>,
+}
+
+/// Adds what the code says of the nodes that the bag names, and the only places that can be meant if asked for.
+pub(crate) fn conclude(code: &Code, known: &mut Findings<'_>) -> Outcome {
     let recorded = Recorded::of(known);
     let named = named(known);
     let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
@@ -48,29 +59,137 @@ pub(crate) fn conclude(code: &Code, known: &mut Findings<'_>) -> Vec<Notice> {
             .push(instance);
     }
     let (mut edges, mut nodes) = (0, 0);
+    let mut explained = BTreeSet::new();
+    let (mut remarks, mut without) = (BTreeSet::new(), Vec::new());
     for (text, (node, words)) in &named {
         let candidates = by_name
             .get(last_part(text))
             .or_else(|| by_name.get(without_numbers(last_part(text))));
-        let matches = best(candidates.map_or(&[][..], Vec::as_slice), text, &recorded);
+        let Some(candidates) = candidates else {
+            without.push(text.clone());
+            continue;
+        };
+        let matches = best(candidates, text, &recorded);
         let mut drawn = 0;
-        for found in matches {
-            drawn += usize::from(draw(code, known, &recorded, (*node, words), &found));
+        for found in &matches {
+            drawn += usize::from(draw(code, known, &recorded, (*node, words), found));
+            explained.insert(found.instance.program.clone());
+        }
+        if let Some(found) = matches.first() {
+            remarks.extend(remarks_on(found.instance, text, &recorded));
         }
         edges += drawn;
         nodes += usize::from(drawn > 0);
     }
+    let names = named.keys().cloned().collect();
+    let logged = named.values().any(|(_, words)| words.contains("rosout"));
+    let bag = only::Bag {
+        recorded: &recorded,
+        explained: &explained,
+        named: &names,
+        logged,
+    };
+    let (inferred, undrawn) = only::conclude(code, known, &bag);
+    let mut notices = code.notices.clone();
+    notices.push(summary(code, (edges, nodes), inferred, &undrawn));
+    let mut lines: Vec<String> = undrawn
+        .iter()
+        .map(|(reason, text)| format!("{text}: {}", reason.words()))
+        .collect();
+    lines.extend(remarks);
+    if !without.is_empty() && !code.instances.is_empty() {
+        lines.push(format!(
+            "no code was found for {}",
+            some_of(&without, MOST_NAMES)
+        ));
+    }
+    Outcome {
+        notices,
+        undrawn: lines,
+    }
+}
+
+/// How many nodes without code are named.
+const MOST_NAMES: usize = 8;
+
+/// `412 files of 6 packages read (code of …); 22 edges for 4 named nodes; 6 places not drawn (4: …, 2: …)`
+fn summary(
+    code: &Code,
+    (edges, nodes): (usize, usize),
+    inferred: usize,
+    undrawn: &only::Undrawn,
+) -> Notice {
     let version = code
         .version
         .as_ref()
         .map_or(String::new(), |v| format!(" ({v})"));
-    let text = format!(
-        "{} files of {} packages read{version}; {edges} edges for {nodes} named nodes",
-        code.files, code.packages
+    let mut text = format!(
+        "{} of {} read{version}; {} for {}",
+        count(code.files, "file"),
+        count(code.packages, "package"),
+        count(edges, "edge"),
+        count(nodes, "named node")
     );
-    let mut notices = code.notices.clone();
-    notices.push(Notice::new(NoticeKind::Note, text));
-    notices
+    if inferred > 0 {
+        text.extend(["; ", &count(inferred, "inferred edge")]);
+    }
+    if !undrawn.is_empty() {
+        let mut reasons: BTreeMap<only::Reason, usize> = BTreeMap::new();
+        for (reason, _) in undrawn {
+            *reasons.entry(*reason).or_default() += 1;
+        }
+        let reasons: Vec<String> = reasons
+            .iter()
+            .map(|(r, n)| format!("{n}: {}", r.words()))
+            .collect();
+        text.extend([
+            "; ",
+            &count(undrawn.len(), "place"),
+            " not drawn (",
+            &reasons.join(", "),
+            ")",
+        ]);
+        text.push_str("; `bagreel info --source` lists them");
+    }
+    Notice::new(NoticeKind::Note, text)
+}
+
+/// What is worth knowing about the code of a node that ran: topics that it names and the bag lacks, or has with another
+/// type.
+fn remarks_on(instance: &Instance, node: &str, recorded: &Recorded) -> Vec<String> {
+    let remark = |placed: &Placed| {
+        let declaration = &placed.declaration;
+        let name = remapped(
+            &resolved(node, declaration.topic.as_ref()?),
+            node,
+            &instance.remaps,
+        );
+        let place = format!("{}:{}", placed.path, declaration.line);
+        let types = declaration.types.join(" or ");
+        match recorded.topics.get(&name) {
+            None => {
+                let does = if declaration.role == Role::Publishes {
+                    "publishes"
+                } else {
+                    "subscribes"
+                };
+                Some(format!(
+                    "{node} {does} {name} by its code ({place}), which is not recorded: record it too"
+                ))
+            }
+            Some((_, kinds))
+                if !types.is_empty() && !declaration.types.iter().any(|t| kinds.contains(t)) =>
+            {
+                let kinds: Vec<&str> = kinds.iter().map(String::as_str).collect();
+                Some(format!(
+                    "{name} is {} in the bag and {types} in the code of {node} ({place})",
+                    kinds.join(" and ")
+                ))
+            }
+            Some(_) => None,
+        }
+    };
+    instance.declared.iter().filter_map(remark).collect()
 }
 
 impl Recorded {
@@ -106,7 +225,7 @@ impl Recorded {
     }
 
     /// The recorded topic of this name, if one of the types is its own.
-    fn topic(&self, name: &str, types: &[String]) -> Option<Name> {
+    pub(super) fn topic(&self, name: &str, types: &[String]) -> Option<Name> {
         let (topic, recorded) = self.topics.get(name)?;
         types.iter().any(|t| recorded.contains(t)).then_some(*topic)
     }
@@ -164,7 +283,11 @@ fn best<'a>(candidates: &[&'a Instance], node: &str, recorded: &Recorded) -> Vec
 }
 
 /// The edges of an instance that the bag's topics bear out, if it ran under this name; one per role and topic.
-fn matches<'a>(instance: &'a Instance, node: &str, recorded: &Recorded) -> Vec<Match<'a>> {
+pub(super) fn matches<'a>(
+    instance: &'a Instance,
+    node: &str,
+    recorded: &Recorded,
+) -> Vec<Match<'a>> {
     let mut found: Vec<Match<'a>> = Vec::new();
     for placed in instance.declared.iter() {
         let Some(written) = &placed.declaration.topic else {
@@ -187,7 +310,7 @@ fn matches<'a>(instance: &'a Instance, node: &str, recorded: &Recorded) -> Vec<M
 }
 
 /// The full name of a topic that a node of this name writes so.
-fn resolved(node: &str, topic: &str) -> String {
+pub(super) fn resolved(node: &str, topic: &str) -> String {
     let joined = match (topic.strip_prefix('/'), topic.strip_prefix('~')) {
         (Some(absolute), _) => format!("/{absolute}"),
         (_, Some(private)) => format!("{node}/{private}"),
@@ -272,6 +395,6 @@ fn sentence(code: &Code, found: &Match<'_>, words: &BTreeSet<&str>) -> String {
 }
 
 /// The place of a source in the table.
-fn row(word: &str) -> SourceId {
+pub(super) fn row(word: &str) -> SourceId {
     SOURCES.iter().position(|s| s.word == word).unwrap_or(0)
 }

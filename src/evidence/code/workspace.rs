@@ -112,6 +112,19 @@ impl Workspace {
         all
     }
 
+    /// Every declaration of files that are no tests, whoever it belongs to.
+    pub(super) fn places(&self) -> Vec<Placed> {
+        let files = self.files.iter().filter(|file| !is_test(&file.path));
+        let declared = files.flat_map(|file| {
+            let all = file.code.classes.iter().flat_map(|c| &c.declarations);
+            all.map(|declaration| Placed {
+                path: file.path.clone(),
+                declaration: declaration.clone(),
+            })
+        });
+        declared.collect()
+    }
+
     /// Every node that may be started, as written and as launched.
     pub(super) fn instances(&self) -> Vec<Instance> {
         let mut all = Vec::new();

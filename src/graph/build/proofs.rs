@@ -6,7 +6,6 @@ use std::io;
 use super::Options;
 use super::roles::role;
 use super::values::Values;
-use crate::base::notice::Notice;
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::code::matching;
@@ -20,7 +19,7 @@ use crate::evidence::{Degree, EvidenceLine, SOURCES};
 pub(crate) fn prove(
     collected: &mut Collected,
     options: &Options,
-) -> io::Result<(Vec<Proof>, Values, Vec<Notice>)> {
+) -> io::Result<(Vec<Proof>, Values, matching::Outcome)> {
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
     let mut known = Findings::new(&collected.streams, &mut collected.facts, end);
@@ -34,7 +33,7 @@ pub(crate) fn prove(
         told(&mut known, entry, (start, end));
     }
     let code = options.code.as_ref();
-    let notices = code.map_or(Vec::new(), |code| matching::conclude(code, &mut known));
+    let told_by_code = code.map(|code| matching::conclude(code, &mut known));
     explain(&mut known, &collected.messages);
     if let Some(error) = known.failed {
         return Err(error);
@@ -58,7 +57,7 @@ pub(crate) fn prove(
         stream.speaker = stream.publisher.map(role);
     }
     let values = Values::new(&mut collected.facts, role)?;
-    Ok((proofs, values, notices))
+    Ok((proofs, values, told_by_code.unwrap_or_default()))
 }
 
 /// Puts into words what rests on no single message, for elements that somebody asked about.
