@@ -81,12 +81,12 @@ pub(crate) fn conclude(code: &Code, known: &mut Findings<'_>) -> Outcome {
         edges += drawn;
         nodes += usize::from(drawn > 0);
     }
-    let names = named.keys().cloned().collect();
+    let known_nodes = named.keys().cloned().collect();
     let logged = named.values().any(|(_, words)| words.contains("rosout"));
     let bag = only::Bag {
         recorded: &recorded,
         explained: &explained,
-        named: &names,
+        named: &known_nodes,
         logged,
     };
     let (inferred, undrawn) = only::conclude(code, known, &bag);

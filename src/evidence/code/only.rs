@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Code;
 use super::declaration::Role;
 use super::matching::{Match, Recorded, matches, resolved, row};
-use super::workspace::Instance;
+use super::workspace::{Instance, Placed};
 use crate::evidence::claim::{Degree, EvidenceLine, Name};
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
 use crate::evidence::topology::launch::join;
@@ -138,30 +138,24 @@ fn places<'a>(
     recorded: &Recorded,
     candidates: &[Candidate<'a>],
 ) -> BTreeMap<(Role, Name), BTreeSet<(&'a str, usize)>> {
-    let mut places: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
-    for candidate in candidates {
-        let placed = candidate.found.placed;
-        let edge = (candidate.found.role, candidate.found.topic);
-        places
-            .entry(edge)
+    let mut all: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
+    for Candidate { found, .. } in candidates {
+        let place = (found.placed.path.as_str(), found.placed.declaration.line);
+        all.entry((found.role, found.topic))
             .or_default()
-            .insert((placed.path.as_str(), placed.declaration.line));
+            .insert(place);
     }
-    for placed in &code.places {
-        let declaration = &placed.declaration;
-        let name = declaration
-            .topic
-            .as_ref()
-            .map(|topic| resolved("/node", topic));
+    for Placed { path, declaration } in &code.places {
+        let topic = declaration.topic.as_ref();
+        let name = topic.map(|topic| resolved("/node", topic));
         if let Some(topic) = name.and_then(|name| recorded.topic(&name, &declaration.types)) {
             let edge = (declaration.role, topic);
-            places
-                .entry(edge)
+            all.entry(edge)
                 .or_default()
-                .insert((placed.path.as_str(), declaration.line));
+                .insert((path.as_str(), declaration.line));
         }
     }
-    places
+    all
 }
 
 /// The launch files that explain most edges.
