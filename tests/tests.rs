@@ -13,6 +13,7 @@ mod cli;
 mod docs;
 mod encode;
 mod evidence;
+mod hostile;
 mod layout;
 mod pages;
 mod phases;
