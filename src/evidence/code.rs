@@ -21,6 +21,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::base::error::Result;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
+use crate::base::words;
 use crate::evidence::topology::launch;
 use declaration::FileCode;
 use files::{FileKind, Files, SourceFile};
@@ -81,10 +82,10 @@ pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
     };
     if files.is_cut {
         let text = format!(
-            "`{}` holds more than {} files or {} MB of source code; the rest was not read",
+            "`{}` holds more than {} or {} of source code; the rest was not read",
             wanted.folder.display(),
-            files::MOST_FILES,
-            files::MOST_BYTES >> 20
+            words::count(files::MOST_FILES, "file"),
+            words::bytes(files::MOST_BYTES as u64)
         );
         notices.push(Notice::new(NoticeKind::Note, text));
     }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::base::words;
+
 /// What a node does with a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Role {
@@ -210,11 +212,8 @@ pub(crate) fn type_key(type_name: &str) -> String {
     }
 }
 
-/// A text on one line, cut where it is long; what is inside brackets of a call may span lines.
+/// A text on one line, cut where it is long; a call may span lines.
 pub(super) fn short(text: &str) -> String {
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    match words.char_indices().nth(100) {
-        Some((at, _)) => format!("{}…", &words[..at]),
-        None => words,
-    }
+    words::shorten(&words, 100).into_owned()
 }

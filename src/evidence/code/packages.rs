@@ -86,15 +86,19 @@ fn entry_points(text: &str, folder: &str) -> Vec<(String, Program)> {
 /// The most variables and sources of a `CMakeLists.txt` that are kept.
 const MOST: usize = 10_000;
 
+/// The most text that the variables of a `CMakeLists.txt` may grow to, in bytes.
+const MOST_TEXT: usize = 4 << 20;
+
 /// The executables that a `CMakeLists.txt` makes.
 fn cmake(file: &SourceFile, package: &str, paths: &[&str]) -> Vec<(String, Program)> {
     let here = folder(&file.path);
     let mut variables = BTreeMap::from([("PROJECT_NAME".to_owned(), package.to_owned())]);
     let mut programs = Vec::new();
+    let mut left = MOST_TEXT;
     for (command, words) in commands(&file.text) {
         let words: Vec<String> = words
             .iter()
-            .flat_map(|w| put_in(w, &variables))
+            .flat_map(|w| put_in(w, &variables, &mut left))
             .take(MOST)
             .collect();
         let (Some(first), rest) = (words.first(), words.get(1..).unwrap_or_default()) else {
@@ -172,7 +176,7 @@ fn glob(pattern: &str, here: &str, paths: &[&str]) -> Vec<String> {
 }
 
 /// A word with its variables put in, lists taken apart; what is not known stays as written.
-fn put_in(word: &str, variables: &BTreeMap<String, String>) -> Vec<String> {
+fn put_in(word: &str, variables: &BTreeMap<String, String>, left: &mut usize) -> Vec<String> {
     let mut done = String::new();
     let mut rest = word;
     while let Some((before, after)) = rest.split_once("${") {
@@ -181,7 +185,10 @@ fn put_in(word: &str, variables: &BTreeMap<String, String>) -> Vec<String> {
         };
         done.push_str(before);
         match variables.get(name) {
-            Some(value) if done.len() + value.len() < MOST * 10 => done.push_str(value),
+            Some(value) if value.len() <= *left => {
+                *left -= value.len();
+                done.push_str(value);
+            }
             _ => done.extend(["${", name, "}"]),
         }
         rest = behind;

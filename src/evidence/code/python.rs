@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use super::declaration::{Call, Class, FileCode, Made, short, type_of};
-use super::texts::{DEEPEST, LONGEST, MOST_WORK, Texts};
+use super::texts::{DEEPEST, LONGEST, Texts, most_work};
 use crate::evidence::syntax::{Language, Node, Parsed, children, line, walk};
 
 /// Reads a file; nothing for one that is too tangled.
@@ -322,7 +322,7 @@ impl<'a> Reader<'a> {
     /// The text that an expression stands for.
     fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
         self.work.set(self.work.get() + 1);
-        if depth > DEEPEST || self.work.get() > MOST_WORK {
+        if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {
             return None;
         }
         let field = |name| node.child_by_field_name(name);

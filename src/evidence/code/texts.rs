@@ -10,8 +10,11 @@ pub(super) const LONGEST: usize = 1000;
 /// Names that stand for names further than this are not followed.
 pub(super) const DEEPEST: usize = 8;
 
-/// The most expressions of a file that are looked at for their texts: far more than any file written by hand has.
-pub(super) const MOST_WORK: usize = 1 << 20;
+/// The most expressions that are looked at for the texts of a file of this many bytes: code written by hand needs a
+/// tenth, and whoever lets names stand for each other over and over gets no further than in reading the file.
+pub(super) fn most_work(bytes: usize) -> usize {
+    1000 + bytes
+}
 
 /// Names with the expressions that they are given; a name that is given several is not known.
 #[derive(Debug, Default)]

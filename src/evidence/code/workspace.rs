@@ -73,6 +73,16 @@ const NODES: &[&str] = &["LifecycleNode", "ManagedNode", "Node", "Nodelet"];
 /// The most parts that one node may be made of.
 const MOST_PARTS: usize = 300;
 
+/// The most declarations of one node, and of all nodes together: a hundred times what the largest robots have.
+const MOST_DECLARED: usize = 1000;
+const MOST_OF_ALL: usize = 500_000;
+
+/// A name of more classes than this says nothing outside its own file.
+const MOST_NAMESAKES: usize = 500;
+
+/// The most programs that launch files may start.
+const MOST_PROGRAMS: usize = 5_000;
+
 /// The most nodes that a workspace may start.
 const MOST_INSTANCES: usize = 20_000;
 
@@ -128,7 +138,11 @@ impl Workspace {
     /// Every node that may be started, as written and as launched.
     pub(super) fn instances(&self) -> Vec<Instance> {
         let mut all = Vec::new();
+        let mut declared = 0;
         for (file, code) in self.files.iter().enumerate() {
+            if declared > MOST_OF_ALL || all.len() > MOST_INSTANCES {
+                break;
+            }
             let mut nodes: Vec<CodeNode> = self.free_node(&[file]).into_iter().collect();
             let given = code.code.classes.iter().flat_map(|c| &c.mentions);
             let given: BTreeMap<&str, &String> = given
@@ -151,6 +165,7 @@ impl Workspace {
                 }
             }
             for node in nodes {
+                declared += node.declared.len();
                 all.extend(node.names.iter().map(|name| as_written(&node, name)));
             }
         }
@@ -162,7 +177,7 @@ impl Workspace {
                     .entry(key)
                     .or_insert_with(|| self.program(&node.package, &node.program));
                 all.extend(as_launched(path, node, nodes));
-                if all.len() > MOST_INSTANCES {
+                if all.len() > MOST_INSTANCES || programs.len() > MOST_PROGRAMS {
                     return all;
                 }
             }
@@ -282,7 +297,7 @@ impl Workspace {
             declared: if is_recorder {
                 Arc::default()
             } else {
-                parts.iter().flat_map(placed).collect()
+                parts.iter().flat_map(placed).take(MOST_DECLARED).collect()
             },
             logs: parts.iter().any(|part| self.class(*part).logs),
         }
@@ -323,6 +338,15 @@ impl Workspace {
         let Some(all) = self.by_name.get(name) else {
             return Vec::new();
         };
+        if all.len() > MOST_NAMESAKES {
+            let from = all.partition_point(|part| part.0 < file);
+            let own = all[from..].iter().take_while(|part| part.0 == file);
+            return own
+                .copied()
+                .filter(|p| self.class(*p).is_defined)
+                .take(1)
+                .collect();
+        }
         let defined = || all.iter().copied().filter(|p| self.class(*p).is_defined);
         let here = &self.files[file];
         let import = here

@@ -1,6 +1,6 @@
 //! The texts that expressions of C++ stand for: literals, constants, members, defaults of parameters.
 
-use super::super::texts::{DEEPEST, LONGEST, MOST_WORK};
+use super::super::texts::{DEEPEST, LONGEST, most_work};
 use super::Reader;
 use super::made::Callee;
 use crate::evidence::syntax::{Node, children};
@@ -20,7 +20,7 @@ impl<'a> Reader<'a> {
     /// The text that an expression stands for.
     pub(super) fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
         self.work.set(self.work.get() + 1);
-        if depth > DEEPEST || self.work.get() > MOST_WORK {
+        if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {
             return None;
         }
         let again = |node| {
