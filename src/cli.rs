@@ -16,6 +16,7 @@ use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::{budget, file};
 use crate::cli::terminal::Terminal;
+use crate::evidence::code::{SourceCode, Version};
 use crate::evidence::collector;
 use crate::evidence::topology;
 use crate::export::Output;
@@ -123,9 +124,36 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
             grace: graph.grace.unwrap_or(0) as usize,
             roles: graph.roles,
             topology: topology::read_all(&graph.topology)?,
+            code: None,
         },
+        code: source_code(graph)?,
         rate_change: graph.rate_change,
     })
+}
+
+/// Which source code to read, if any.
+fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
+    let infers = graph.infer.iter().any(|word| word == "source");
+    let Some(folder) = graph.source.clone() else {
+        return if infers {
+            Err(Error::usage(
+                "`--infer source` has no source code to read",
+                "add `--source DIR`, a workspace or repository",
+            ))
+        } else {
+            Ok(None)
+        };
+    };
+    let version = match graph.source_at.as_deref() {
+        None => Version::Recording,
+        Some("worktree") => Version::Worktree,
+        Some(commit) => Version::Commit(commit.to_owned()),
+    };
+    Ok(Some(SourceCode {
+        folder,
+        version,
+        infers,
+    }))
 }
 
 fn input(path: &Path) -> Input {

@@ -33,7 +33,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
         &["kinds", "proof"],
-        &["publishers", "source"],
+        &["code", "publishers", "source"],
         &["collector"],
     ]),
     ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),

@@ -53,6 +53,7 @@ fn mission(windows: usize) -> (Mission, View) {
     let second = |i: usize| Stamp(i64::try_from(i).unwrap() * 1_000_000_000);
     let period = Period::parse("1s").unwrap();
     let mission = Mission {
+        undrawn: Vec::new(),
         bags: Vec::new(),
         span: Span {
             start: second(0),

@@ -25,6 +25,7 @@ mod properties;
 mod reading;
 mod ros2_example;
 mod story;
+mod source;
 mod support;
 mod tables;
 mod warehouse;

@@ -225,8 +225,17 @@ pub(super) struct GraphArgs {
     /// Add nodes and edges that the bag hides: CSV, YAML, DOT of rqt_graph, or a launch file.
     #[arg(long, value_name = "FILE")]
     pub(super) topology: Vec<PathBuf>,
-    /// Infer subscriptions from equal header stamps, or from equal payloads in bags larger than 64 MB too.
-    #[arg(long, value_name = "stamps,payloads", value_parser = ["stamps", "payloads"], value_delimiter = ',')]
+    /// Add what the source code in this workspace or repository declares for the nodes that the bag names; as of the
+    /// recording's day, where it is in git. Nothing is run.
+    #[arg(long, value_name = "DIR")]
+    pub(super) source: Option<PathBuf>,
+    /// The code to read, instead of the last commit before the recording's end: the newest commit, another one, or the
+    /// files as they lie.
+    #[arg(long, value_name = "HEAD|COMMIT|worktree", requires = "source")]
+    pub(super) source_at: Option<String>,
+    /// Infer subscriptions from equal header stamps, or from equal payloads in bags larger than 64 MB too; infer nodes
+    /// that the bag does not name from the only place in the source code that can be meant.
+    #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]
     pub(super) infer: Vec<String>,
     /// Read the size of every message, even where the index does not tell it.
     #[arg(long)]

@@ -52,6 +52,8 @@ pub struct Info {
     pub nodes: Vec<NodeInfo>,
     /// What would have told more, and how to record it; empty if nothing is missing.
     pub advice: Vec<String>,
+    /// What source code offers and was not drawn, and what else it tells; a line each.
+    pub undrawn: Vec<String>,
     /// What went wrong without stopping us.
     pub notices: Vec<String>,
 }
@@ -196,9 +198,13 @@ pub fn info(mission: &Mission) -> Info {
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: best.nodes.iter().copied().collect(),
-        publishes_by_degree: best.publishes.iter().copied().collect(),
+        nodes_by_degree: counted(&best.nodes, elements.nodes.iter().map(|e| e.evidence)),
+        publishes_by_degree: counted(
+            &best.publishes,
+            elements.publishes.iter().map(|e| e.evidence),
+        ),
         subscribes_by_degree: listeners(mission)
+            .filter(|(_, edge)| edge.evidence != Evidence::of("source_only"))
             .map(|(id, _)| best.subscribes[id])
             .collect(),
         topics_without_publisher: lacking(&topics, |t| t.publishers.is_empty()),
@@ -207,6 +213,7 @@ pub fn info(mission: &Mission) -> Info {
         nodes: nodes.collect(),
         topics,
         advice: Vec::new(),
+        undrawn: mission.undrawn.clone(),
         notices: mission.notices.iter().map(|n| n.text).collect(),
     };
     info.advice = advice(&info, is_ros1(mission));
@@ -298,6 +305,14 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
 /// How many topics with messages lack something.
 fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
     topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
+/// How many elements are known how well, without those that only might be meant by the code.
+fn counted(degrees: &[Degree], evidence: impl Iterator<Item = Evidence>) -> Degrees {
+    let guessed = Evidence::of("source_only");
+    let mut all = Degrees::default();
+    for (degree, _) in degrees.iter().zip(evidence).filter(|(_, e)| *e != guessed) {
+        all.add(*degree);
+    }
+    all
 }
 
 /// Messages that each node sent; `None` where no count is known.
