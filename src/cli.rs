@@ -26,11 +26,12 @@ use crate::mission::Mission;
 use crate::mission::events::{LogFormat, LogOptions, log};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::pipeline::{
-    Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey, survey_file,
+    Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
+    survey_file,
 };
 use args::{
-    Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs,
-    TimeArgs, Typed,
+    Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs,
+    RenderArgs, TimeArgs, Typed,
 };
 
 const DONE: u8 = 0;

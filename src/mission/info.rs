@@ -305,6 +305,8 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
 /// How many topics with messages lack something.
 fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
     topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
+}
+
 /// How many elements are known how well, without those that only might be meant by the code.
 fn counted(degrees: &[Degree], evidence: impl Iterator<Item = Evidence>) -> Degrees {
     let guessed = Evidence::of("source_only");
