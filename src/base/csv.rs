@@ -132,6 +132,20 @@ fn text(texts: &Texts, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result
     Ok(())
 }
 
+/// A small table as text: the names of its columns, then a row a line.
+pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = WriterBuilder::new()
+        .terminator(Terminator::Any(b'\n'))
+        .from_writer(Vec::new());
+    // Writing to memory cannot fail, and rows are as long as the head.
+    let _ = writer.write_record(columns);
+    for row in rows {
+        let _ = writer.write_record(row);
+    }
+    let bytes = writer.into_inner().unwrap_or_default();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
 /// A row with its line, 1...
 pub(crate) type Record = (usize, Vec<String>);
 

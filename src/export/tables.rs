@@ -23,28 +23,6 @@ struct Tables<'a> {
     format: TableFormat,
 }
 
-/// Whether several files can be made of this name.
-///
-/// # Errors
-/// [`Error::Usage`] for standard output, devices, and a name with `{n}`.
-pub(crate) fn check(target: &Target) -> Result<()> {
-    let what = match target {
-        Target::Stdout => "standard output is one".to_owned(),
-        Target::Path(path) if is_special(path) => format!("`{}` is one", path.display()),
-        Target::Path(_) => return target.must_be_one("the tables hold all windows"),
-    };
-    Err(Error::usage(
-        format!("a mission is several tables, {what}"),
-        "name a file: `-o x.csv` writes `x.edges.csv` and others",
-    ))
-}
-
-/// The files of all tables.
-pub(crate) fn files(target: &Target, word: &str) -> Vec<Target> {
-    let file = |table: &Table| target.with_word(table.word, word);
-    TABLES.iter().map(file).collect()
-}
-
 /// Begins the tables as CSV.
 ///
 /// # Errors

@@ -282,11 +282,6 @@ impl BestDegrees {
     }
 }
 
-/// Whether an edge belongs to a recorder or a player, which listen to everything and are no part of the robot.
-fn is_recorders(mission: &Mission, edge: &Edge) -> bool {
-    records(&mission.elements.nodes[edge.node as usize])
-}
-
 fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
