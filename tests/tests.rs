@@ -28,4 +28,5 @@ mod source;
 mod story;
 mod support;
 mod tables;
+mod telling;
 mod warehouse;
