@@ -23,7 +23,7 @@ use crate::base::error::Result;
 
 pub(crate) use deferred::open_each;
 pub(crate) use input::Place;
-pub use input::{FormatRow, Input, file_name};
+pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{head, place};
 pub use model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Tier, Want,

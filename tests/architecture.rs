@@ -16,7 +16,11 @@ const STATIONS: &[&str] = &[
 /// known to all.
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
-    ("base", &[&["words"], &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
+    ("base", &[
+        &["budget", "leftovers", "words"],
+        &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"],
+        &["file"],
+    ]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "input"],
@@ -25,7 +29,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "syntax", "times"],
+        &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
         &["kinds", "proof"],
         &["publishers", "source"],
@@ -51,7 +55,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["report", "run"],
     ]),
     ("pipeline", &[&["captions", "draw", "read"], &["export", "survey"]]),
-    ("cli", &[&["args", "terminal"], &["look"]]),
+    ("cli", &[&["args", "stop"], &["look", "terminal"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.

@@ -27,6 +27,8 @@ pub struct Render {
     pub drawing: Drawing,
     /// How the sequence runs.
     pub sequence: options::Options,
+    /// Files and folders of the user's that are read beside the inputs, and never overwritten.
+    pub kept: Vec<PathBuf>,
     /// What to write.
     pub outputs: Vec<Output>,
     /// Where mission phases come from: a file or a topic.
@@ -47,6 +49,7 @@ impl Render {
             sequence: options::Options::default(),
             outputs,
             captions: None,
+            kept: Vec::new(),
             is_filtered: false,
         })
     }
@@ -77,10 +80,11 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 /// As [`export::check`].
 pub fn check(job: &Render) -> Result<()> {
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
-        Input::Path(path) => Some(path.clone()),
+        Input::Path(path) => Some(path),
         Input::Stdin => None,
     });
-    export::check(&job.outputs, &inputs.collect::<Vec<PathBuf>>())
+    let kept: Vec<PathBuf> = inputs.chain(&job.kept).cloned().collect();
+    export::check(&job.outputs, &kept)
 }
 
 /// Draws and writes a mission that was read.

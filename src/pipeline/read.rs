@@ -1,7 +1,6 @@
 //! From bags to the evolution: read once, divide time, build the graphs, find what changed.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Stage, Watch};
@@ -9,6 +8,7 @@ use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
+use crate::base::{budget, file};
 use crate::evidence::EvidenceLine;
 use crate::evidence::collector::{self, Collected, Collector};
 use crate::graph;
@@ -71,7 +71,7 @@ pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     if reading.verify && mission_file(&reading.inputs)?.is_none() {
         watch.stage(Stage::Verify);
         let second = Recorded::read(reading, true, watch);
-        match second.and_then(|second| build(second, reading, watch)) {
+        match second.and_then(|mut second| build(&mut second, reading, watch)) {
             Ok(second) => compare(&mut mission, &second),
             Err(Error::Interrupted) => return Err(Error::Interrupted),
             Err(why) => {
@@ -93,9 +93,9 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
     if let Some(path) = mission_file(&reading.inputs)? {
         return Ok((reread(path, reading)?, Vec::new()));
     }
-    let recorded = Recorded::read(reading, false, watch)?;
-    let pieces = recorded.collected.why();
-    Ok((build(recorded, reading, watch)?, pieces))
+    let mut recorded = Recorded::read(reading, false, watch)?;
+    let mission = build(&mut recorded, reading, watch)?;
+    Ok((mission, recorded.collected.why()))
 }
 
 /// The path of the evolution that is the only input; `None` for bags.
@@ -107,21 +107,20 @@ fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     }
 }
 
-/// The largest evolution that is read, in bytes.
-const MOST_JSON: u64 = 4 << 30;
+const DAY: i64 = 86_400_000_000_000;
 
 fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
-    let length = fs::metadata(path).map_err(Error::io("read", path))?.len();
-    if length > MOST_JSON {
-        return Err(Error::Unsupported {
-            path: path.to_owned(),
-            what: format!("{length} bytes of JSON are too many"),
-            hint: "render the bag itself".to_owned(),
-        });
-    }
-    let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let text = file::read_text(path, budget::MISSION_JSON)?;
     let mut mission = read_json(&text, path)?;
     drop(text);
+    if mission.span.nanos() / DAY >= budget::SPAN_DAYS {
+        return Err(Error::BadFile {
+            path: path.to_owned(),
+            line: 0,
+            reason: format!("its windows cover more than {} days", budget::SPAN_DAYS),
+            hint: "times are nanoseconds since 1970".to_owned(),
+        });
+    }
     mission.find_changes(reading.rate_change, &[]);
     mission.activity = Activity::of_windows(&mission);
     if mission.ledger.phases.is_empty() {
@@ -149,7 +148,7 @@ impl Recorded {
         let range = known
             .map(|span| window::range(&reading.division, span))
             .transpose()?;
-        let mut collector = Collector::new(reading.collect.clone());
+        let mut collector = Collector::new(affordable(reading));
         let mut bags = Vec::new();
         for mut reader in readers {
             let mut progress = |done, total| watch.progress(done, total);
@@ -194,6 +193,17 @@ fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     Ok((once, twice))
 }
 
+/// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
+/// use if every payload were read.
+fn affordable(reading: &Reading) -> collector::Options {
+    let mut options = reading.collect.clone();
+    let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
+    if sizes.fold(0, u64::saturating_add) > options.payload_bytes {
+        options.payload_bytes = 0;
+    }
+    options
+}
+
 /// What is said of a bag that is whole and empty.
 pub(super) const NOTHING_RECORDED: &str = "it was closed before anything was recorded";
 
@@ -232,15 +242,15 @@ fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
     Ok(all)
 }
 
-fn build(mut recorded: Recorded, reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
+fn build(recorded: &mut Recorded, reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     watch.stage(Stage::Graphs);
     let windows = window::divide(&reading.division, recorded.range)?;
-    let mut mission = graphs(&mut recorded, &windows, reading)?;
+    let mut mission = graphs(recorded, &windows, reading)?;
     if reading.skip_unchanged {
         let merged = merged(&mission, &windows);
-        mission = graphs(&mut recorded, &merged, reading)?;
+        mission = graphs(recorded, &merged, reading)?;
     }
-    mission.activity = activity(&mut recorded, &mission, reading)?;
+    mission.activity = activity(recorded, &mission, reading)?;
     mission.ledger.phases = phases(&mission.elements, &mission.activity);
     if reading.division.length == Length::Auto {
         let text = format!("the period is {}; `--period` takes another", windows.period);
