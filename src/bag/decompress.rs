@@ -5,6 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::base::budget::{UNPACKED, UNPACKED_FOLD};
+
 /// A compression that a bag may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Compression {
@@ -77,11 +79,6 @@ pub(crate) struct Allowance {
     plain: AtomicU64,
 }
 
-/// How much may be unpacked of any bag, in bytes: seconds of work.
-const ALWAYS: u64 = 4 << 30;
-/// How much more for each byte that was read for it.
-const FOLD: u64 = 1000;
-
 impl Allowance {
     /// A reader of what `from` holds compressed, which fails once the allowance is spent.
     ///
@@ -110,7 +107,11 @@ impl Allowance {
             .fetch_add(work, Ordering::Relaxed)
             .saturating_add(work);
         let packed = self.packed.load(Ordering::Relaxed);
-        if spent > packed.saturating_mul(FOLD).saturating_add(ALWAYS) {
+        if spent
+            > packed
+                .saturating_mul(UNPACKED_FOLD)
+                .saturating_add(UNPACKED)
+        {
             return Err(io::Error::other(UNFOLDS));
         }
         Ok(())
