@@ -12,6 +12,7 @@ pub use survey::{SurveyRow, survey_csv, survey_text};
 pub use text::text;
 pub use why::why;
 
+use crate::base::words::visible_json;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Element, NodeId};
 use crate::mission::Mission;
@@ -200,7 +201,7 @@ pub fn info(mission: &Mission) -> Info {
 /// Any part of this module as JSON, ending in a new line.
 pub fn json(value: &impl Serialize) -> String {
     // Only maps with keys that are no strings fail, and there are none.
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+    visible_json(&serde_json::to_string_pretty(value).unwrap_or_default()) + "\n"
 }
 
 fn bags(mission: &Mission) -> Vec<BagInfo> {
