@@ -1,9 +1,12 @@
 //! The nouns that all stations share: times, names, errors, notices, points, and the small formats around them.
 
+pub(crate) mod budget;
 pub(crate) mod csv;
 pub(crate) mod digest;
 pub mod error;
+pub(crate) mod file;
 pub mod geometry;
+pub(crate) mod leftovers;
 pub mod name;
 pub mod notice;
 pub mod time;

@@ -2,15 +2,18 @@
 
 mod args;
 mod look;
+mod stop;
 pub mod terminal;
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{CommandFactory as _, Parser as _};
 
 use crate::bag::Input;
 use crate::base::error::Error;
+use crate::base::{budget, file};
 use crate::cli::terminal::Terminal;
 use crate::evidence::collector;
 use crate::evidence::topology;
@@ -39,11 +42,7 @@ const PARTS: u32 = 32;
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let typed = match Typed::try_parse_from(args) {
         Ok(typed) => typed,
-        Err(error) => {
-            // A closed pipe has read enough of the help.
-            let _ = error.print();
-            return if error.use_stderr() { USAGE } else { DONE };
-        }
+        Err(error) => return untyped(&error),
     };
     let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
     let mut terminal = Terminal::new(typed.quiet, no_colour);
@@ -55,22 +54,42 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Completions { shell } => {
             let mut text = Vec::new();
             clap_complete::generate(shell, &mut Typed::command(), "bagreel", &mut text);
-            terminal.results(&String::from_utf8_lossy(&text));
-            Ok(DONE)
+            terminal
+                .results(&String::from_utf8_lossy(&text))
+                .map(|()| DONE)
         }
         Command::Man => {
             let mut page = Vec::new();
-            let written = clap_mangen::Man::new(Typed::command()).render(&mut page);
-            terminal.results(&String::from_utf8_lossy(&page));
-            written
-                .map(|()| DONE)
+            clap_mangen::Man::new(Typed::command())
+                .render(&mut page)
                 .map_err(Error::io("write", Path::new("the manual page")))
+                .and_then(|()| terminal.results(&String::from_utf8_lossy(&page)))
+                .map(|()| DONE)
         }
+    };
+    // Whatever was still done, a script must not go on as if nobody had stopped it.
+    let outcome = match terminal.stopped_by() {
+        Some(_) => Err(Error::Interrupted),
+        None => outcome,
     };
     outcome.unwrap_or_else(|error| {
         terminal.error(&error);
-        if error.is_usage() { USAGE } else { FAILED }
+        match (error, terminal.stopped_by()) {
+            (Error::Interrupted, Some(code)) => code,
+            (error, _) if error.is_usage() => USAGE,
+            _ => FAILED,
+        }
     })
+}
+
+/// Prints the help, the version, or what is wrong with the command line.
+fn untyped(error: &clap::Error) -> u8 {
+    match error.print().and_then(|()| std::io::stdout().flush()) {
+        _ if error.use_stderr() => USAGE,
+        // A closed pipe has read enough of the help.
+        Err(lost) if lost.kind() != std::io::ErrorKind::BrokenPipe => FAILED,
+        _ => DONE,
+    }
 }
 
 fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Reading, Error> {
@@ -139,7 +158,7 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
     }
     let mut seen = None;
     while !terminal.stopped() {
-        let now = std::fs::read_to_string(&path).ok();
+        let now = file::read_text(&path, budget::USER_TEXT).ok();
         if now == seen {
             terminal.wait();
             continue;
@@ -193,12 +212,12 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .unwrap_or_else(|| title(&reading.inputs));
     let mut outputs = match &args.outputs[..] {
         [] => vec![Output::parse(
-            &default_output(&reading.inputs),
+            &default_output(&reading.inputs, args.figure.figure.is_some()),
             args.format.as_deref(),
         )?],
         some => some
             .iter()
-            .map(|o| Output::parse(o, args.format.as_deref().or(summary_format(o))))
+            .map(|o| Output::named(o, args.format.as_deref().or(summary_format(o))))
             .collect::<Result<_, _>>()?,
     };
     outputs.extend(args.sequence.poster.as_deref().map(Output::poster));
@@ -218,12 +237,28 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             figure: look::figure(&args.figure, &args.look)?,
             ..look::sequence(&args.sequence)?
         },
+        kept: kept(args),
         outputs,
         captions: args.look.captions.clone(),
         phases: look::phases(&args.figure.phases),
         is_filtered: args.view.filtered,
         reading,
     })
+}
+
+/// The files that are read beside the bags. A style or captions may be a name that is no file, which does no harm.
+fn kept(args: &RenderArgs) -> Vec<PathBuf> {
+    let look = &args.look;
+    let named = [
+        Some(&look.style),
+        look.captions.as_ref(),
+        Some(&args.figure.phases),
+    ];
+    let named = named.into_iter().flatten().map(PathBuf::from);
+    let files = [&look.font, &look.layout_from].into_iter().flatten();
+    let topologies = args.graph.topology.iter();
+    let all = named.chain(files.chain(topologies).cloned());
+    all.filter(|path| path.exists()).collect()
 }
 
 fn title(inputs: &[Input]) -> String {
@@ -239,20 +274,21 @@ fn summary() -> Option<PathBuf> {
     std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
 }
 
-fn summary_format(output: &str) -> Option<&'static str> {
+fn summary_format(output: &OsStr) -> Option<&'static str> {
     summary()
         .is_some_and(|path| path == Path::new(output))
         .then_some("md")
 }
 
-/// `out/<bag name>.gif`, the name without what tells the format.
-fn default_output(inputs: &[Input]) -> String {
+/// `out/<bag name>.gif`, of a figure `.pdf`, the name without what tells the format.
+fn default_output(inputs: &[Input], is_figure: bool) -> String {
     let name = inputs.first().map_or_else(String::new, Input::name);
     let mut stem = name.as_str();
     for end in [".active", ".zstd", ".bag", ".db3", ".mcap", ".json"] {
         stem = stem.strip_suffix(end).unwrap_or(stem);
     }
-    format!("out/{}.gif", stem.replace('/', "_"))
+    let extension = if is_figure { "pdf" } else { "gif" };
+    format!("out/{}.{extension}", stem.replace('/', "_"))
 }
 
 fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
@@ -262,7 +298,7 @@ fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
             "{:>12}  {}\n",
             event.at(&mission),
             event.sentence()
-        ));
+        ))?;
     }
     terminal.notices(&mission.notices);
     Ok(code(&mission))
@@ -282,14 +318,14 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
             InfoFormat::Text => survey_text(&rows),
             InfoFormat::Csv => survey_csv(&rows),
             InfoFormat::Json => json(&rows),
-        });
+        })?;
         return Ok(DONE);
     }
     if !args.why.is_empty() {
         let mut reading = reading;
         reading.collect.why.clone_from(&args.why);
         let (mission, pieces) = explain(&reading, terminal)?;
-        terminal.results(&crate::mission::info::why(&mission, &args.why, &pieces)?);
+        terminal.results(&crate::mission::info::why(&mission, &args.why, &pieces)?)?;
         terminal.notices(&mission.notices);
         return Ok(code(&mission));
     }
@@ -310,15 +346,15 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
                 info: Some(info),
             }])
         }
-    });
+    })?;
     terminal.notices(&mission.notices);
     Ok(code(&mission))
 }
 
 fn styles(name: Option<&str>, terminal: &mut Terminal) -> Result<u8, Error> {
     match name {
-        Some(name) => terminal.results(crate::draw::style::builtin_text(name)?),
-        None => terminal.results(&look::styles()),
+        Some(name) => terminal.results(crate::draw::style::builtin_text(name)?)?,
+        None => terminal.results(&look::styles())?,
     }
     Ok(DONE)
 }

@@ -23,6 +23,7 @@ pub mod target;
 mod tex;
 mod video;
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
@@ -32,6 +33,7 @@ pub(crate) use encoder::{AtOnce, Single, single};
 pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Start, Written};
 use sequence::Sequence;
 use target::Target;
+pub(crate) use tex::needs_figure;
 
 /// All formats.
 pub const FORMATS: &[Format] = &[
@@ -127,6 +129,7 @@ pub const FORMATS: &[Format] = &[
     Format {
         word: "csv",
         what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
+        check: Some(csv::check),
         start: csv::start,
         ..DATA
     },
@@ -174,12 +177,20 @@ impl Output {
     /// # Errors
     /// [`Error::Usage`] for a format that does not exist, and for standard output without a format.
     pub fn parse(text: &str, word: Option<&str>) -> Result<Self> {
-        let target = Target::parse(text);
+        Self::named(text.as_ref(), word)
+    }
+
+    /// As [`Output::parse`], for any name that a file may have.
+    ///
+    /// # Errors
+    /// As [`Output::parse`].
+    pub fn named(name: &OsStr, word: Option<&str>) -> Result<Self> {
+        let target = Target::parse(name);
         let word = word.map(str::to_lowercase).or_else(|| target.extension());
         let all: Vec<&str> = FORMATS.iter().map(|f| f.word).collect();
         let all = all.join(", ");
         let Some(word) = word else {
-            let what = format!("`{text}` does not say its format");
+            let what = format!("`{}` does not say its format", name.display());
             return Err(Error::usage(what, format!("say it with `--format`: {all}")));
         };
         match FORMATS.iter().find(|f| f.word == word) {
@@ -192,16 +203,25 @@ impl Output {
     }
 }
 
-/// Checks all outputs before the inputs are read: their names, their folders, and what their formats need.
+/// Checks all outputs before the inputs are read: their names, their folders, and what their formats need. What the
+/// user keeps, inputs and other files that are read, is never overwritten.
 ///
 /// # Errors
 /// As [`check::check`], and [`Error::Output`] where a format lacks something.
-pub fn check(outputs: &[Output], inputs: &[PathBuf]) -> Result<()> {
-    let targets: Vec<Target> = outputs.iter().map(|o| o.target.clone()).collect();
-    check::check(&targets, inputs)?;
+pub fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
+    let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
+    check::check(&targets, kept)?;
     outputs
         .iter()
         .try_for_each(|o| o.format.check.map_or(Ok(()), |check| check(&o.target)))
+}
+
+/// The files that an output makes: of most formats the one of its name.
+fn files(output: &Output) -> Vec<Target> {
+    match output.format.word {
+        "csv" => csv::files(&output.target),
+        _ => vec![output.target.clone()],
+    }
 }
 
 /// Whether a sequence of this many windows needs a strip for these outputs even if none was asked for.

@@ -16,7 +16,11 @@ const STATIONS: &[&str] = &[
 /// known to all.
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
-    ("base", &[&["words"], &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"]]),
+    ("base", &[
+        &["budget", "leftovers", "words"],
+        &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"],
+        &["file"],
+    ]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "index", "input"],
@@ -49,7 +53,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["report", "run"],
     ]),
     ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "survey"]]),
-    ("cli", &[&["args", "terminal"], &["look"]]),
+    ("cli", &[&["args", "stop"], &["look", "terminal"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.

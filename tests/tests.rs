@@ -14,6 +14,7 @@ mod docs;
 mod encode;
 mod evidence;
 mod figures;
+mod hostile;
 mod layout;
 mod pages;
 mod phases;

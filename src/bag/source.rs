@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::base::error::{Error, Result};
+use crate::base::leftovers::Leftover;
 
 /// A regular file that several threads read at any place at once. Counts the bytes it hands out.
 #[derive(Debug)]
@@ -87,7 +88,10 @@ fn read_once(mut file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
 }
 
 /// A folder of ours that is gone when this is dropped.
-pub(crate) struct Temporary(tempfile::TempDir);
+pub(crate) struct Temporary {
+    folder: tempfile::TempDir,
+    _left: Leftover,
+}
 
 impl Temporary {
     /// Makes one where the system keeps such folders.
@@ -95,14 +99,17 @@ impl Temporary {
     /// # Errors
     /// The system's refusal.
     pub(crate) fn new() -> Result<Self> {
-        let dir = tempfile::tempdir();
-        dir.map(Self)
-            .map_err(Error::io("make a folder in", &std::env::temp_dir()))
+        let folder = tempfile::tempdir();
+        let folder = folder.map_err(Error::io("make a folder in", &std::env::temp_dir()))?;
+        Ok(Self {
+            _left: Leftover::at(folder.path()),
+            folder,
+        })
     }
 
     /// Where it is.
     pub(crate) fn path(&self) -> &Path {
-        self.0.path()
+        self.folder.path()
     }
 }
 

@@ -1,5 +1,6 @@
 //! What can be typed: every command and flag with its help text.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -50,7 +51,7 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) inputs: Inputs,
     #[arg(long = "output", short, value_name = "FILE", help = shown(OUTPUT))]
-    pub(super) outputs: Vec<String>,
+    pub(super) outputs: Vec<OsString>,
     /// The format of outputs whose name does not tell it (such as `-`).
     #[arg(long, value_name = "WORD")]
     pub(super) format: Option<String>,

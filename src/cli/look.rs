@@ -1,12 +1,12 @@
 //! How things are to look, from what was typed.
 
-use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::args::{FigureArgs, LookArgs, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
+use crate::base::{budget, file};
 use crate::draw::figure::{Kind, Rows};
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
@@ -52,7 +52,7 @@ pub(super) fn style(name: &str) -> Result<Style> {
     if BUILTIN.iter().any(|row| row.0 == name) || !path.exists() {
         return Style::builtin(name);
     }
-    let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let text = file::read_text(path, budget::USER_TEXT)?;
     Style::from_toml(&text, path)
 }
 
@@ -67,7 +67,7 @@ pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
     let Some(path) = file else {
         return Ok(Fonts::bundled());
     };
-    let data = fs::read(path).map_err(Error::io("read", path))?;
+    let data = file::read(path, budget::FONT)?;
     Fonts::bundled().with(data, path)
 }
 
@@ -162,7 +162,7 @@ fn link(text: &str) -> Result<(String, String)> {
 /// The places of an earlier run's JSON.
 pub(super) fn kept(file: Option<&Path>) -> Result<Option<Places>> {
     let Some(path) = file else { return Ok(None) };
-    let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let text = file::read_text(path, budget::MISSION_JSON)?;
     let places = read_json(&text, path)?.layout;
     places.map(Some).ok_or_else(|| Error::BadFile {
         path: path.to_owned(),

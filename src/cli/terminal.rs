@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal as _, Write as _};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::base::error::Error;
+use super::stop::Stop;
+use crate::base::error::{Error, Result};
 use crate::base::notice::Notices;
 use crate::base::words::visible;
 use crate::pipeline::{Stage, Watch};
@@ -22,17 +22,13 @@ pub struct Terminal {
     stage: Option<(Stage, Instant)>,
     spent: BTreeMap<Stage, Duration>,
     begun: Instant,
-    interrupted: Arc<AtomicBool>,
+    stop: Stop,
 }
 
 impl Terminal {
     /// A terminal that says nothing but errors if `quiet`. Colours only where standard error is a terminal and
     /// `no_colour` is false; progress only on a terminal.
     pub fn new(quiet: bool, no_colour: bool) -> Self {
-        let interrupted = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&interrupted);
-        // Without a handler an interrupt ends us at once, which is what it did before.
-        let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
         Self {
             quiet,
             colour: io::stderr().is_terminal() && !no_colour,
@@ -40,7 +36,7 @@ impl Terminal {
             stage: None,
             spent: BTreeMap::new(),
             begun: Instant::now(),
-            interrupted,
+            stop: Stop::listen(last_words),
         }
     }
 
@@ -82,10 +78,24 @@ impl Terminal {
         }
     }
 
-    /// Prints results on standard output, as they are. A closed pipe ends nothing: the reader has what it wanted.
-    pub fn results(&mut self, text: &str) {
+    /// Prints results on standard output. A closed pipe is no error: the reader has what it wanted.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where not all of it could be written.
+    pub fn results(&mut self, text: &str) -> Result<()> {
         let mut out = io::stdout().lock();
-        let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        let written = out
+            .write_all(printable(text).as_bytes())
+            .and_then(|()| out.flush());
+        match written {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            other => other.map_err(Error::io("write", Path::new("standard output"))),
+        }
+    }
+
+    /// The exit code for the signal that asked us to stop; `None` if none did.
+    pub fn stopped_by(&self) -> Option<u8> {
+        self.stop.code()
     }
 
     /// Prints something worth knowing unless quiet.
@@ -154,7 +164,7 @@ impl Watch for Terminal {
     }
 
     fn stopped(&self) -> bool {
-        self.interrupted.load(Ordering::Relaxed)
+        self.stop.code().is_some()
     }
 }
 
@@ -169,4 +179,34 @@ fn bar(stage: Stage) -> ProgressBar {
     bar.set_style(style.progress_chars("=> "));
     bar.set_message(stage.word());
     bar
+}
+
+/// Says why the process ends, whatever else is on the line.
+fn last_words() {
+    let _ = writeln!(io::stderr(), "\nerror: {}", Error::Interrupted);
+}
+
+/// Lines as they may be printed, whatever names they hold: all but line ends and tabs is made visible.
+fn printable(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for part in text.split_inclusive(['\n', '\t']) {
+        let kept = part.trim_end_matches(['\n', '\t']);
+        out.push_str(&visible(kept));
+        out.push_str(&part[kept.len()..]);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_steer_the_terminal() {
+        assert_eq!(
+            printable("/a\u{1b}[2J\u{202e}b\n"),
+            "/a\\u{1b}[2J\\u{202e}b\n"
+        );
+        assert_eq!(printable("/größe ✓\ta\n\nb"), "/größe ✓\ta\n\nb");
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::base::budget;
 use crate::base::time::{Span, Stamp};
 
 const DAY: i64 = 86_400_000_000_000;
@@ -9,27 +10,90 @@ const DAY: i64 = 86_400_000_000_000;
 const FAR_DAYS: i64 = 365;
 /// Of so many messages at most one may be a stranger that is set aside.
 const RARE: u64 = 10;
+/// Ten years after 1970: a clock without a battery begins there until it is set, and no robot recorded then.
+const UNSET_DAYS: i64 = 3652;
 
-/// The times to believe, if a few messages lie far from the bulk; `None` to believe all.
-pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Option<Span> {
-    let mut clusters: Vec<(i64, i64, u64)> = Vec::new();
+/// Days without a gap of more than [`FAR_DAYS`] between them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Cluster {
+    first: i64,
+    last: i64,
+    messages: u64,
+}
+
+/// What to make of the times of a mission.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Belief {
+    /// The times to believe, if some messages lie far from the bulk; `None` to believe all.
+    pub(crate) span: Option<Span>,
+    /// That the clock jumps, where messages too many to be an accident lie far apart and stay on one axis.
+    pub(crate) jump: Option<String>,
+}
+
+/// Judges the times of a mission by how many messages each day has.
+pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
+    let clusters = clusters(days);
+    let Some(bulk) = clusters.iter().max_by_key(|c| c.messages) else {
+        return Belief::default();
+    };
+    let strangers: u64 = days.values().sum::<u64>() - bulk.messages;
+    let is_rare = strangers <= (days.values().sum::<u64>() / RARE).max(1);
+    let others = || clusters.iter().filter(|c| *c != bulk);
+    let is_unset = bulk.first > UNSET_DAYS && others().all(|c| (0..=UNSET_DAYS).contains(&c.last));
+    let whole = clusters.last().map_or(0, |c| c.last) - clusters.first().map_or(0, |c| c.first);
+    let is_too_long = whole >= budget::SPAN_DAYS;
+    if strangers < bulk.messages && (is_rare || is_unset) || is_too_long {
+        let last = bulk.last.min(bulk.first + budget::SPAN_DAYS - 1);
+        let span = Span {
+            start: Stamp(bulk.first.saturating_mul(DAY)),
+            end: Stamp((last + 1).saturating_mul(DAY)),
+        };
+        return Belief {
+            span: (strangers > 0 || is_too_long).then_some(span),
+            jump: None,
+        };
+    }
+    Belief {
+        span: None,
+        jump: (clusters.len() > 1).then(|| told(&clusters)),
+    }
+}
+
+fn clusters(days: &BTreeMap<i64, u64>) -> Vec<Cluster> {
+    let mut clusters: Vec<Cluster> = Vec::new();
     for (day, count) in days {
         match clusters.last_mut() {
-            Some((_, last, sum)) if day - *last <= FAR_DAYS => {
-                *last = *day;
-                *sum += count;
+            Some(before) if day - before.last <= FAR_DAYS => {
+                before.last = *day;
+                before.messages += count;
             }
-            _ => clusters.push((*day, *day, *count)),
+            _ => clusters.push(Cluster {
+                first: *day,
+                last: *day,
+                messages: *count,
+            }),
         }
     }
-    let total: u64 = days.values().sum();
-    let (first, last, count) = clusters.iter().max_by_key(|c| c.2)?;
-    let strangers = total - count;
-    let rare = strangers <= (total / RARE).max(1) && strangers < *count;
-    (strangers > 0 && rare).then(|| Span {
-        start: Stamp(first.saturating_mul(DAY)),
-        end: Stamp((last + 1).saturating_mul(DAY)),
-    })
+    clusters
+}
+
+/// How many clusters are named.
+const NAMED: usize = 3;
+
+fn told(clusters: &[Cluster]) -> String {
+    let one = |c: &Cluster| {
+        let date = Stamp(c.first.saturating_mul(DAY)).to_string();
+        let date = date.split('T').next().unwrap_or_default();
+        format!("{} messages from {date}", c.messages)
+    };
+    let mut parts: Vec<String> = clusters.iter().take(NAMED).map(one).collect();
+    if clusters.len() > NAMED {
+        parts.push(format!("{} more such jumps", clusters.len() - NAMED));
+    }
+    format!(
+        "the recorder's clock jumps by more than a year: {}; `--start` and `--end` choose a part",
+        parts.join(", ")
+    )
 }
 
 #[cfg(test)]
@@ -37,7 +101,7 @@ mod tests {
     use super::*;
 
     fn kept(days: &[(i64, u64)]) -> Option<(i64, i64)> {
-        let span = believed(&days.iter().copied().collect())?;
+        let span = believed(&days.iter().copied().collect()).span?;
         Some((span.start.0 / DAY, span.end.0 / DAY))
     }
 
@@ -55,5 +119,32 @@ mod tests {
         assert_eq!(kept(&[(0, 250), (20_000, 250)]), None);
         assert_eq!(kept(&[(0, 1), (20_000, 1)]), None);
         assert_eq!(kept(&[]), None);
+    }
+
+    #[test]
+    fn what_was_recorded_before_the_clock_was_set_is_set_aside() {
+        assert_eq!(kept(&[(0, 249), (20_000, 250)]), Some((20_000, 20_001)));
+        assert_eq!(kept(&[(10_957, 249), (20_000, 250)]), None);
+        assert_eq!(kept(&[(0, 250), (20_000, 249)]), None);
+    }
+
+    #[test]
+    fn no_mission_is_longer_than_a_hundred_years() {
+        assert_eq!(kept(&[(0, 2), (100_000, 2)]), Some((100_000, 100_001)));
+        assert_eq!(kept(&[(0, 3), (100_000, 2)]), Some((0, 1)));
+        let yearly: Vec<_> = (0..200).map(|year| (year * 365, 1)).collect();
+        assert_eq!(kept(&yearly), Some((0, budget::SPAN_DAYS)));
+    }
+
+    #[test]
+    fn a_jump_that_stays_on_the_axis_is_told() {
+        let days = [(10_957, 249), (20_000, 250)].into_iter().collect();
+        let told = believed(&days).jump.unwrap();
+        assert!(
+            told.contains("249 messages from 2000-01-01, 250 messages from 2024-10-04"),
+            "{told}"
+        );
+        let one = [(20_000, 249), (20_001, 250)].into_iter().collect();
+        assert_eq!(believed(&one).jump, None);
     }
 }

@@ -4,7 +4,7 @@ mod services;
 
 use std::io;
 
-use super::clock::believed;
+use super::clock::{Belief, believed};
 pub use services::Service;
 
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
@@ -120,7 +120,9 @@ impl Collector {
     pub fn finish(mut self) -> Result<Collected> {
         self.messages.finish().map_err(spool_error)?;
         self.facts.times.finish().map_err(spool_error)?;
-        let believed = believed(self.messages.days());
+        let Belief { span, jump } = believed(self.messages.days());
+        self.notices
+            .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));
         self.notices
             .extend(publishers::judge(&mut self.streams, &self.facts));
         let mut all = Collected {
@@ -128,7 +130,7 @@ impl Collector {
             messages: self.messages,
             facts: self.facts,
             notices: self.notices,
-            believed,
+            believed: span,
             span: None,
         };
         all.span = all.measure().map_err(spool_error)?;

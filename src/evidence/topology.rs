@@ -12,10 +12,11 @@ mod substitution;
 mod tree;
 mod yaml;
 
-use std::fs;
 use std::path::Path;
 
+use crate::base::budget::USER_TEXT;
 use crate::base::error::{Error, Result};
+use crate::base::file;
 use crate::base::notice::{Notice, NoticeKind};
 
 /// An element by its names.
@@ -54,9 +55,6 @@ pub struct Topology {
     /// What could not be used: includes that were not found, nodes without a name.
     pub notices: Vec<Notice>,
 }
-
-/// The longest file that is read, in bytes.
-const LONGEST: u64 = 16 << 20;
 
 /// Reads a file of any of the forms, told apart by its name's ending and its content.
 ///
@@ -105,16 +103,7 @@ pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
 
 /// The text of a file that is not too long.
 fn text(path: &Path) -> Result<String> {
-    let length = fs::metadata(path).map_err(Error::io("read", path))?.len();
-    if length > LONGEST {
-        return Err(bad(
-            path,
-            0,
-            format!("{length} bytes are too many"),
-            "give a smaller file",
-        ));
-    }
-    let bytes = fs::read(path).map_err(Error::io("read", path))?;
+    let bytes = file::read(path, USER_TEXT)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
@@ -155,7 +144,7 @@ mod tests {
     fn an_unknown_ending_names_the_known_ones() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("robot.txt");
-        fs::write(&path, "hello").unwrap();
+        std::fs::write(&path, "hello").unwrap();
         assert!(read(&path).unwrap_err().hint().contains(".yaml"));
     }
 }

@@ -3,38 +3,80 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::FORMATS;
 use super::sink::probe;
-use super::target::{NUMBER, Target, folder_of, is_special, same_file};
+use super::target::{NUMBER, Target, folder_of, is_special};
 use crate::base::error::{Error, Result};
 
-/// Checks every target before the inputs are read: no two the same, none an input, every folder there or to be
-/// made, and writable. Leaves nothing behind.
+/// Checks every file to be written before the inputs are read: no two the same, none that the user keeps, every folder
+/// there or to be made, and writable. Leaves nothing behind.
+///
+/// Kept are files with what `SQLite` puts beside them, and in a folder all that is there and does not end like an
+/// output of ours.
 ///
 /// # Errors
-/// [`Error::Usage`] where targets and inputs meet, [`Error::Output`] or [`Error::Io`] where a folder cannot be
-/// written.
-pub fn check(targets: &[Target], inputs: &[PathBuf]) -> Result<()> {
+/// [`Error::Usage`] where targets meet each other or what is kept, [`Error::Output`] or [`Error::Io`] where a folder
+/// cannot be written.
+pub fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     for (at, target) in targets.iter().enumerate() {
         let name = target.path().display();
-        let twice = targets[..at].iter().any(|t| match (t, target) {
-            (Target::Path(a), Target::Path(b)) => same_file(a, b),
-            (a, b) => a == b,
-        });
-        if twice {
-            return Err(Error::usage(
-                format!("`{name}` is asked for twice"),
-                "give every output its own name",
-            ));
+        if let Some(other) = targets[..at].iter().find(|t| t.may_meet(target)) {
+            let what = if *other == *target {
+                format!("`{name}` is asked for twice")
+            } else {
+                format!("`{name}` and `{}` may be one file", other.path().display())
+            };
+            return Err(Error::usage(what, "give every output its own name"));
         }
-        if inputs.iter().any(|input| target.may_be(input)) {
-            return Err(Error::usage(
-                format!("`{name}` would overwrite an input"),
-                "give the output another name",
-            ));
+        if let Some(path) = kept.iter().find(|path| would_harm(target, path)) {
+            let whose = if path.is_dir() {
+                format!("a file of `{}`", path.display())
+            } else {
+                "an input".to_owned()
+            };
+            let what = format!("`{name}` would overwrite {whose}");
+            return Err(Error::usage(what, "give the output another name"));
         }
         check_place(target)?;
     }
     Ok(())
+}
+
+/// What `SQLite` puts beside a database, which is part of it.
+const BESIDE: [&str; 4] = ["", "-wal", "-shm", "-journal"];
+
+/// Whether writing `target` would change what the user keeps at `path`.
+fn would_harm(target: &Target, path: &Path) -> bool {
+    if path.is_dir() {
+        return existing(target).iter().any(|file| is_kept_in(path, file));
+    }
+    BESIDE.iter().any(|end| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(end);
+        target.may_be(Path::new(&name))
+    })
+}
+
+/// The files that are there already and would be replaced.
+fn existing(target: &Target) -> Vec<PathBuf> {
+    let Target::Path(path) = target else {
+        return Vec::new();
+    };
+    if !target.is_numbered() {
+        return vec![path.clone()];
+    }
+    let beside = fs::read_dir(folder_of(path)).into_iter().flatten();
+    let files = beside.filter_map(|entry| Some(entry.ok()?.path()));
+    files.filter(|file| target.may_be(file)).collect()
+}
+
+/// Whether `file` is there, inside `folder`, and does not end like an output of ours.
+fn is_kept_in(folder: &Path, file: &Path) -> bool {
+    let (Ok(folder), Ok(file)) = (folder.canonicalize(), file.canonicalize()) else {
+        return false;
+    };
+    let ending = file.extension().unwrap_or_default().to_string_lossy();
+    file.starts_with(folder) && !FORMATS.iter().any(|f| ending.eq_ignore_ascii_case(f.word))
 }
 
 fn check_place(target: &Target) -> Result<()> {
@@ -50,6 +92,13 @@ fn check_place(target: &Target) -> Result<()> {
     };
     if path.file_name().is_none() || path.is_dir() {
         return refuse("it is a folder".to_owned(), "name a file in it");
+    }
+    let is_text = path.file_name().is_some_and(|name| name.to_str().is_some());
+    if Target::Path(path.clone()).is_numbered() && !is_text {
+        return refuse(
+            "`{n}` stands in a name that is no UTF-8".to_owned(),
+            "give it a name in UTF-8, or leave `{n}` out",
+        );
     }
     let folder = folder_of(path);
     if folder.to_string_lossy().contains(NUMBER) {
@@ -111,10 +160,33 @@ mod tests {
     }
 
     #[test]
+    fn what_belongs_to_an_input_is_never_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let bag = folder.path().join("bag");
+        fs::create_dir(&bag).unwrap();
+        for name in ["bag_0.db3", "bag_0.db3-wal", "metadata.yaml", "old.gif"] {
+            fs::write(bag.join(name), "").unwrap();
+        }
+        let clash = |out: &str, kept: &Path| {
+            let target = Target::Path(bag.join(out));
+            check(&[target], &[kept.to_owned()]).is_err_and(|e| e.is_usage())
+        };
+        for out in ["bag_0.db3", "bag_0.db3-wal", "metadata.yaml", "bag_{n}.db3"] {
+            assert!(clash(out, &bag), "{out}");
+        }
+        assert!(!clash("old.gif", &bag) && !clash("new.gif", &bag));
+        let file = bag.join("bag_0.db3");
+        assert!(clash("bag_0.db3-wal", &file) && clash("bag_0.db3-journal", &file));
+        assert!(!clash("metadata.gif", &file));
+    }
+
+    #[test]
     fn no_two_outputs_share_a_name() {
         let twice = [Target::Stdout, Target::Stdout];
         assert!(check(&twice, &[]).is_err_and(|e| e.is_usage()));
         let twice = [Target::parse("a.gif"), Target::parse("./a.gif")];
+        assert!(check(&twice, &[]).is_err_and(|e| e.is_usage()));
+        let twice = [Target::parse("a{n}.svg"), Target::parse("a0.svg")];
         assert!(check(&twice, &[]).is_err_and(|e| e.is_usage()));
     }
 

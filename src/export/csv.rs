@@ -10,7 +10,7 @@ use crate::base::time::Stamp;
 use crate::evidence::Evidence;
 use crate::export::sequence::Sequence;
 use crate::export::sink::Sink;
-use crate::export::target::Target;
+use crate::export::target::{Target, is_special};
 use crate::graph::diff::Change;
 use crate::graph::{Edge, EdgeState, Element};
 use crate::mission::{Mission, Window};
@@ -59,22 +59,37 @@ struct Tables<'a> {
     target: Target,
 }
 
+/// Whether several files can be made of this name.
+///
+/// # Errors
+/// [`Error::Usage`] for standard output, devices, and a name with `{n}`.
+pub(crate) fn check(target: &Target) -> Result<()> {
+    let what = match target {
+        Target::Stdout => "standard output is one".to_owned(),
+        Target::Path(path) if is_special(path) => format!("`{}` is one", path.display()),
+        Target::Path(_) => return target.must_be_one("the tables hold all windows"),
+    };
+    Err(Error::usage(
+        format!("CSV is several tables, {what}"),
+        "name a file: `-o x.csv` writes `x.edges.csv` and others",
+    ))
+}
+
+/// The files of all tables.
+pub(crate) fn files(target: &Target) -> Vec<Target> {
+    let file = |table: &Table| target.with_word(table.word, "csv");
+    TABLES.iter().map(file).collect()
+}
+
 /// Begins the tables.
 ///
 /// # Errors
-/// [`Error::Usage`] for standard output and for a name with `{n}`.
+/// As [`check`].
 pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
-    if *target == Target::Stdout {
-        let what = "CSV is several tables, standard output is one".to_owned();
-        return Err(Error::usage(
-            what,
-            "name a file: `-o x.csv` writes `x.edges.csv` and others",
-        ));
-    }
-    target.must_be_one("the tables hold all windows")?;
+    check(target)?;
     Ok(Box::new(Tables {
         mission: sequence.data,
         target: target.clone(),
@@ -83,9 +98,10 @@ pub(crate) fn start<'a>(
 
 impl Encoder for Tables<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
-        let write = |table| write(self.mission, table, &self.target.with_word(table.word));
+        let each = TABLES.iter().zip(files(&self.target));
+        let write = |(table, file): (_, Target)| write(self.mission, table, &file);
         // All of them are whole before the first one gets its name.
-        let sinks: Vec<Sink> = TABLES.iter().map(write).collect::<Result<_>>()?;
+        let sinks: Vec<Sink> = each.map(write).collect::<Result<_>>()?;
         let mut written = Written::to(&self.target);
         for sink in sinks {
             written.add(sink.commit()?);

@@ -8,6 +8,7 @@ use tempfile::NamedTempFile;
 
 use super::target::{Target, folder_of, is_special};
 use crate::base::error::{Error, Result};
+use crate::base::leftovers::Leftover;
 
 /// A file (or standard output) being written. Dropped without [`Sink::commit`], a file leaves no trace.
 #[derive(Debug)]
@@ -30,7 +31,7 @@ enum Way {
     #[cfg(target_os = "linux")]
     Nameless(File),
     /// A file with a temporary name beside the final one.
-    Named(NamedTempFile),
+    Named(NamedTempFile, Leftover),
     /// Held back until it is known to be within the limit.
     Memory(Vec<u8>),
 }
@@ -83,7 +84,7 @@ impl Sink {
             #[cfg(target_os = "linux")]
             Way::Nameless(file) => Some(file.try_clone()),
             Way::Special(file) => Some(file.try_clone()),
-            Way::Named(file) => Some(file.as_file().try_clone()),
+            Way::Named(file, _) => Some(file.as_file().try_clone()),
             Way::Stdout(_) | Way::Memory(_) => None,
         };
         handle.transpose().map_err(self.error())
@@ -131,7 +132,7 @@ impl Way {
         let file = match self {
             #[cfg(target_os = "linux")]
             Self::Nameless(file) => file,
-            Self::Named(file) => file.as_file(),
+            Self::Named(file, _) => file.as_file(),
             _ => return None,
         };
         file.metadata().ok().map(|m| m.len())
@@ -145,7 +146,7 @@ impl Write for Way {
             Self::Special(file) => file.write(bytes),
             #[cfg(target_os = "linux")]
             Self::Nameless(file) => file.write(bytes),
-            Self::Named(file) => file.write(bytes),
+            Self::Named(file, _) => file.write(bytes),
             Self::Memory(held) => held.write(bytes),
         }
     }
@@ -169,10 +170,14 @@ fn publish(way: Way, path: &Path) -> io::Result<()> {
         }
         #[cfg(target_os = "linux")]
         Way::Nameless(file) => {
-            let named = temporary().make_in(folder_of(path), |name| link(&file, name))?;
+            let mut left = None;
+            let named = temporary().make_in(folder_of(path), |name| {
+                left = Some(Leftover::at(name));
+                link(&file, name)
+            })?;
             named.persist(path).map(drop).map_err(|e| e.error)
         }
-        Way::Named(file) => file.persist(path).map(drop).map_err(|e| e.error),
+        Way::Named(file, _left) => file.persist(path).map(drop).map_err(|e| e.error),
     }
 }
 
@@ -182,7 +187,9 @@ fn hidden(folder: &Path) -> io::Result<Way> {
     if let Ok(file) = nameless(folder) {
         return Ok(Way::Nameless(file));
     }
-    temporary().tempfile_in(folder).map(Way::Named)
+    let file = temporary().tempfile_in(folder)?;
+    let left = Leftover::at(file.path());
+    Ok(Way::Named(file, left))
 }
 
 /// How temporary files are called, so that a left one tells whose it is.

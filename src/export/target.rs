@@ -1,5 +1,6 @@
 //! Where outputs go: names with window numbers, checked before anything is read, and files that appear whole or not at all.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -18,10 +19,10 @@ pub enum Target {
 }
 
 impl Target {
-    /// Reads a target as the user writes it: `-`, `out/a.gif`, `frames/{n}.svg`.
-    pub fn parse(text: &str) -> Self {
-        match text {
-            "-" => Self::Stdout,
+    /// Reads a target as the user writes it: `-`, `out/a.gif`, `frames/{n}.svg`; any name that a file may have.
+    pub fn parse(text: impl AsRef<OsStr>) -> Self {
+        match text.as_ref() {
+            text if text == "-" => Self::Stdout,
             path => Self::Path(path.into()),
         }
     }
@@ -57,20 +58,23 @@ impl Target {
         let digits = windows.saturating_sub(1).to_string().len();
         let number = format!("{index:0digits$}");
         match self {
-            Self::Path(path) if self.is_numbered() => {
-                Self::Path(path.to_string_lossy().replace(NUMBER, &number).into())
-            }
-            other => other.clone(),
+            Self::Path(path) => match path.file_name().and_then(OsStr::to_str) {
+                Some(name) => Self::Path(path.with_file_name(name.replace(NUMBER, &number))),
+                None => self.clone(),
+            },
+            Self::Stdout => Self::Stdout,
         }
     }
 
-    /// The same name with `word` before its extension: `x.csv` becomes `x.edges.csv`.
+    /// The same name with `word` before its extension, which is `format` where it has none: `x.csv` becomes
+    /// `x.edges.csv`, and so does `x`.
     #[must_use]
-    pub fn with_word(&self, word: &str) -> Self {
+    pub fn with_word(&self, word: &str, format: &str) -> Self {
         match self {
             Self::Stdout => Self::Stdout,
             Self::Path(path) => {
-                let extension = self.extension().unwrap_or_default();
+                let extension = self.extension();
+                let extension = extension.as_deref().unwrap_or(format);
                 Self::Path(path.with_extension(format!("{word}.{extension}")))
             }
         }
@@ -94,15 +98,42 @@ impl Target {
             return false;
         };
         let (own_name, name) = (own_name.to_string_lossy(), name.to_string_lossy());
-        let Some((before, after)) = own_name.split_once(NUMBER) else {
-            return false;
-        };
+        let (before, after) = around(&own_name);
         let middle = name
             .strip_prefix(before)
             .and_then(|rest| rest.strip_suffix(after));
         middle.is_some_and(|m| m.starts_with(|c: char| c.is_ascii_digit()))
             && same_file(folder_of(own), folder_of(path))
     }
+
+    /// Whether a file of this target may be one of the other's.
+    pub(crate) fn may_meet(&self, other: &Self) -> bool {
+        let (Self::Path(own), Self::Path(path)) = (self, other) else {
+            return self == other;
+        };
+        match (self.is_numbered(), other.is_numbered()) {
+            (_, false) => self.may_be(path),
+            (false, true) => other.may_be(own),
+            (true, true) => {
+                let names =
+                    [own, path].map(|p| p.file_name().unwrap_or_default().to_string_lossy());
+                let [(a, b), (c, d)] = [around(&names[0]), around(&names[1])];
+                let digits = |rest: &str| rest.bytes().all(|b| b.is_ascii_digit());
+                let begins = |a: &str, b: &str| a.strip_prefix(b).is_some_and(digits);
+                let ends = |a: &str, b: &str| a.strip_suffix(b).is_some_and(digits);
+                (begins(a, c) || begins(c, a))
+                    && (ends(b, d) || ends(d, b))
+                    && same_file(folder_of(own), folder_of(path))
+            }
+        }
+    }
+}
+
+/// What stands before the first `{n}` of a name and behind its last.
+fn around(name: &str) -> (&str, &str) {
+    let before = name.split(NUMBER).next().unwrap_or_default();
+    let after = name.rsplit(NUMBER).next().unwrap_or_default();
+    (before, after)
 }
 
 /// The folder a path stands in: `.` for a bare name.
@@ -150,7 +181,35 @@ mod tests {
 
     #[test]
     fn tables_get_a_word_before_their_extension() {
-        let table = Target::parse("out/x.csv").with_word("edges");
-        assert_eq!(table, Target::parse("out/x.edges.csv"));
+        let table = |name: &str| Target::parse(name).with_word("edges", "csv");
+        assert_eq!(table("out/x.csv"), Target::parse("out/x.edges.csv"));
+        assert_eq!(table("out/x"), Target::parse("out/x.edges.csv"));
+    }
+
+    #[test]
+    fn targets_with_numbers_meet_where_their_names_can() {
+        let meet = |a: &str, b: &str| {
+            let (a, b) = (Target::parse(a), Target::parse(b));
+            assert_eq!(a.may_meet(&b), b.may_meet(&a));
+            a.may_meet(&b)
+        };
+        assert!(meet("a{n}.svg", "a0.svg"));
+        assert!(meet("a{n}.svg", "./a{n}.svg"));
+        assert!(meet("a{n}.svg", "a1{n}.svg"));
+        assert!(meet("a{n}.svg", "a{n}0.svg"));
+        assert!(meet("{n}-{n}.svg", "3-3.svg"));
+        assert!(!meet("a{n}.svg", "a.svg"));
+        assert!(!meet("a{n}.svg", "b{n}.svg"));
+        assert!(!meet("a{n}.svg", "a{n}.png"));
+        assert!(!meet("a{n}.svg", "x/a0.svg"));
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn names_need_not_be_text() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let name = OsStr::from_bytes(b"f\xff/{n}.svg");
+        let first = Target::parse(name).numbered(3, 10);
+        assert_eq!(first.path().as_os_str().as_bytes(), b"f\xff/3.svg");
     }
 }

@@ -2,9 +2,11 @@
 
 use std::io::{self, Read as _, Write as _};
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStderr, ChildStdin, Command, Stdio};
+use std::thread::{self, JoinHandle};
 
 use super::{Encoder, Frame, Needs, Written};
+use crate::base::budget;
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::export::sequence::{FrameTime, Sequence};
@@ -90,6 +92,8 @@ struct Work {
     child: Process,
     /// Where frames go.
     pipe: Option<ChildStdin>,
+    /// Hears what it says meanwhile: a pipe that nobody empties would stop it.
+    ear: Option<JoinHandle<Vec<u8>>>,
     sink: Sink,
     /// The length of one repetition in milliseconds.
     step: u32,
@@ -182,6 +186,10 @@ impl Video<'_> {
         let mut child = child.map_err(|e| missing(self.target.path().to_owned(), &e))?;
         Ok(Work {
             pipe: child.stdin.take(),
+            ear: child
+                .stderr
+                .take()
+                .map(|pipe| thread::spawn(|| last_words(pipe))),
             child: Process(child),
             sink,
             step,
@@ -192,12 +200,9 @@ impl Video<'_> {
     /// What ffmpeg says about its failure.
     fn complaint(&self, work: &mut Work) -> Error {
         drop(work.pipe.take());
-        let mut said = String::new();
-        if let Some(pipe) = &mut work.child.0.stderr {
-            // Whatever can be read helps; a failure to read changes nothing.
-            let _ = pipe.take(1 << 16).read_to_string(&mut said);
-        }
         let _ = work.child.0.wait();
+        let said = work.ear.take().and_then(|ear| ear.join().ok());
+        let said = String::from_utf8_lossy(&said.unwrap_or_default()).into_owned();
         let last = said.lines().rev().find(|l| !l.trim().is_empty());
         self.failed(format!(
             "ffmpeg failed: {}",
@@ -257,6 +262,20 @@ impl Work {
         self.time.1 = until;
         Ok(())
     }
+}
+
+/// The end of what a child process says, heard until it closes the pipe.
+fn last_words(mut pipe: ChildStderr) -> Vec<u8> {
+    let (mut said, mut buffer) = (Vec::new(), [0; 4096]);
+    // Whatever can be read helps; a failure to read changes nothing.
+    while let Ok(count) = pipe.read(&mut buffer)
+        && count > 0
+    {
+        said.extend_from_slice(&buffer[..count]);
+        let spare = said.len().saturating_sub(budget::LAST_WORDS);
+        said.drain(..spare);
+    }
+    said
 }
 
 /// The longest step that all times are multiples of, but not below [`FINEST_MS`].

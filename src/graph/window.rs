@@ -1,11 +1,9 @@
 //! Time divided into periods: which windows a mission has.
 
+use crate::base::budget;
 use crate::base::error::{Error, Result};
 use crate::base::time::{Moment, Period, Span, Stamp};
 use crate::base::words;
-
-/// How many windows are made at most.
-pub const MOST_WINDOWS: i64 = 100_000;
 
 const SECOND: i64 = 1_000_000_000;
 /// What a bag shorter than five minutes may get, the longest first.
@@ -115,7 +113,7 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
 }
 
 /// The period for a bag of this length where none was asked for: a minute; from 30 s down to 0.1 s for a bag below
-/// five minutes, so that it has at least five windows; from 2 min up to a day above 600 windows.
+/// five minutes, so that it has at least five windows; from 2 min up to a day, then whole days, above 600 windows.
 pub fn default_period(nanos: i64) -> Period {
     let minute = 60 * SECOND;
     let chosen = if nanos < 5 * minute {
@@ -123,14 +121,20 @@ pub fn default_period(nanos: i64) -> Period {
             .into_iter()
             .find(|p| count(nanos, *p) >= 5)
             .unwrap_or(SHORT[8])
-    } else if count(nanos, minute) > 600 {
+    } else if count(nanos, minute) > budget::CHOSEN_WINDOWS {
         LONG.into_iter()
-            .find(|p| count(nanos, *p) <= 600)
-            .unwrap_or(LONG[8])
+            .find(|p| count(nanos, *p) <= budget::CHOSEN_WINDOWS)
+            .unwrap_or_else(|| whole_days(nanos))
     } else {
         minute
     };
     Period::from_nanos(chosen).unwrap_or(MINUTE)
+}
+
+/// The fewest whole days that cover `nanos` with at most [`budget::CHOSEN_WINDOWS`] windows.
+fn whole_days(nanos: i64) -> i64 {
+    let day = LONG[8];
+    count(count(nanos, day), budget::CHOSEN_WINDOWS) * day
 }
 
 const MINUTE: Period = match Period::from_nanos(60 * SECOND) {
@@ -151,7 +155,7 @@ fn count(nanos: i64, period: i64) -> i64 {
 /// Divides `span` (see [`range`]) into windows.
 ///
 /// # Errors
-/// [`Error::Usage`] for a step longer than the period and for more than [`MOST_WINDOWS`] windows.
+/// [`Error::Usage`] for a step longer than the period and for more than [`budget::WINDOWS`] windows.
 pub fn divide(division: &Division, span: Span) -> Result<Windows> {
     let nanos = span.nanos().max(1);
     let period = match division.length {
@@ -169,7 +173,7 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
     }
     let first = first_start(division, span, period, step);
     let many = count(span.end.since(first), step.nanos());
-    if many > MOST_WINDOWS {
+    if many > budget::WINDOWS {
         return Err(too_many(many, nanos));
     }
     let starts = (0..many).map(|k| first.plus(k * step.nanos()));
@@ -199,10 +203,10 @@ fn too_many(many: i64, nanos: i64) -> Error {
     let ladder = SHORT.into_iter().rev().chain([60 * SECOND]).chain(LONG);
     let enough = ladder
         .into_iter()
-        .find(|p| count(nanos, *p) <= MOST_WINDOWS);
-    let enough = enough.unwrap_or_else(|| count(nanos, MOST_WINDOWS));
+        .find(|p| count(nanos, *p) <= budget::WINDOWS);
+    let enough = enough.unwrap_or_else(|| count(nanos, budget::WINDOWS));
     Error::usage(
-        format!("{many} windows are more than {MOST_WINDOWS}"),
+        format!("{many} windows are more than {}", budget::WINDOWS),
         format!("`--period {}` would do", plain(enough)),
     )
 }
@@ -294,6 +298,20 @@ mod tests {
         );
         assert_eq!([chosen(600 * 60), chosen(601 * 60)], [60, 120]);
         assert_eq!(default_period(1).nanos(), SECOND / 10);
+        assert_eq!(chosen(601 * 86_400), 2 * 86_400);
+    }
+
+    #[test]
+    fn no_span_is_too_long_for_600_windows() {
+        for end in [i64::MAX / 2, i64::MAX] {
+            let span = Span {
+                start: Stamp(0),
+                end: Stamp(end),
+            };
+            let windows = divide(&Division::default(), span).unwrap();
+            assert!((500..=600).contains(&windows.spans.len()), "{end}");
+            assert_eq!(windows.spans.last().unwrap().end, Stamp(end));
+        }
     }
 
     #[test]

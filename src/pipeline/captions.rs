@@ -1,6 +1,5 @@
 //! Mission phases to show: from a file of `seconds|text` lines, or from a string topic of the bag.
 
-use std::fs;
 use std::path::Path;
 
 use crate::bag::{
@@ -9,6 +8,7 @@ use crate::bag::{
 use crate::base::error::{Error, Result};
 use crate::base::notice::Notice;
 use crate::base::time::{Stamp, parse_nanos};
+use crate::base::{budget, file};
 use crate::evidence::message::cursor::Cursor;
 use crate::mission::Mission;
 
@@ -21,10 +21,7 @@ use crate::mission::Mission;
 pub(super) fn phases(mission: &Mission, inputs: &[Input], from: &str) -> Result<Vec<String>> {
     let path = Path::new(from);
     let captions = if path.is_file() {
-        from_file(
-            &fs::read_to_string(path).map_err(Error::io("read", path))?,
-            path,
-        )?
+        from_file(&file::read_text(path, budget::USER_TEXT)?, path)?
     } else {
         from_topic(inputs, from)?
             .into_iter()

@@ -1,7 +1,6 @@
 //! From bags to the evolution: read once, divide time, build the graphs, find what changed.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Stage, Watch};
@@ -9,6 +8,7 @@ use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
+use crate::base::{budget, file};
 use crate::evidence::EvidenceLine;
 use crate::evidence::collector::{self, Collected, Collector};
 use crate::graph;
@@ -91,21 +91,20 @@ fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     }
 }
 
-/// The largest evolution that is read, in bytes.
-const MOST_JSON: u64 = 4 << 30;
+const DAY: i64 = 86_400_000_000_000;
 
 fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
-    let length = fs::metadata(path).map_err(Error::io("read", path))?.len();
-    if length > MOST_JSON {
-        return Err(Error::Unsupported {
-            path: path.to_owned(),
-            what: format!("{length} bytes of JSON are too many"),
-            hint: "render the bag itself".to_owned(),
-        });
-    }
-    let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let text = file::read_text(path, budget::MISSION_JSON)?;
     let mut mission = read_json(&text, path)?;
     drop(text);
+    if mission.span.nanos() / DAY >= budget::SPAN_DAYS {
+        return Err(Error::BadFile {
+            path: path.to_owned(),
+            line: 0,
+            reason: format!("its windows cover more than {} days", budget::SPAN_DAYS),
+            hint: "times are nanoseconds since 1970".to_owned(),
+        });
+    }
     mission.find_changes(reading.rate_change, &[]);
     mission.activity = Activity::of_windows(&mission);
     if mission.ledger.phases.is_empty() {

@@ -173,8 +173,8 @@ impl<'a> Timeline<'a> {
         #[expect(clippy::cast_possible_truncation, reason = "at most a few hundred")]
         let most = (self.plot.w / (widest * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
         let step = nice(total / most.max(1));
-        let mut at = 0;
-        while at <= total {
+        // Counted, not added up: a span may be as long as a number can say.
+        for at in (0..=total / step).map(|tick| tick * step) {
             let x = self.plot.x + self.plot.w * (at as f64 / total as f64);
             let text = words::offset(at);
             let width = self.fonts.width(&text, size, Weight::Regular);
@@ -190,7 +190,6 @@ impl<'a> Timeline<'a> {
                 halo: None,
                 text,
             });
-            at += step;
         }
         group
     }
@@ -271,5 +270,13 @@ mod tests {
         assert_eq!(nice(100 * SECOND), 120 * SECOND);
         assert_eq!(nice(100_000 * SECOND), 172_800 * SECOND);
         assert!(nice(i64::MAX) > 0);
+    }
+
+    #[test]
+    fn the_longest_span_has_a_few_ticks_too() {
+        for total in [1, 1_000_000_000, i64::MAX] {
+            let step = nice(total / 12);
+            assert!(total / step <= 12, "{total}: {step}");
+        }
     }
 }

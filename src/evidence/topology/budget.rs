@@ -1,8 +1,6 @@
 //! The work that a launch file may ask for: files include each other, texts repeat each other, and neither may run away.
 
-/// How much may be done for one file of the user's, in about as many bytes of memory and of text gone through: two
-/// hundred times the largest launch system seen (all of Autoware's), and a second or two of work.
-const WORK: usize = 64 << 20;
+use crate::base::budget::LAUNCH_WORK;
 
 /// What is left of the work; told once when it is used up.
 #[derive(Debug)]
@@ -15,7 +13,7 @@ pub(super) struct Budget {
 impl Default for Budget {
     fn default() -> Self {
         Self {
-            left: WORK,
+            left: LAUNCH_WORK,
             is_spent: false,
         }
     }

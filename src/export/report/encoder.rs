@@ -1,8 +1,7 @@
 //! The report in Markdown: a file of its own, or at the end of one that a job collects.
 
-use std::fs;
-
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
+use crate::base::{budget, file};
 use crate::export::report::report;
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
@@ -11,15 +10,15 @@ use crate::export::{AtOnce, Encoder};
 /// Begins the report; it follows what is in the file already if that is the file to append to.
 ///
 /// # Errors
-/// As [`AtOnce::start`]; [`Error::Io`] where the file to append to cannot be read.
+/// As [`AtOnce::start`]; as [`file::read_text`] for the file to append to.
 pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
     let path = target.path();
-    let is_appended = sequence.options.append_to.as_deref() == Some(path) && path.exists();
+    let is_appended = sequence.options.append_to.as_deref() == Some(path) && path.is_file();
     let before = if is_appended {
-        fs::read_to_string(path).map_err(Error::io("read", path))?
+        file::read_text(path, budget::SUMMARY)?
     } else {
         String::new()
     };

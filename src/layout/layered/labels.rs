@@ -1,5 +1,6 @@
 //! Where the label of each edge stands: on the edge or beside it, on no box, no title and no other label.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use crate::base::geometry::{Point, Rect, Size};
@@ -7,6 +8,11 @@ use crate::layout::{Layout, Plan, Route};
 
 /// Where along an edge a label is tried, best first.
 const STATIONS: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
+/// A straight piece longer than this many cells is looked up in parts: the rectangle around all of it is mostly empty.
+const LONG: f64 = 4.0;
+/// How many rectangles may be looked at over all labels; the labels of the longest edges are then left out. The largest
+/// graph that is laid out in layers needs a tenth of it.
+const EFFORT: u64 = 20_000_000;
 /// The room between a label and its edge, if it stands beside.
 const ASIDE: f64 = 2.0;
 /// How bad it is to lie on another edge, and to hide most of the own edge.
@@ -47,10 +53,13 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
     let mut edges = Field::new(taken.cell);
     for (i, line) in lines.iter().enumerate() {
         for piece in line.points.windows(2) {
-            edges.insert(between(piece[0], piece[1]), i);
+            edges.insert_line(piece[0], piece[1], i);
         }
     }
     for i in order {
+        if taken.looks.get() + edges.looks.get() > EFFORT {
+            break;
+        }
         let Some(size) = plan.links[i].label else {
             continue;
         };
@@ -185,6 +194,8 @@ struct Field {
     cell: f64,
     cells: BTreeMap<(i64, i64), Vec<usize>>,
     rects: Vec<(Rect, usize)>,
+    /// How many rectangles were looked at.
+    looks: Cell<u64>,
 }
 
 impl Field {
@@ -193,6 +204,25 @@ impl Field {
             cell,
             cells: BTreeMap::new(),
             rects: Vec::new(),
+            looks: Cell::new(0),
+        }
+    }
+
+    /// The rectangles around a straight line, in parts if it is long.
+    fn insert_line(&mut self, a: Point, b: Point, number: usize) {
+        let parts = libm::ceil((b.x - a.x).abs().max((b.y - a.y).abs()) / (LONG * self.cell));
+        let at = |part: f64| Point::new(a.x + (b.x - a.x) * part, a.y + (b.y - a.y) * part);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "as many as the drawing has cells along a side"
+        )]
+        for k in 0..parts.max(1.0) as u32 {
+            let (from, to) = (
+                f64::from(k) / parts.max(1.0),
+                f64::from(k + 1) / parts.max(1.0),
+            );
+            self.insert(between(at(from), at(to)), number);
         }
     }
 
@@ -211,6 +241,7 @@ impl Field {
             .filter_map(|cell| self.cells.get(&cell))
             .flatten();
         near.map(|&i| &self.rects[i])
+            .inspect(|_| self.looks.set(self.looks.get() + 1))
             .filter(|(other, _)| touches(other, rect))
             .map(|&(_, number)| number)
     }

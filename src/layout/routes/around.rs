@@ -165,6 +165,14 @@ struct Map {
 
 impl Map {
     fn new(boxes: &[Rect]) -> Self {
+        // Where a look from every corner at every box is beyond the effort, no way would be found: all edges run straight.
+        if boxes.len().saturating_mul(boxes.len()) > EFFORT {
+            return Self {
+                obstacles: Vec::new(),
+                corners: Vec::new(),
+                effort: 0,
+            };
+        }
         let obstacles: Vec<Rect> = boxes.iter().map(|rect| rect.grown(CLEAR)).collect();
         let mut corners = Vec::new();
         for rect in boxes.iter().map(|rect| rect.grown(TURN)) {
@@ -189,6 +197,9 @@ impl Map {
 
     /// The shortest way around the boxes that are not its own.
     fn way(&mut self, a: Point, b: Point, own: (usize, usize)) -> Option<Vec<Point>> {
+        if self.effort == 0 {
+            return None;
+        }
         if self.clear(a, b, own) {
             return Some(vec![a, b]);
         }
@@ -224,6 +235,7 @@ impl Map {
     /// Whether a line meets no box besides its own; without effort left, no line does.
     fn clear(&mut self, a: Point, b: Point, own: (usize, usize)) -> bool {
         if self.effort < self.obstacles.len() {
+            self.effort = 0;
             return false;
         }
         self.effort -= self.obstacles.len();
@@ -271,6 +283,28 @@ fn meets(a: Point, b: Point, rect: &Rect) -> bool {
 mod tests {
     use super::*;
     use crate::layout::tests::{link, vertex};
+
+    #[test]
+    fn a_crowd_is_crossed_straight_and_at_once() {
+        let n = 20_000;
+        let plan = Plan {
+            vertices: vec![vertex(None); n],
+            links: (1..n).map(|v| link(v - 1, v)).collect(),
+            clusters: vec![],
+        };
+        let place = |v: usize| {
+            Rect::new(
+                (v % 141) as f64 * 100.0,
+                (v / 141) as f64 * 40.0,
+                80.0,
+                30.0,
+            )
+        };
+        let boxes: Vec<Rect> = (0..n).map(place).collect();
+        let (routes, straight) = routes(&plan, &boxes);
+        assert_eq!(straight, n - 1);
+        assert!(routes.iter().skip(1).all(|route| route.curves.len() <= 1));
+    }
 
     #[test]
     fn an_edge_goes_around_what_stands_between() {

@@ -1,0 +1,32 @@
+//! The budget for untrusted work, told once: every limit with its unit and its reason. What lies past one is counted,
+//! said, and left out; what was read so far stays.
+
+/// The most windows that are chosen for a user who asked for no period, whatever the span: each is a frame of a second,
+/// and nobody watches longer than ten minutes.
+pub(crate) const CHOSEN_WINDOWS: i64 = 600;
+
+/// The most windows that may be asked for: a bag of a day by the second. Each costs about a kilobyte per element.
+pub(crate) const WINDOWS: i64 = 100_000;
+
+/// The longest mission, in days: nobody records for a hundred years, and sums of three such lengths in nanoseconds still
+/// fit a number.
+pub(crate) const SPAN_DAYS: i64 = 36_525;
+
+/// The longest style, topology or file of captions, in bytes: a hundred times the largest we know.
+pub(crate) const USER_TEXT: u64 = 16 << 20;
+
+/// How much may be done for one launch file, in about as many bytes of memory and of text gone through: two hundred times
+/// the largest launch system seen (all of Autoware's), and a second or two of work.
+pub(crate) const LAUNCH_WORK: usize = 64 << 20;
+
+/// The longest font file, in bytes: collections of Chinese, Japanese and Korean have 20 MB.
+pub(crate) const FONT: u64 = 64 << 20;
+
+/// The longest mission in JSON, in bytes: one of 100,000 windows has 2 GB.
+pub(crate) const MISSION_JSON: u64 = 4 << 30;
+
+/// The longest file of a job's summary that a report is written behind, in bytes: GitHub takes 1 MiB.
+pub(crate) const SUMMARY: u64 = 16 << 20;
+
+/// How much of what a child process says is kept, in bytes: its last words.
+pub(crate) const LAST_WORDS: usize = 1 << 16;

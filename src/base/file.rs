@@ -1,0 +1,66 @@
+//! Reads files of the user's within a limit: a device or a pipe tells no length and may never end.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
+
+use super::error::{Error, Result};
+
+/// The bytes of a file of at most `limit` bytes.
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be read, [`Error::BadFile`] where it is longer.
+pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(Error::io("read", path))?;
+    let read = file.take(limit.saturating_add(1)).read_to_end(&mut bytes);
+    read.map_err(Error::io("read", path))?;
+    if bytes.len() as u64 > limit {
+        return Err(Error::BadFile {
+            path: path.to_owned(),
+            line: 0,
+            reason: format!("more than {limit} bytes are too many"),
+            hint: "give a smaller file".to_owned(),
+        });
+    }
+    Ok(bytes)
+}
+
+/// The text of a file of at most `limit` bytes.
+///
+/// # Errors
+/// As [`read`], and [`Error::Io`] where it is no UTF-8.
+pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String> {
+    let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is no UTF-8 text");
+    String::from_utf8(read(path, limit)?)
+        .map_err(no_text)
+        .map_err(Error::io("read", path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_without_an_end_is_too_long() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("style.toml");
+        std::fs::write(&path, "1234").unwrap();
+        assert_eq!(read_text(&path, 4).unwrap(), "1234");
+        assert!(read(&path, 3).unwrap_err().to_string().contains("too many"));
+        #[cfg(unix)]
+        assert!(read(Path::new("/dev/zero"), 1 << 20).is_err());
+    }
+
+    #[test]
+    fn what_is_no_text_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("latin1.toml");
+        std::fs::write(&path, b"t = 'gr\xfc\xdfe'").unwrap();
+        let error = read_text(&path, 100).unwrap_err().to_string();
+        assert!(
+            error.contains("latin1.toml") && error.contains("UTF-8"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,62 @@
+//! Files and folders with temporary names: should a signal end the process before their owners remove them, this does.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// A set of paths is never half-changed, so that a panic elsewhere spoils nothing.
+fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    ALL.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Something with a temporary name, from before it is made until its owner has removed or renamed it.
+#[derive(Debug)]
+pub(crate) struct Leftover(PathBuf);
+
+impl Leftover {
+    /// Remembers `path`.
+    pub(crate) fn at(path: &Path) -> Self {
+        all().insert(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for Leftover {
+    fn drop(&mut self) {
+        all().remove(&self.0);
+    }
+}
+
+/// Removes whatever is there, just before the process ends.
+pub(crate) fn remove() {
+    for path in all().iter() {
+        // What is gone, or cannot be removed now, nobody could do more about.
+        let _ = fs::remove_file(path).or_else(|_| fs::remove_dir_all(path));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_still_remembered_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        fs::write(place("half"), "").unwrap();
+        fs::create_dir(place("unpacked")).unwrap();
+        fs::write(place("unpacked/bag"), "").unwrap();
+        fs::write(place("whole"), "").unwrap();
+        let _kept = [
+            Leftover::at(&place("half")),
+            Leftover::at(&place("unpacked")),
+        ];
+        drop(Leftover::at(&place("whole")));
+        remove();
+        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+        assert_eq!(left.len(), 1, "{left:?}");
+    }
+}

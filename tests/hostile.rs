@@ -1,0 +1,276 @@
+//! The command under attack: signals, full disks, pipes, files that never end, names that are somebody else's.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+
+fn command(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command.current_dir(folder).args(args);
+    command
+}
+
+fn bagreel(folder: &Path, args: &[&str]) -> Output {
+    command(folder, args).output().unwrap()
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let name = |e: std::io::Result<fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
+    let mut names: Vec<String> = entries.map(name).collect();
+    names.sort();
+    names
+}
+
+/// Every command that prints results.
+const PRINTING: &[&[&str]] = &[
+    &["info", COURIER],
+    &["info", COURIER, "--format", "json"],
+    &["info", COURIER, "--format", "csv"],
+    &["info", COURIER, "--why", "/tf"],
+    &["info", concat!(env!("CARGO_MANIFEST_DIR"), "/examples")],
+    &["events", COURIER],
+    &["styles"],
+    &["styles", "light"],
+    &["man"],
+    &["completions", "bash"],
+    &["--help"],
+    &["render", "--help"],
+    &["--version"],
+    &["render", COURIER, "-o", "-", "--format", "json"],
+    &["render", COURIER, "-o", "-", "--format", "dot"],
+];
+
+#[test]
+fn a_closed_pipe_has_read_enough() {
+    let dir = tempfile::tempdir().unwrap();
+    for args in PRINTING {
+        let mut child = command(dir.path(), args)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{args:?}: {}",
+            errors(&output)
+        );
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_failure_of_every_command() {
+    let dir = tempfile::tempdir().unwrap();
+    for args in PRINTING {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let output = command(dir.path(), args).stdout(full).output().unwrap();
+        assert_eq!(
+            output.status.code(),
+            Some(1),
+            "{args:?}: {}",
+            errors(&output)
+        );
+        // What clap prints itself has no words for it.
+        if !args.iter().any(|a| ["--help", "--version"].contains(a)) {
+            let said = errors(&output);
+            assert!(
+                said.contains("No space left") && said.contains("hint: make room"),
+                "{said}"
+            );
+        }
+    }
+}
+
+#[test]
+fn nothing_of_the_users_is_overwritten() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    fs::create_dir(path("bag")).unwrap();
+    fs::copy(COURIER, path("bag/bag_0.mcap")).unwrap();
+    fs::write(path("bag/metadata.yaml"), "rosbag2_bagfile_information:\n  version: 4\n  storage_identifier: mcap\n  relative_file_paths: [bag_0.mcap]\n  message_count: 1\n").unwrap();
+    fs::write(path("t.dot"), "digraph {}").unwrap();
+    fs::write(path("g.nodes.csv"), "Name\n/a\n").unwrap();
+    fs::write(path("c.md"), "0|start\n").unwrap();
+    fs::write(path("s.toml"), "").unwrap();
+    fs::write(path("x.json"), "{}").unwrap();
+    let before: Vec<Vec<u8>> = [
+        "bag/bag_0.mcap",
+        "bag/metadata.yaml",
+        "t.dot",
+        "g.nodes.csv",
+        "c.md",
+        "s.toml",
+        "x.json",
+    ]
+    .map(|name| fs::read(path(name)).unwrap())
+    .into();
+    let refused: &[&[&str]] = &[
+        &["render", "bag", "-o", "bag/bag_0.mcap", "--format", "json"],
+        &["render", "bag", "-o", "bag/bag_{n}.mcap", "--format", "svg"],
+        &[
+            "render",
+            "bag",
+            "-o",
+            "bag/metadata.yaml",
+            "--format",
+            "json",
+        ],
+        &["render", COURIER, "--topology", "t.dot", "-o", "t.dot"],
+        &[
+            "render",
+            COURIER,
+            "--topology",
+            "g.nodes.csv",
+            "-o",
+            "g.csv",
+        ],
+        &["render", COURIER, "--captions", "c.md", "-o", "c.md"],
+        &[
+            "render", COURIER, "--style", "s.toml", "-o", "s.toml", "--format", "json",
+        ],
+        &["render", COURIER, "--layout-from", "x.json", "-o", "x.json"],
+        &["render", COURIER, "-o", "a{n}.svg", "-o", "a0.svg"],
+        &["render", COURIER, "-o", "a.gif", "--poster", "./a.gif"],
+    ];
+    for args in refused {
+        let output = bagreel(dir.path(), args);
+        let said = errors(&output);
+        // What is read before the outputs are checked may complain first.
+        assert!(
+            matches!(output.status.code(), Some(1 | 2)),
+            "{args:?}: {said}"
+        );
+    }
+    let after: Vec<Vec<u8>> = [
+        "bag/bag_0.mcap",
+        "bag/metadata.yaml",
+        "t.dot",
+        "g.nodes.csv",
+        "c.md",
+        "s.toml",
+        "x.json",
+    ]
+    .map(|name| fs::read(path(name)).unwrap())
+    .into();
+    assert_eq!(before, after);
+    assert_eq!(
+        names(dir.path()),
+        ["bag", "c.md", "g.nodes.csv", "s.toml", "t.dot", "x.json"]
+    );
+}
+
+#[test]
+fn tables_without_an_ending_are_called_csv() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = bagreel(
+        dir.path(),
+        &["render", COURIER, "--format", "csv", "-o", "x"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let tables = ["bags", "changes", "edges", "nodes", "topics"];
+    assert_eq!(names(dir.path()), tables.map(|t| format!("x.{t}.csv")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn tables_do_not_go_into_a_device() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = bagreel(
+        dir.path(),
+        &["render", COURIER, "--format", "csv", "-o", "/dev/full"],
+    );
+    assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+    assert!(
+        errors(&output).contains("several tables"),
+        "{}",
+        errors(&output)
+    );
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_may_have_any_name() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let dir = tempfile::tempdir().unwrap();
+    let name = std::ffi::OsStr::from_bytes(b"a\xff.json");
+    let output = command(dir.path(), &["render", COURIER, "-o"])
+        .arg(name)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert!(dir.path().join(name).exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn files_that_never_end_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let zero = |name: &str| std::os::unix::fs::symlink("/dev/zero", dir.path().join(name)).unwrap();
+    zero("zero.yaml");
+    zero("zero.txt");
+    for option in [
+        ["--style", "zero.txt"],
+        ["--font", "zero.txt"],
+        ["--topology", "zero.yaml"],
+    ] {
+        let args = [&["render", COURIER, "-o", "x.gif"][..], &option].concat();
+        let output = bagreel(dir.path(), &args);
+        let said = errors(&output);
+        assert_eq!(output.status.code(), Some(1), "{option:?}: {said}");
+        assert!(said.contains("too many"), "{option:?}: {said}");
+    }
+}
+
+/// A crafted input of this name.
+fn crafted(name: &str) -> String {
+    format!("{}/tests/data/hostile/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn a_mission_of_three_hundred_years_is_none() {
+    let dir = tempfile::tempdir().unwrap();
+    let bag = crafted("06_span292.mcap");
+    for args in [
+        &["render", &bag, "-p", "all", "-o", "x.svg"][..],
+        &["render", &bag, "-o", "x.gif"],
+        &["info", &bag],
+        &["events", &bag],
+    ] {
+        let output = bagreel(dir.path(), args);
+        let said = errors(&output);
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {said}");
+        assert!(said.contains("impossible time, set aside"), "{said}");
+    }
+    for command in ["info", "events", "render"] {
+        let output = bagreel(dir.path(), &[command, &crafted("06_span292.json")]);
+        let said = errors(&output);
+        assert_eq!(output.status.code(), Some(1), "{command}: {said}");
+        assert!(said.contains("cover more than 36525 days"), "{said}");
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_late_makes_no_windows_of_fifty_years() {
+    let dir = tempfile::tempdir().unwrap();
+    let args = ["render", &crafted("08_jump1970.bag"), "-o", "x.json"];
+    let output = bagreel(dir.path(), &args);
+    let said = errors(&output);
+    assert!(
+        said.contains("impossible time, set aside (300 times)"),
+        "{said}"
+    );
+    assert!(said.contains(" 6 windows of 20 s"), "{said}");
+}
+
+#[cfg(unix)]
+mod unix;

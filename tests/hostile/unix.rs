@@ -1,0 +1,187 @@
+//! What only processes of Unix can be asked: signals at any stage, pipes that stall, children that chatter.
+
+use std::fs;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::{COURIER, command, errors, names};
+
+/// How long an end may take: half a second, and what a loaded machine adds.
+const SOON: Duration = Duration::from_millis(1500);
+
+fn signal(child: &Child, name: &str) {
+    let done = Command::new("kill")
+        .args([format!("-{name}"), child.id().to_string()])
+        .status();
+    assert!(done.unwrap().success());
+}
+
+/// Waits for the end of a process that was told to stop; answers its exit code.
+#[track_caller]
+fn ended(mut child: Child) -> Option<i32> {
+    let since = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        if since.elapsed() > SOON {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            panic!("still there after {SOON:?}");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn fifo(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+/// A command that waits for something that never comes.
+fn stalled(folder: &Path, args: &[&str]) -> Child {
+    let child = command(folder, args)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    child
+}
+
+#[test]
+fn every_signal_ends_what_waits_with_its_own_code() {
+    let dir = tempfile::tempdir().unwrap();
+    fifo(&dir.path().join("pipe.bag"));
+    fifo(&dir.path().join("pipe.toml"));
+    fifo(&dir.path().join("pipe.yaml"));
+    fifo(&dir.path().join("pipe.json"));
+    let before = names(dir.path());
+    let stalls: &[(&[&str], &str, i32)] = &[
+        (&["info", "-"], "INT", 130),
+        (&["info", "pipe.bag"], "TERM", 143),
+        (
+            &["render", COURIER, "--style", "pipe.toml", "-o", "x.gif"],
+            "HUP",
+            129,
+        ),
+        (&["events", COURIER, "--topology", "pipe.yaml"], "INT", 130),
+        (&["render", COURIER, "-o", "pipe.json"], "TERM", 143),
+    ];
+    for (args, name, code) in stalls {
+        let child = stalled(dir.path(), args);
+        signal(&child, name);
+        assert_eq!(ended(child), Some(*code), "{args:?}");
+    }
+    assert_eq!(names(dir.path()), before);
+}
+
+#[test]
+fn a_second_signal_ends_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let child = stalled(dir.path(), &["info", "-"]);
+    let since = Instant::now();
+    signal(&child, "INT");
+    signal(&child, "INT");
+    assert_eq!(ended(child), Some(130));
+    assert!(since.elapsed() < Duration::from_secs(1));
+}
+
+#[test]
+fn a_signal_while_files_are_written_leaves_none() {
+    let dir = tempfile::tempdir().unwrap();
+    let warehouse = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+    let args = [
+        "render", warehouse, "-p", "1", "-o", "x.gif", "-o", "x.json", "-o", "x.html", "-o",
+        "x.csv",
+    ];
+    let child = stalled(dir.path(), &args);
+    std::thread::sleep(Duration::from_millis(700));
+    signal(&child, "TERM");
+    let mut child = child;
+    let mut said = String::new();
+    let mut pipe = child.stderr.take().unwrap();
+    assert_eq!(ended(child), Some(143));
+    pipe.read_to_string(&mut said).unwrap();
+    assert!(said.contains("interrupted"), "{said}");
+    assert_eq!(names(dir.path()), [""; 0]);
+}
+
+#[test]
+fn what_is_to_be_ignored_stays_so() {
+    let dir = tempfile::tempdir().unwrap();
+    if Command::new("nohup").arg("true").status().is_err() {
+        println!("skipped: there is no nohup");
+        return;
+    }
+    let mut child = Command::new("nohup")
+        .arg(env!("CARGO_BIN_EXE_bagreel"))
+        .args(["info", "-"])
+        .current_dir(dir.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(400));
+    signal(&child, "HUP");
+    let mut stdin = child.stdin.take().unwrap();
+    stdin.write_all(&fs::read(COURIER).unwrap()).unwrap();
+    drop(stdin);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(
+        String::from_utf8(output.stdout)
+            .unwrap()
+            .contains("messages")
+    );
+}
+
+/// Puts a program of this name and text before all others.
+fn with_program(folder: &Path, name: &str, text: &str) -> String {
+    use std::os::unix::fs::PermissionsExt as _;
+    let path = folder.join(name);
+    fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    let others = std::env::var("PATH").unwrap();
+    format!("{}:{others}", folder.display())
+}
+
+#[test]
+fn a_chattering_ffmpeg_is_heard_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let bin = tempfile::tempdir().unwrap();
+    let chatter = "head -c 200000 /dev/zero | tr '\\0' x >&2; echo >&2; echo 'last words' >&2";
+    let path = with_program(
+        bin.path(),
+        "ffmpeg",
+        &format!("{chatter}; cat >/dev/null; echo video"),
+    );
+    let args = ["render", COURIER, "-o", "x.mp4", "--size", "320x200"];
+    let output = command(dir.path(), &args)
+        .env("PATH", &path)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert_eq!(
+        fs::read_to_string(dir.path().join("x.mp4")).unwrap(),
+        "video\n"
+    );
+    with_program(
+        bin.path(),
+        "ffmpeg",
+        &format!("[ \"$1\" = -version ] && exit; {chatter}; exit 1"),
+    );
+    let output = command(dir.path(), &args)
+        .env("PATH", &path)
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        errors(&output).contains("last words"),
+        "{}",
+        errors(&output)
+    );
+}
