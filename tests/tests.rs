@@ -11,10 +11,12 @@
 mod architecture;
 mod cli;
 mod docs;
+mod edges;
 mod encode;
 mod evidence;
 mod figures;
 mod hostile;
+mod info;
 mod layout;
 mod pages;
 mod phases;
