@@ -276,7 +276,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .unwrap_or_else(|| title(&reading.inputs));
     let mut outputs = match &args.outputs[..] {
         [] => vec![Output::parse(
-            &default_output(&reading.inputs),
+            &default_output(&reading.inputs, args.figure.figure.is_some()),
             args.format.as_deref(),
         )?],
         some => some
@@ -313,7 +313,11 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
 /// The files that are read beside the bags. A style or captions may be a name that is no file, which does no harm.
 fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     let look = &args.look;
-    let named = [Some(&look.style), look.captions.as_ref()];
+    let named = [
+        Some(&look.style),
+        look.captions.as_ref(),
+        Some(&args.figure.phases),
+    ];
     let named = named.into_iter().flatten().map(PathBuf::from);
     let files = [&look.font, &look.layout_from].into_iter().flatten();
     let topologies = args.graph.topology.iter();
@@ -340,14 +344,15 @@ fn summary_format(output: &OsStr) -> Option<&'static str> {
         .then_some("md")
 }
 
-/// `out/<bag name>.gif`, the name without what tells the format.
-fn default_output(inputs: &[Input]) -> String {
+/// `out/<bag name>.gif`, of a figure `.pdf`, the name without what tells the format.
+fn default_output(inputs: &[Input], is_figure: bool) -> String {
     let name = inputs.first().map_or_else(String::new, Input::name);
     let mut stem = name.as_str();
     for end in [".active", ".zstd", ".bag", ".db3", ".mcap", ".json"] {
         stem = stem.strip_suffix(end).unwrap_or(stem);
     }
-    format!("out/{}.gif", stem.replace('/', "_"))
+    let extension = if is_figure { "pdf" } else { "gif" };
+    format!("out/{}.{extension}", stem.replace('/', "_"))
 }
 
 fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {

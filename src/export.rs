@@ -38,6 +38,7 @@ pub(crate) use encoder::{AtOnce, Single, single};
 pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Start, Written};
 use sequence::Sequence;
 use target::Target;
+pub(crate) use tex::needs_figure;
 
 /// All formats.
 pub const FORMATS: &[Format] = &[

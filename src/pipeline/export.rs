@@ -7,7 +7,7 @@ use super::draw::{Composed, compose, places, unplaced};
 use super::figure::name_phases;
 use super::{Drawing, Phases, Reading, Stage, Watch, captions, read};
 use crate::bag::Input;
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::draw::figure::Figure;
 use crate::draw::paint::raster::Painter;
@@ -84,12 +84,29 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 /// # Errors
 /// As [`export::check`].
 pub fn check(job: &Render) -> Result<()> {
+    check_figure(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
         Input::Stdin => None,
     });
     let kept: Vec<PathBuf> = inputs.chain(&job.kept).cloned().collect();
     export::check(&job.outputs, &kept)
+}
+
+/// A figure needs an output that holds it, and lines for LaTeX need a figure.
+fn check_figure(job: &Render) -> Result<()> {
+    let holds = |o: &Output| o.format.whole != OneDrawing::Never && o.format.word != "tex";
+    if job.sequence.figure.is_some() && !job.outputs.iter().any(holds) {
+        return Err(Error::usage(
+            "no output holds the figure",
+            "write it with `-o fig.pdf`, `.svg`, `.png` or `.webp`",
+        ));
+    }
+    let latex = job.outputs.iter().find(|o| o.format.word == "tex");
+    match latex.filter(|_| job.sequence.figure.is_none()) {
+        Some(output) => Err(export::needs_figure(&output.target)),
+        None => Ok(()),
+    }
 }
 
 /// Draws and writes a mission that was read.

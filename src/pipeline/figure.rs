@@ -1,12 +1,12 @@
 //! The figure that was asked for: its phases named, drawn, and put into LaTeX.
 
-use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::Drawing;
 use crate::base::error::{Error, Result};
 use crate::base::time::{Span, parse_nanos};
+use crate::base::{budget, file};
 use crate::draw::figure::{self, Figure};
 use crate::export::Output;
 use crate::export::options::FigureOptions;
@@ -61,7 +61,7 @@ pub(super) fn name_phases(mission: &mut Mission, from: &Phases) -> Result<bool> 
             Ok(false)
         }
         Phases::File(path) => {
-            let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
+            let text = file::read_text(path, budget::USER_TEXT)?;
             read(mission, &text, path)?;
             Ok(true)
         }

@@ -36,6 +36,7 @@ pub(crate) fn place(
     width: f64,
     engine: &dyn Engine,
 ) -> Option<Placed> {
+    let wanted = labels.iter().filter(|l| !l.is_empty()).count();
     let parts = parts(plan);
     let tried: Vec<Vec<Placed>> = parts
         .iter()
@@ -54,7 +55,12 @@ pub(crate) fn place(
             .zip(&tried)
             .map(|(at, all)| all[*at].left_out)
             .sum();
-        let cost = size.h + lost as f64 * LOST;
+        let excess = if wanted < MANY {
+            0
+        } else {
+            lost.saturating_sub(wanted / TENTH)
+        };
+        let cost = size.h + lost as f64 * LOST + excess as f64 * EXCESS;
         if best.as_ref().is_none_or(|b| cost < b.cost) {
             let parts = chosen.into_iter().zip(corners).collect();
             best = Some(Choice { cost, parts, size });
@@ -106,7 +112,11 @@ fn choices(tried: &[Vec<Placed>], width: f64) -> Option<Vec<Vec<usize>>> {
 }
 
 /// What a label that is left out costs, in millimetres of height.
-const LOST: f64 = 5.0;
+const LOST: f64 = 4.0;
+/// The share of many labels, one in so many, that may be left out before each more costs as much as `EXCESS`.
+const TENTH: usize = 10;
+const EXCESS: f64 = 15.0;
+const MANY: usize = 15;
 /// The room between parts.
 const PARTED: f64 = 3.0;
 

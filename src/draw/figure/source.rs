@@ -65,8 +65,7 @@ impl<'a> Source<'a> {
 
     /// Whether at least half of the messages have a known publisher; else rows are topics.
     pub(crate) fn knows_publishers(&self) -> bool {
-        let is_known = knows_publishers(&self.mission.elements, &self.mission.activity);
-        is_known && !self.roles.is_empty()
+        knows_publishers(&self.mission.elements, &self.mission.activity)
     }
 
     pub(crate) fn shows(&self, topic: TopicId) -> bool {

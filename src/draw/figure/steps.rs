@@ -434,21 +434,23 @@ impl Studio<'_> {
         place(&plan, &rooms, width, engine("layered").ok()?)
     }
 
-    /// All panels in rows, each row as high as its highest.
+    /// All panels in columns, in order of time, and what is left out.
     fn page(&self, panels: &[Panel], left: usize) -> Scene {
         let sheet = self.sheet;
         let mut canvas = sheet.canvas();
         let (columns, wide) = (self.columns(), self.panel_width());
-        let mut y = 0.1;
-        for (row, own) in panels.chunks(columns).enumerate() {
-            let high = own.iter().map(|p| p.height).fold(0.0, f64::max);
-            for (column, panel) in own.iter().enumerate() {
-                canvas.begin(&format!("step-{}", row * columns + column + 1));
-                let x = (wide + BETWEEN) * column as f64;
-                paint(&mut canvas, panel, Rect::new(x + 0.1, y, wide - 0.2, high));
-            }
-            y += high + 1.2;
+        // Each panel into the column that is shortest so far, so that high ones leave no holes.
+        let mut ends = vec![0.1_f64; columns];
+        for (at, panel) in panels.iter().enumerate() {
+            let shortest = (0..columns).min_by(|a, b| ends[*a].total_cmp(&ends[*b]));
+            let column = shortest.unwrap_or(0);
+            canvas.begin(&format!("step-{}", at + 1));
+            let x = (wide + BETWEEN) * column as f64;
+            let rect = Rect::new(x + 0.1, ends[column], wide - 0.2, panel.height);
+            paint(&mut canvas, panel, rect);
+            ends[column] += panel.height + 1.2;
         }
+        let y = ends.into_iter().fold(0.0, f64::max);
         canvas.begin("notes");
         let mut items: Vec<Item> = Vec::new();
         if !sheet.options.is_bare {
