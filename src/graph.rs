@@ -58,6 +58,9 @@ pub struct Topic {
     pub qos: Option<Arc<str>>,
     /// When it is there, in order, half-open; empty where only windows are known.
     pub runs: Vec<Span>,
+    /// How many publishers the bag counts that nobody names, 0..; `None` if it counts none at all. They are no nodes: a
+    /// picture may show them as one small box.
+    pub unknown_publishers: Option<u32>,
 }
 
 /// A publication or a subscription, over the whole mission.

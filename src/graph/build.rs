@@ -25,7 +25,7 @@ use self::windows::Windows;
 use super::lives::Lives;
 use super::{Elements, Graph};
 use crate::base::error::Result;
-use crate::base::notice::Notices;
+use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
 use crate::evidence::collector::{Collected, spool_error};
@@ -79,11 +79,13 @@ struct Builder<'a> {
     rates: Traffic,
     restarts: Restarts,
     values: Values,
+    /// Names of the user's that the bag does not know.
+    strange: Vec<Notice>,
 }
 
 impl<'a> Builder<'a> {
     fn new(collected: &mut Collected, windows: &'a [Span], options: &Options) -> io::Result<Self> {
-        let (proofs, values) = prove(collected, options)?;
+        let (proofs, values, strange) = prove(collected, options)?;
         let start = collected.span.map_or(Stamp(0), |s| s.start);
         let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
         Ok(Self {
@@ -94,6 +96,7 @@ impl<'a> Builder<'a> {
             rates: BTreeMap::new(),
             restarts: Restarts::new(),
             values,
+            strange,
         })
     }
 
@@ -102,10 +105,10 @@ impl<'a> Builder<'a> {
         self.restarts = restarts(collected, &self.proofs)?;
         self.track(collected)?;
         settle(&mut self.tracks, &self.proofs, &self.restarts, self.mission);
+        let strange = std::mem::take(&mut self.strange);
         let mut built = self.assemble(collected, options.grace);
-        built
-            .notices
-            .extend(options.topology.notices.iter().cloned());
+        let told = options.topology.notices.iter().cloned();
+        built.notices.extend(told.chain(strange));
         Ok(built)
     }
 

@@ -154,6 +154,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
                 last: None,
                 runs: Vec::new(),
                 qos: None,
+                unknown_publishers: None,
             })
             .collect(),
     }

@@ -45,6 +45,7 @@ impl Names {
                 last: None,
                 runs: Vec::new(),
                 qos: None,
+                unknown_publishers: None,
             })
     }
 
@@ -67,6 +68,7 @@ impl Names {
             topic.types.dedup();
             topic.evidence = topic.evidence.and(raw.rest.evidence());
             topic.qos = raw.qos.as_deref().map(Arc::from).or(topic.qos.take());
+            topic.unknown_publishers = raw.unknown_publishers.or(topic.unknown_publishers);
             widen(&mut topic.first, &mut topic.last, raw.rest.life());
             keep(&mut topic.runs, raw.rest.runs());
         }
