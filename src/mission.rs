@@ -127,13 +127,8 @@ impl Mission {
                 .collect();
             window.changes = changes.next(window.span, &window.graph, &inside);
         }
-        let windows: Vec<_> = self
-            .windows
-            .iter()
-            .map(|w| (w.span, &w.changes[..]))
-            .collect();
-        let (entries, places) = ledger::of_changes(&windows, &self.elements);
-        self.ledger.entries = entries;
+        self.ledger = Ledger::from_changes(&self.elements, &self.windows);
+        let places = ledger::places(&self.ledger, &self.windows);
         for (window, places) in self.windows.iter_mut().zip(places) {
             window.entries = places;
         }

@@ -1,14 +1,12 @@
-//! The windows' differences, each with the entry that explains it; and the other way round, entries from differences
-//! where nothing but windows is known.
+//! The windows' differences, each with the entry that explains it.
 
 use std::collections::BTreeMap;
 
-use super::make::{is_housekeeping, sorted};
 use super::{Detail, Entry, EntryId, Kind, Ledger};
 use crate::base::time::{Span, Stamp};
-use crate::evidence::Degree;
 use crate::graph::diff::{Change, ValueKind, diff};
 use crate::graph::{Element, Elements, Graph};
+use crate::mission::Window;
 
 /// What is different in each window from the one before, with the places of the entries that tell why.
 pub(crate) fn explain<'g>(
@@ -166,120 +164,45 @@ fn change(entry: &Entry) -> Option<Change> {
     }
 }
 
-/// Entries made of windows' differences, for missions of which only windows are known; answers also the places of the
-/// entries by window and change. What happened in a window happened from the start of the one before to its end.
-pub(crate) fn of_changes(
-    windows: &[(Span, &[Change])],
-    elements: &Elements,
-) -> (Vec<Entry>, Vec<Vec<EntryId>>) {
-    let mut list: Vec<Entry> = Vec::new();
-    for (at, (span, changes)) in windows.iter().enumerate() {
-        let before = at.checked_sub(1).map_or(*span, |at| windows[at].0);
-        let first = list.len();
-        list.extend(changes.iter().map(|c| entry(c, (before, *span), elements)));
-        attach(&mut list, first, elements);
+/// The places of the entries that tell of the windows' changes, of a ledger that was made from them: of those of the
+/// same kind about the same element the one that is nearest in time.
+pub(crate) fn places(ledger: &Ledger, windows: &[Window]) -> Vec<Vec<EntryId>> {
+    let mut of: BTreeMap<(Kind, Element), Vec<EntryId>> = BTreeMap::new();
+    for (id, entry) in (0..).zip(&ledger.entries) {
+        of.entry((entry.kind, entry.what)).or_default().push(id);
     }
-    let (entries, new) = sorted(list, elements);
-    let mut new = new.into_iter();
-    let places = windows
-        .iter()
-        .map(|w| new.by_ref().take(w.1.len()).collect());
-    let places = places.collect();
-    (entries, places)
-}
-
-fn entry(change: &Change, (before, span): (Span, Span), elements: &Elements) -> Entry {
-    let (kind, what, time, detail) = match change {
-        Change::Added { what, time } => {
-            let kind = match what {
-                Element::Node(_) => Kind::Started,
-                _ => Kind::Appeared,
-            };
-            (kind, *what, *time, Detail::None)
-        }
-        Change::Removed { what, time } => {
-            let kind = match what {
-                Element::Node(_) => Kind::Stopped,
-                _ => Kind::Vanished,
-            };
-            (kind, *what, *time, Detail::None)
-        }
-        Change::Rate {
-            what,
-            from_hz,
-            to_hz,
-        } => {
-            let (from_hz, to_hz) = (*from_hz, *to_hz);
-            (Kind::Rate, *what, None, Detail::Rates { from_hz, to_hz })
-        }
-        Change::HandedOver { topic, from, to } => {
-            let (from, to) = (from.clone(), to.clone());
-            let what = Element::Topic(*topic);
-            (Kind::HandedOver, what, None, Detail::Senders { from, to })
-        }
-        Change::Restarted { node, time } => (
-            Kind::Restarted,
-            Element::Node(*node),
-            Some(*time),
-            Detail::None,
-        ),
-        Change::Value {
-            kind,
-            what,
-            from,
-            to,
-        } => {
-            let kind = match kind {
-                ValueKind::Type => Kind::Type,
-                ValueKind::Qos => Kind::Qos,
-                ValueKind::Lifecycle => Kind::Lifecycle,
-            };
-            let (from, to) = (from.clone(), to.clone());
-            (kind, *what, None, Detail::Values { from, to })
-        }
+    let time = |id: EntryId| ledger.entries[id as usize].time;
+    let place = |change: &Change, start: Stamp| {
+        let all = of.get(&kind_of(change))?;
+        let next = all.partition_point(|id| time(*id) < start);
+        let near = all[next.saturating_sub(1)..].iter().take(2).copied();
+        near.min_by_key(|id| time(*id).since(start).abs())
     };
-    Entry {
-        kind,
-        what,
-        time: time.unwrap_or(span.start),
-        earliest: time.unwrap_or(before.start).min(time.unwrap_or(span.start)),
-        latest: time.unwrap_or(span.end),
-        until: None,
-        detail,
-        degree: Degree::Stated,
-        evidence: elements.evidence(what),
-        part_of: None,
-        quiet: is_housekeeping(elements, what),
-        weight: 1,
-    }
+    let of_window = |window: &Window| {
+        let changes = window.changes.iter();
+        changes
+            .map(|c| place(c, window.span.start).unwrap_or(0))
+            .collect()
+    };
+    windows.iter().map(of_window).collect()
 }
 
-/// Makes the edges and topics of a window's entries, from `first` on, parts of what their nodes did.
-fn attach(list: &mut [Entry], first: usize, elements: &Elements) {
-    let id = |at: usize| EntryId::try_from(at).unwrap_or(EntryId::MAX);
-    let mut nodes = BTreeMap::new();
-    for (at, entry) in list.iter().enumerate().skip(first) {
-        if let (Element::Node(node), Kind::Started | Kind::Stopped) = (entry.what, entry.kind) {
-            nodes.insert((node, entry.kind == Kind::Started), id(at));
-        }
-    }
-    let mut topics = BTreeMap::new();
-    for (at, entry) in list.iter_mut().enumerate().skip(first) {
-        let (Some(node), Some(topic)) = elements.ends(entry.what) else {
-            continue;
-        };
-        if let Kind::Appeared | Kind::Vanished = entry.kind {
-            let begins = entry.kind == Kind::Appeared;
-            let whole = nodes.get(&(node, begins)).copied();
-            entry.part_of = whole;
-            topics
-                .entry((topic, begins))
-                .or_insert(whole.unwrap_or(id(at)));
-        }
-    }
-    for entry in &mut list[first..] {
-        if let (Element::Topic(topic), Kind::Appeared | Kind::Vanished) = (entry.what, entry.kind) {
-            entry.part_of = topics.get(&(topic, entry.kind == Kind::Appeared)).copied();
-        }
+/// The kind of the entry that tells of a change, and what it is about.
+fn kind_of(change: &Change) -> (Kind, Element) {
+    let turn = |what: Element, node, other| match what {
+        Element::Node(_) => (node, what),
+        _ => (other, what),
+    };
+    match change {
+        Change::Added { what, .. } => turn(*what, Kind::Started, Kind::Appeared),
+        Change::Removed { what, .. } => turn(*what, Kind::Stopped, Kind::Vanished),
+        Change::Rate { what, .. } => (Kind::Rate, *what),
+        Change::HandedOver { topic, .. } => (Kind::HandedOver, Element::Topic(*topic)),
+        Change::Restarted { node, .. } => (Kind::Restarted, Element::Node(*node)),
+        Change::Value { kind, what, .. } => match kind {
+            ValueKind::Type => (Kind::Type, *what),
+            ValueKind::Qos => (Kind::Qos, *what),
+            ValueKind::Lifecycle => (Kind::Lifecycle, *what),
+        },
     }
 }
