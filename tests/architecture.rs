@@ -27,7 +27,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "syntax", "times"],
+        &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
         &["kinds", "proof"],
         &["code", "publishers", "source"],

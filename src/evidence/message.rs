@@ -3,3 +3,5 @@
 pub mod cursor;
 pub(crate) mod definition;
 pub(crate) mod dynamic;
+pub(crate) mod log;
+pub(crate) mod parameters;

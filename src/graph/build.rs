@@ -83,7 +83,7 @@ struct Builder<'a> {
     rates: Traffic,
     restarts: Restarts,
     values: Values,
-    /// What source code told.
+    /// What is worth saying about what was proved, and what source code offers beyond it.
     code: matching::Outcome,
 }
 
@@ -119,11 +119,9 @@ impl<'a> Builder<'a> {
         );
         let code = std::mem::take(&mut self.code);
         let mut built = self.assemble(collected);
-        built.notices.extend(code.notices);
+        let told = options.topology.notices.iter().cloned();
+        built.notices.extend(told.chain(code.notices));
         built.undrawn = code.undrawn;
-        built
-            .notices
-            .extend(options.topology.notices.iter().cloned());
         Ok(built)
     }
 
@@ -161,7 +159,14 @@ impl<'a> Builder<'a> {
                         continue;
                     };
                     let place = streams.iter().position(|s| s == at).unwrap_or(0);
-                    follow(track, rates, place, stream.latched, self.mission.1);
+                    follow(
+                        track,
+                        rates,
+                        place,
+                        stream.latched,
+                        self.mission.1,
+                        proof.degree,
+                    );
                     if !deaths.is_empty() {
                         let times = collected.messages.times(stream.times)?;
                         track.bound_all(&times, &deaths);
@@ -229,8 +234,15 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Puts the messages of one stream on a track.
-fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end: Stamp) {
+/// Puts the messages of one stream on a track, which `degree` ties them to.
+fn follow(
+    track: &mut Liveness,
+    rates: &Rates,
+    place: usize,
+    latched: bool,
+    end: Stamp,
+    degree: Degree,
+) {
     let Some(spoke) = rates.traces.get(place).copied().flatten() else {
         track.extent = track.extent.max(Extent::Whole);
         return;
@@ -244,6 +256,6 @@ fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end:
             .map_or(Some(spoke.first), |l| Some(l.min(spoke.first)));
     }
     for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
-        track.mark(tally.window, Degree::Measured);
+        track.mark(tally.window, degree);
     }
 }

@@ -7,13 +7,14 @@ mod why;
 
 use serde::Serialize;
 
-pub use advice::advice;
+use advice::advice;
 pub use survey::{SurveyRow, survey_csv, survey_text};
 pub use text::text;
 pub use why::why;
 
+use crate::base::name::is_recorder;
 use crate::evidence::{Degree, Evidence};
-use crate::graph::{Element, NodeId};
+use crate::graph::{Edge, Element, NodeId};
 use crate::mission::Mission;
 
 /// All that `bagreel info` tells of one mission. Written as JSON with these names.
@@ -37,7 +38,9 @@ pub struct Info {
     pub publishes_by_degree: Degrees,
     /// How many subscriptions are known how well.
     pub subscribes_by_degree: Degrees,
-    /// Topics that carry messages and of which no subscriber is known.
+    /// Topics that carry messages and of which no publisher is known.
+    pub topics_without_publisher: usize,
+    /// Topics that carry messages and of which no subscriber is known; the recorder is none.
     pub topics_without_subscriber: usize,
     /// Each kind of evidence found, with what it proves.
     pub evidence: Vec<EvidenceInfo>,
@@ -93,6 +96,14 @@ impl Degrees {
     }
 }
 
+impl FromIterator<Degree> for Degrees {
+    fn from_iter<T: IntoIterator<Item = Degree>>(degrees: T) -> Self {
+        let mut all = Self::default();
+        degrees.into_iter().for_each(|degree| all.add(degree));
+        all
+    }
+}
+
 /// A kind of evidence and how much it proves.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct EvidenceInfo {
@@ -123,6 +134,8 @@ pub struct TopicInfo {
     pub publishers: Vec<String>,
     /// Who subscribes it, as far as known.
     pub subscribers: Vec<String>,
+    /// Publishers that the bag counts and nobody names; `None` if it counts none.
+    pub unknown_publishers: Option<u32>,
     /// Quality of service, if known.
     pub qos: Option<String>,
     /// Messages per equal part of the mission.
@@ -160,7 +173,7 @@ pub fn info(mission: &Mission) -> Info {
     let topics = topics(mission);
     let nodes = elements.nodes.iter().enumerate().map(|(id, node)| {
         let own = |edge: &&crate::graph::Edge| edge.node as usize == id;
-        let subscribed = || elements.subscribes.iter().filter(own);
+        let subscribed = || listeners(mission).map(|(_, edge)| edge).filter(own);
         let received = subscribed()
             .map(|edge| topics[edge.topic as usize].count)
             .sum();
@@ -176,34 +189,42 @@ pub fn info(mission: &Mission) -> Info {
             received: (subscribed().count() > 0).then_some(received),
         }
     });
-    let silent_ears = topics
-        .iter()
-        .filter(|t| t.count > 0 && t.subscribers.is_empty())
-        .count();
-    Info {
+    let mut info = Info {
         schema: "bagreel.info/1",
         bags: bags(mission),
         start_ns: mission.span.start.0,
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: counted(&best.nodes, elements.nodes.iter().map(|e| e.evidence)),
-        publishes_by_degree: counted(
+        nodes_by_degree: known(&best.nodes, elements.nodes.iter().map(|e| e.evidence)).collect(),
+        publishes_by_degree: known(
             &best.publishes,
             elements.publishes.iter().map(|e| e.evidence),
-        ),
-        subscribes_by_degree: counted(
-            &best.subscribes,
-            elements.subscribes.iter().map(|e| e.evidence),
-        ),
-        topics_without_subscriber: silent_ears,
+        )
+        .collect(),
+        subscribes_by_degree: listeners(mission)
+            .filter(|(_, edge)| edge.evidence != Evidence::of("source_only"))
+            .map(|(id, _)| best.subscribes[id])
+            .collect(),
+        topics_without_publisher: lacking(&topics, |t| t.publishers.is_empty()),
+        topics_without_subscriber: lacking(&topics, |t| t.subscribers.is_empty()),
         evidence: evidence(mission),
         nodes: nodes.collect(),
         topics,
-        advice: advice(mission, silent_ears),
+        advice: Vec::new(),
         undrawn: mission.undrawn.clone(),
         notices: mission.notices.iter().map(|n| n.text).collect(),
-    }
+    };
+    info.advice = advice(&info, is_ros1(mission));
+    info
+}
+
+/// Whether the bags come from ROS 1, in whatever format; `None` for a mission that nobody recorded.
+fn is_ros1(mission: &Mission) -> Option<bool> {
+    let bag = mission.bags.first()?;
+    let mut facts = bag.facts.iter();
+    let profile = facts.any(|(key, value)| key == "profile" && value == "ros1");
+    Some(bag.format == "rosbag1" || profile)
 }
 
 /// Any part of this module as JSON, ending in a new line.
@@ -264,14 +285,31 @@ fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
-/// How many elements are known how well, without those that only might be meant by the code.
-fn counted(degrees: &[Degree], evidence: impl Iterator<Item = Evidence>) -> Degrees {
+/// How well each element is known, without those that only might be meant by the code.
+fn known(
+    degrees: &[Degree],
+    evidence: impl Iterator<Item = Evidence>,
+) -> impl Iterator<Item = Degree> {
     let guessed = Evidence::of("source_only");
-    let mut all = Degrees::default();
-    for (degree, _) in degrees.iter().zip(evidence).filter(|(_, e)| *e != guessed) {
-        all.add(*degree);
-    }
-    all
+    let all = degrees.iter().copied().zip(evidence);
+    all.filter(move |(_, evidence)| *evidence != guessed)
+        .map(|(degree, _)| degree)
+}
+
+/// Subscriptions with their ids, without those of the recorder, who is no part of the robot.
+fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
+    let elements = &mission.elements;
+    let is_recorder = |edge: &Edge| {
+        let node = &elements.nodes[edge.node as usize];
+        is_recorder(node.name.as_str()) || node.evidence.words().any(|word| word == "recorder")
+    };
+    let edges = elements.subscribes.iter().enumerate();
+    edges.filter(move |(_, edge)| !is_recorder(edge))
+}
+
+/// How many topics with messages lack something.
+fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
+    topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
 }
 
 /// Messages that each node sent; `None` where no count is known.
@@ -299,6 +337,7 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
             bytes: None,
             publishers: Vec::new(),
             subscribers: Vec::new(),
+            unknown_publishers: topic.unknown_publishers,
             qos: topic.qos.as_deref().map(str::to_owned),
             activity: vec![0; mission.windows.len()],
         })
@@ -317,7 +356,7 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
     for edge in &elements.publishes {
         topics[edge.topic as usize].publishers.push(name(edge.node));
     }
-    for edge in &elements.subscribes {
+    for (_, edge) in listeners(mission) {
         topics[edge.topic as usize]
             .subscribers
             .push(name(edge.node));
@@ -347,7 +386,7 @@ fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {
         source,
         nodes: count(&mut elements.nodes.iter().map(|n| n.evidence), source),
         publishes: count(&mut elements.publishes.iter().map(|e| e.evidence), source),
-        subscribes: count(&mut elements.subscribes.iter().map(|e| e.evidence), source),
+        subscribes: count(&mut listeners(mission).map(|(_, e)| e.evidence), source),
     });
     rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0)
         .collect()

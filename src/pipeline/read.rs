@@ -149,7 +149,7 @@ impl Recorded {
         let range = known
             .map(|span| window::range(&reading.division, span))
             .transpose()?;
-        let mut collector = Collector::new(reading.collect.clone());
+        let mut collector = Collector::new(affordable(reading));
         let mut bags = Vec::new();
         for reader in &mut readers {
             let mut progress = |done, total| watch.progress(done, total);
@@ -169,6 +169,17 @@ impl Recorded {
             range,
         })
     }
+}
+
+/// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
+/// use if every payload were read.
+fn affordable(reading: &Reading) -> collector::Options {
+    let mut options = reading.collect.clone();
+    let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
+    if sizes.fold(0, u64::saturating_add) > options.payload_bytes {
+        options.payload_bytes = 0;
+    }
+    options
 }
 
 fn no_messages(inputs: &[Input]) -> Error {

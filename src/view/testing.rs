@@ -151,6 +151,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
                 first: None,
                 last: None,
                 qos: None,
+                unknown_publishers: None,
             })
             .collect(),
     }
