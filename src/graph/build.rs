@@ -26,7 +26,7 @@ use self::windows::Windows;
 use super::lives::Lives;
 use super::{Elements, Graph};
 use crate::base::error::Result;
-use crate::base::notice::{Notice, Notices};
+use crate::base::notice::Notices;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
 use crate::evidence::code::{Code, matching};
@@ -85,15 +85,13 @@ struct Builder<'a> {
     rates: Traffic,
     restarts: Restarts,
     values: Values,
-    /// Names of the user's that the bag does not know.
-    strange: Vec<Notice>,
-    /// What source code told.
+    /// What is worth saying about what was proved, and what source code offers beyond it.
     code: matching::Outcome,
 }
 
 impl<'a> Builder<'a> {
     fn new(collected: &mut Collected, windows: &'a [Span], options: &Options) -> io::Result<Self> {
-        let (proofs, values, strange, code) = prove(collected, options)?;
+        let (proofs, values, code) = prove(collected, options)?;
         let start = collected.span.map_or(Stamp(0), |s| s.start);
         let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
         Ok(Self {
@@ -104,7 +102,6 @@ impl<'a> Builder<'a> {
             rates: BTreeMap::new(),
             restarts: Restarts::new(),
             values,
-            strange,
             code,
         })
     }
@@ -114,12 +111,10 @@ impl<'a> Builder<'a> {
         self.restarts = restarts(collected, &self.proofs)?;
         self.track(collected)?;
         settle(&mut self.tracks, &self.proofs, &self.restarts, self.mission);
-        let strange = std::mem::take(&mut self.strange);
         let code = std::mem::take(&mut self.code);
         let mut built = self.assemble(collected, options.grace);
         let told = options.topology.notices.iter().cloned();
-        built.notices.extend(told.chain(strange));
-        built.notices.extend(code.notices);
+        built.notices.extend(told.chain(code.notices));
         built.undrawn = code.undrawn;
         Ok(built)
     }

@@ -199,11 +199,12 @@ pub fn info(mission: &Mission) -> Info {
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: counted(&best.nodes, elements.nodes.iter().map(|e| e.evidence)),
-        publishes_by_degree: counted(
+        nodes_by_degree: known(&best.nodes, elements.nodes.iter().map(|e| e.evidence)).collect(),
+        publishes_by_degree: known(
             &best.publishes,
             elements.publishes.iter().map(|e| e.evidence),
-        ),
+        )
+        .collect(),
         subscribes_by_degree: listeners(mission)
             .filter(|(_, edge)| edge.evidence != Evidence::of("source_only"))
             .map(|(id, _)| best.subscribes[id])
@@ -287,6 +288,17 @@ fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
+/// How well each element is known, without those that only might be meant by the code.
+fn known(
+    degrees: &[Degree],
+    evidence: impl Iterator<Item = Evidence>,
+) -> impl Iterator<Item = Degree> {
+    let guessed = Evidence::of("source_only");
+    let all = degrees.iter().copied().zip(evidence);
+    all.filter(move |(_, evidence)| *evidence != guessed)
+        .map(|(degree, _)| degree)
+}
+
 /// Subscriptions with their ids, without those of the recorder, who is no part of the robot.
 fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
     let elements = &mission.elements;
@@ -301,16 +313,6 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
 /// How many topics with messages lack something.
 fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
     topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
-}
-
-/// How many elements are known how well, without those that only might be meant by the code.
-fn counted(degrees: &[Degree], evidence: impl Iterator<Item = Evidence>) -> Degrees {
-    let guessed = Evidence::of("source_only");
-    let mut all = Degrees::default();
-    for (degree, _) in degrees.iter().zip(evidence).filter(|(_, e)| *e != guessed) {
-        all.add(*degree);
-    }
-    all
 }
 
 /// Messages that each node sent; `None` where no count is known.

@@ -14,7 +14,7 @@ use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of};
 use crate::evidence::SOURCES;
-use crate::evidence::claim::{Degree, EvidenceLine, Name, SourceId};
+use crate::evidence::claim::{Degree, Name, SourceId};
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
 
 /// An edge that the code declares for a node of the bag.
@@ -34,8 +34,6 @@ pub(super) struct Recorded {
     pub(super) told: BTreeSet<Name>,
     /// What is known already, by more than a declaration.
     proved: BTreeSet<Key>,
-    /// How many publishers each topic was offered by, where that was recorded.
-    offered: BTreeMap<Name, usize>,
 }
 
 /// What came of reading the code.
@@ -203,7 +201,6 @@ impl Recorded {
                 .filter(|p| p.degree != Degree::Declared)
                 .map(|p| p.what)
                 .collect(),
-            offered: BTreeMap::new(),
         };
         for stream in known.streams {
             let topic = known.text(stream.topic).to_string();
@@ -214,11 +211,6 @@ impl Recorded {
             types.insert(type_key(&stream.connection.type_name));
             if stream.publisher.is_some() {
                 all.told.insert(stream.topic);
-            }
-            if let Some(qos) = &stream.connection.qos {
-                let publishers = qos.matches("history:").count();
-                let most = all.offered.entry(stream.topic).or_default();
-                *most = publishers.max(*most);
             }
         }
         all
@@ -340,26 +332,17 @@ fn draw(
         Role::Publishes => Key::Publish(node, found.topic),
         Role::Subscribes => Key::Subscribe(found.topic, node),
     };
-    if recorded.proved.contains(&what)
-        || found.role == Role::Publishes && !has_room(known, recorded, found.topic)
-    {
+    let has_room = found.role == Role::Subscribes || has_room(known, recorded, found.topic);
+    if recorded.proved.contains(&what) || !has_room || known.denies(what) {
         return false;
     }
-    let source = row("source");
-    if known.facts.is_watched(what.names()) {
-        known.facts.pieces.push(EvidenceLine {
-            time: None,
-            source: "source",
-            degree: Degree::Declared,
-            text: sentence(code, found, words),
-        });
-    }
-    known.prove(Proof {
+    let proof = Proof {
         what,
-        source,
+        source: row("source"),
         degree: Degree::Declared,
         when: Validity::Like(Key::Node(node)),
-    });
+    };
+    known.because(proof, None, |_| sentence(code, found, words));
     true
 }
 
@@ -367,8 +350,8 @@ fn draw(
 /// offered than are known.
 fn has_room(known: &Findings<'_>, recorded: &Recorded, topic: Name) -> bool {
     let publishers = known.publishers(topic).count();
-    let offered = recorded.offered.get(&topic).copied().filter(|n| *n > 0);
-    !recorded.told.contains(&topic) && publishers < offered.unwrap_or(1)
+    let offered = known.offers(topic).map_or(1, |n| n.max(1) as usize);
+    !recorded.told.contains(&topic) && publishers < offered
 }
 
 /// `arm/servo.py:41  create_subscription(…); the node is named by rosout; launched at arm.launch.py:67; code of …`

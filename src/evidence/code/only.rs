@@ -11,7 +11,8 @@ use super::Code;
 use super::declaration::Role;
 use super::matching::{Match, Recorded, matches, resolved, row};
 use super::workspace::{Instance, Placed};
-use crate::evidence::claim::{Degree, EvidenceLine, Name};
+use crate::base::words::count;
+use crate::evidence::claim::{Degree, Name};
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
 use crate::evidence::topology::launch::join;
 
@@ -226,29 +227,20 @@ fn draw(code: &Code, known: &mut Findings<'_>, candidate: &Candidate<'_>) {
         Role::Publishes => Key::Publish(node, topic),
         Role::Subscribes => Key::Subscribe(topic, node),
     };
-    if known.facts.is_watched(edge.names()) {
-        let text = format!(
-            "the only place in {} packages that may do so: {}; the bag does not say that it ran",
-            code.packages,
-            words(known, candidate)
-        );
-        known.facts.pieces.push(EvidenceLine {
-            time: None,
-            source: "source_only",
-            degree: Degree::Declared,
-            text,
-        });
-    }
-    for (what, when) in [
-        (Key::Node(node), Validity::Whole),
-        (edge, Validity::Like(Key::Node(node))),
-    ] {
-        known.prove(Proof {
+    let text = format!(
+        "the only place in {} that may do so: {}; the bag does not say that it ran",
+        count(code.packages, "package"),
+        words(known, candidate)
+    );
+    let basis = Validity::Like(Key::Node(node));
+    for (what, when) in [(Key::Node(node), Validity::Whole), (edge, basis)] {
+        let proof = Proof {
             what,
             source: row("source_only"),
             degree: Degree::Declared,
             when,
-        });
+        };
+        known.because(proof, None, |_| text.clone());
     }
 }
 

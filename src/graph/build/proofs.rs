@@ -22,7 +22,7 @@ use crate::evidence::{Degree, EvidenceLine, SOURCES};
 pub(crate) fn prove(
     collected: &mut Collected,
     options: &Options,
-) -> io::Result<(Vec<Proof>, Values, Vec<Notice>, matching::Outcome)> {
+) -> io::Result<(Vec<Proof>, Values, matching::Outcome)> {
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
     let mut known = Findings::new(&collected.streams, &mut collected.facts, (start, end));
@@ -61,7 +61,9 @@ pub(crate) fn prove(
         stream.speaker = stream.publisher.map(role);
     }
     let values = Values::new(&mut collected.facts, role)?;
-    Ok((proofs, values, strange, told_by_code.unwrap_or_default()))
+    let mut code = told_by_code.unwrap_or_default();
+    code.notices.extend(strange);
+    Ok((proofs, values, code))
 }
 
 /// Names of the user's that nothing in the bags bears: topics, and nodes that come close to one that is known.
@@ -118,9 +120,7 @@ fn explain(known: &mut Findings<'_>, messages: &Stamps) {
         ) else {
             continue;
         };
-        // The place in the code says more.
-        let is_worded = known.worded.contains(&(proof.what, proof.source));
-        if is_worded || source.word.starts_with("source") {
+        if known.worded.contains(&(proof.what, proof.source)) {
             continue;
         }
         let (time, text) = match &proof.when {
