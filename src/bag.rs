@@ -21,7 +21,7 @@ use std::path::PathBuf;
 use crate::base::error::Result;
 
 pub(crate) use input::Place;
-pub use input::{FormatRow, Input, file_name};
+pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{head, place};
 pub use model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Tier, Want,

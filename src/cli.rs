@@ -96,6 +96,7 @@ fn untyped(error: &clap::Error) -> u8 {
 }
 
 fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Reading, Error> {
+    let infers = |what: &str| graph.infer.iter().any(|word| word == what);
     Ok(Reading {
         inputs: inputs.bags.iter().map(|path| input(path)).collect(),
         verify: inputs.verify,
@@ -109,7 +110,12 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
         skip_unchanged: time.skip_unchanged,
         collect: collector::Options {
             sizes: graph.bytes,
-            infer_stamps: graph.infer.is_some(),
+            infer_stamps: infers("stamps"),
+            payload_bytes: if infers("payloads") {
+                u64::MAX
+            } else {
+                collector::PAYLOAD_BYTES
+            },
             ..collector::Options::default()
         },
         graph: graph::Options {

@@ -12,8 +12,10 @@ pub(crate) mod proof;
 pub(crate) mod publishers;
 pub(crate) mod rhythm;
 pub(crate) mod source;
+pub(crate) mod spread;
 #[allow(dead_code, reason = "readers of source code need the rest")]
 pub(crate) mod syntax;
+pub(crate) mod texts;
 pub mod times;
 pub mod topology;
 
@@ -21,11 +23,13 @@ pub use claim::{Degree, EvidenceLine};
 pub use kinds::Evidence;
 pub use source::Source;
 
-use message::definition;
+use message::{definition, parameters};
 use source::{
-    NOTHING, action, bond, connection, diagnostics, discovery, dynamic_reconfigure, equal_stamps,
-    lifecycle, links, metrics, only_publisher, parameter_events, qos, recorder, rosgraph, rosout,
-    rosout_ros2, rosout_rule, service_event, statistics, topic_statistics,
+    NOTHING, action, anonymous, bond, connection, contract, diagnostics, discovery,
+    dynamic_reconfigure, echo, equal_stamps, lifecycle, links, log_text, metrics, only_publisher,
+    parameter_events, payload, private_name, qos, qos_overrides, recorder, rosgraph, rosout,
+    rosout_ros2, rosout_rule, service_event, sim_time, sister, statistics, tf_pair,
+    topic_statistics,
 };
 
 /// All kinds of evidence; a set of them ([`Evidence`]) holds at most 64.
@@ -88,7 +92,21 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "parameter_events",
         about: "`rcl_interfaces/msg/ParameterEvent`",
-        reads: &[(parameter_events::SHAPE, parameter_events::read)],
+        reads: &[(parameters::SHAPE, parameter_events::read)],
+        lasting: true,
+        ..NOTHING
+    },
+    Source {
+        word: "qos_overrides",
+        about: "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end",
+        reads: &[(parameters::SHAPE, qos_overrides::read)],
+        lasting: true,
+        ..NOTHING
+    },
+    Source {
+        word: "sim_time",
+        about: "`use_sim_time` in parameter events: such a node subscribes `/clock`",
+        reads: &[(parameters::SHAPE, sim_time::read)],
         lasting: true,
         ..NOTHING
     },
@@ -102,14 +120,35 @@ pub const SOURCES: &[Source] = &[
         ..NOTHING
     },
     Source {
+        word: "diagnostics",
+        about: "status names of `diagnostic_msgs/DiagnosticArray`, and its aggregator",
+        reads: &[
+            (diagnostics::SHAPE, diagnostics::read),
+            (diagnostics::SHAPE2, diagnostics::read),
+        ],
+        conclude: &[diagnostics::conclude],
+        ..NOTHING
+    },
+    Source {
         word: "rosout",
         about: "log records of ROS 1 (`rosgraph_msgs/Log`) and ROS 2 (`rcl_interfaces/msg/Log`)",
         reads: &[
             (definition::LOG, rosout::read),
             (definition::OLD_LOG, rosout::read),
-            (rosout_ros2::SHAPE, rosout_ros2::read),
+            (definition::LOG2, rosout_ros2::read),
         ],
         conclude: &[rosout::conclude, rosout_ros2::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "log_text",
+        about: "log texts in which a node names a topic as its own",
+        reads: &[
+            (definition::LOG, log_text::read),
+            (definition::OLD_LOG, log_text::read),
+            (definition::LOG2, log_text::read),
+        ],
+        conclude: &[log_text::conclude],
         ..NOTHING
     },
     Source {
@@ -121,19 +160,15 @@ pub const SOURCES: &[Source] = &[
         ..NOTHING
     },
     Source {
-        word: "diagnostics",
-        about: "status names of `diagnostic_msgs/DiagnosticArray`, and its aggregator",
-        reads: &[
-            (diagnostics::SHAPE, diagnostics::read),
-            (diagnostics::SHAPE2, diagnostics::read),
-        ],
-        conclude: &[diagnostics::conclude],
-        ..NOTHING
-    },
-    Source {
         word: "dynamic_reconfigure",
         about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1",
         conclude: &[dynamic_reconfigure::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "private_name",
+        about: "a topic below the full name of a node, which nobody else is known to publish",
+        conclude: &[private_name::conclude],
         ..NOTHING
     },
     Source {
@@ -150,9 +185,37 @@ pub const SOURCES: &[Source] = &[
         ..NOTHING
     },
     Source {
+        word: "echo",
+        about: "log texts that repeat a recorded message",
+        reads: &[
+            (definition::LOG, echo::read),
+            (definition::OLD_LOG, echo::read),
+            (definition::LOG2, echo::read),
+        ],
+        conclude: &[echo::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "contract",
+        about: "well-known nodes, by name and source file: their topics of the right type",
+        reads: &[
+            (definition::LOG, contract::read),
+            (definition::OLD_LOG, contract::read),
+            (definition::LOG2, contract::read),
+        ],
+        conclude: &[contract::conclude],
+        ..NOTHING
+    },
+    Source {
         word: "only_publisher",
         about: "messages that name no publisher, of topics that one node is known to publish",
         conclude: &[only_publisher::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "payload",
+        about: "messages passed on byte by byte from input to output",
+        conclude: &[payload::conclude],
         ..NOTHING
     },
     Source {
@@ -162,11 +225,30 @@ pub const SOURCES: &[Source] = &[
         ..NOTHING
     },
     Source {
+        word: "tf_pair",
+        about: "a listener of `/tf` is one of `/tf_static` too, and the other way round",
+        conclude: &[tf_pair::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "sister",
+        about: "a node whose twin in another namespace publishes the same and subscribes more",
+        conclude: &[sister::conclude],
+        ..NOTHING
+    },
+    Source {
+        word: "anonymous",
+        about: "the start inside an anonymous name (`_PID_MILLISECONDS`, `_NANOSECONDS`)",
+        conclude: &[anonymous::conclude],
+        ..NOTHING
+    },
+    Source {
         word: "recorder",
         about: "the recorder subscribes everything recorded; its log records name its source file",
         reads: &[
             (definition::LOG, recorder::read),
             (definition::OLD_LOG, recorder::read),
+            (definition::LOG2, recorder::read),
         ],
         conclude: &[recorder::conclude],
         ..NOTHING

@@ -53,6 +53,9 @@ pub struct Topic {
     pub last: Option<Stamp>,
     /// The quality of service offered, in short words, if known: `reliable transient_local depth 1`.
     pub qos: Option<Arc<str>>,
+    /// How many publishers the bag counts that nobody names, 0..; `None` if it counts none at all. They are no nodes: a
+    /// picture may show them as one small box.
+    pub unknown_publishers: Option<u32>,
 }
 
 /// A publication or a subscription, over the whole mission.

@@ -28,7 +28,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "syntax", "times"],
+        &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
         &["kinds", "proof"],
         &["publishers", "source"],
@@ -37,11 +37,11 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["build", "diff", "sending", "window"]]),
     ("mission", &[&["activity", "ledger"], &["events", "json", "phases"], &["info"]]),
     ("view", &[
-        &["cluster", "collapse", "filter", "names", "runs", "union"],
+        &["cluster", "collapse", "counts", "filter", "lives", "names", "runs", "settle", "union"],
         &["options"],
         &["group", "select"],
         &["items"],
-        &["caption", "counts", "hidden", "marks", "state"],
+        &["caption", "hidden", "marks", "state"],
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),

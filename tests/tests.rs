@@ -11,9 +11,11 @@
 mod architecture;
 mod cli;
 mod docs;
+mod edges;
 mod encode;
 mod evidence;
 mod hostile;
+mod info;
 mod layout;
 mod pages;
 mod phases;

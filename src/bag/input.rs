@@ -27,6 +27,21 @@ impl Input {
     }
 }
 
+/// The bytes that an input takes on disk, a folder's own files together; `None` for pipes and what cannot be looked at.
+pub fn size_on_disk(input: &Input) -> Option<u64> {
+    let Input::Path(path) = input else {
+        return None;
+    };
+    let size = |path: &Path| {
+        let told = std::fs::metadata(path).ok();
+        told.filter(std::fs::Metadata::is_file).map(|m| m.len())
+    };
+    match std::fs::read_dir(path) {
+        Ok(files) => Some(files.flatten().filter_map(|file| size(&file.path())).sum()),
+        Err(_) => size(path),
+    }
+}
+
 /// A row of [`FORMATS`].
 pub struct FormatRow {
     /// Its word in JSON.

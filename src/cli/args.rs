@@ -214,9 +214,9 @@ pub(super) struct GraphArgs {
     /// Add nodes and edges that the bag hides: CSV, YAML, DOT of rqt_graph, or a launch file.
     #[arg(long, value_name = "FILE")]
     pub(super) topology: Vec<PathBuf>,
-    /// Infer subscriptions from equal header stamps.
-    #[arg(long, value_name = "stamps", value_parser = ["stamps"])]
-    pub(super) infer: Option<String>,
+    /// Infer subscriptions from equal header stamps, or from equal payloads in bags larger than 64 MB too.
+    #[arg(long, value_name = "stamps,payloads", value_parser = ["stamps", "payloads"], value_delimiter = ',')]
+    pub(super) infer: Vec<String>,
     /// Read the size of every message, even where the index does not tell it.
     #[arg(long)]
     pub(super) bytes: bool,

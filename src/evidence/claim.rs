@@ -8,6 +8,7 @@ use std::io;
 use std::sync::Arc;
 
 use crate::base::time::Stamp;
+use crate::evidence::texts::Texts;
 use crate::evidence::times::{SeriesId, Stamps};
 
 /// How well something is known. Ordered: the stronger is the smaller.
@@ -79,6 +80,12 @@ pub(crate) enum Claim {
     Type(Name, Name),
     /// This topic is offered with this quality of service.
     Quality(Name, Name),
+    /// A log text of this logger says that its node publishes this topic.
+    SaysPublish(Name, Name),
+    /// A log text of this logger says that its node subscribes this topic.
+    SaysSubscribe(Name, Name),
+    /// This logger logs from this source file (its own name, no folder).
+    LogsFrom(Name, Name),
     /// A snapshot was taken: what the source claims in it but not in a later one of the same name is gone.
     Snapshot(Name),
 }
@@ -104,7 +111,10 @@ impl Claim {
             | Self::Client(a, b)
             | Self::Called(a, b)
             | Self::Type(a, b)
-            | Self::Quality(a, b) => [Some(a), Some(b)],
+            | Self::Quality(a, b)
+            | Self::SaysPublish(a, b)
+            | Self::SaysSubscribe(a, b)
+            | Self::LogsFrom(a, b) => [Some(a), Some(b)],
         }
     }
 
@@ -128,6 +138,9 @@ impl Claim {
             Self::Called(a, b) => Self::Called(to(a), to(b)),
             Self::Type(a, b) => Self::Type(to(a), to(b)),
             Self::Quality(a, b) => Self::Quality(to(a), to(b)),
+            Self::SaysPublish(a, b) => Self::SaysPublish(to(a), to(b)),
+            Self::SaysSubscribe(a, b) => Self::SaysSubscribe(to(a), to(b)),
+            Self::LogsFrom(a, b) => Self::LogsFrom(to(a), to(b)),
             Self::Snapshot(a) => Self::Snapshot(to(a)),
         }
     }
@@ -174,6 +187,12 @@ pub(crate) struct Claims {
     pub(crate) sequences: BTreeMap<usize, SeriesId>,
     /// The header stamps of streams, by the streams' places; log times are kept as if they were sizes.
     pub(crate) headers: BTreeMap<usize, SeriesId>,
+    /// The hashes of payloads, by the streams' places; kept as if they were sizes.
+    pub(crate) payloads: BTreeMap<usize, SeriesId>,
+    /// How many publishers each stream was offered by, by the streams' places.
+    pub(crate) offers: BTreeMap<usize, u32>,
+    /// What nodes log and what messages hold, as text.
+    pub(crate) spoken: Texts,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
     places: HashMap<(Claim, SourceId, Option<Name>), usize>,
@@ -254,6 +273,13 @@ impl Claims {
         let times = &mut self.times;
         let id = *self.headers.entry(place).or_insert_with(|| times.series());
         self.times.add(id, &[stamp], Some(&[log_time]));
+    }
+
+    /// Takes in the hash of a payload of the stream at `place`.
+    pub(crate) fn payload(&mut self, place: usize, time: Stamp, hash: u32) {
+        let times = &mut self.times;
+        let id = *self.payloads.entry(place).or_insert_with(|| times.series());
+        self.times.add(id, &[time], Some(&[hash]));
     }
 
     /// Takes in that `source` claims something, at `time` if it is a matter of time.

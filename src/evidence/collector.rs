@@ -13,14 +13,15 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::{Claims, SourceId};
 use crate::evidence::message::cursor::Cursor;
+use crate::evidence::message::dynamic::Schema;
 use crate::evidence::proof::{Reliability, Stream};
 use crate::evidence::publishers;
-use crate::evidence::source::{self, Read, SourceContext, equal_stamps};
+use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
 use crate::evidence::{EvidenceLine, SOURCES};
 
 /// What to look at while reading.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Know every payload's size, even if that means reading more than the index.
     pub sizes: bool,
@@ -28,7 +29,27 @@ pub struct Options {
     pub why: Vec<String>,
     /// Infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
     pub infer_stamps: bool,
+    /// The beginnings of payloads are compared with each other and with log texts, up to this many bytes of them; 0: none,
+    /// and none is read for it.
+    pub payload_bytes: u64,
 }
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            sizes: false,
+            why: Vec::new(),
+            infer_stamps: false,
+            payload_bytes: PAYLOAD_BYTES,
+        }
+    }
+}
+
+/// Bytes of payload that are compared unless asked otherwise: a tenth of a second of work, and enough for an hour of a
+/// small robot without cameras.
+pub const PAYLOAD_BYTES: u64 = 64 << 20;
+/// What a payload costs besides its bytes: its hash is kept.
+const PAYLOAD_ENTRY: u64 = 64;
 
 /// Takes in bags, one after another.
 #[derive(Debug, Default)]
@@ -39,6 +60,10 @@ pub struct Collector {
     readers: Vec<Vec<(SourceId, Read)>>,
     /// Whether the header stamps of each stream are wanted.
     stamped: Vec<bool>,
+    /// How to take the messages of each stream apart for words and numbers, where they hold any.
+    schemas: Vec<Option<Schema>>,
+    /// Bytes of payload compared so far.
+    compared: u64,
     messages: Stamps,
     facts: Claims,
     notices: Notices,
@@ -96,6 +121,8 @@ impl Collector {
             };
             equal_stamps::hear(&mut heard, message.data);
         }
+        self.compare(place, message);
+        let stream = &self.streams[place];
         for (source, read) in &self.readers[place] {
             let mut heard = SourceContext {
                 facts: &mut self.facts,
@@ -110,6 +137,30 @@ impl Collector {
                 self.notices
                     .add(undecodable(stream, "some messages do not have its layout"));
             }
+        }
+    }
+
+    /// Keeps what a payload has in common with others, as long as the budget lasts.
+    fn compare(&mut self, place: usize, message: &Message<'_>) {
+        let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
+        self.compared = self
+            .compared
+            .saturating_add(beginning.len() as u64 + PAYLOAD_ENTRY);
+        if self.compared > self.options.payload_bytes {
+            return;
+        }
+        let mut heard = SourceContext {
+            facts: &mut self.facts,
+            stream: &self.streams[place],
+            place,
+            source: 0,
+            time: Some(message.time),
+        };
+        payload::hear(&mut heard, beginning, message.size);
+        if let Some(schema) = &self.schemas[place]
+            && beginning.len() == message.size as usize
+        {
+            echo::hear(&mut heard, schema, beginning);
         }
     }
 
@@ -200,8 +251,10 @@ impl Sink for BagSink<'_> {
                 .add(undecodable(&stream, "its definition is not the known one"));
         }
         let stamped = all.options.infer_stamps && equal_stamps::is_stamped(connection);
+        let compared = all.options.payload_bytes > 0;
         let want = match (readers.is_empty(), stamped, all.options.sizes) {
             (false, ..) => Want::Payload,
+            _ if compared => Want::Head(payload::HEAD),
             (true, true, _) => Want::Head(equal_stamps::HEAD),
             (true, false, true) => Want::Sizes,
             (true, false, false) => Want::Stamps,
@@ -210,6 +263,9 @@ impl Sink for BagSink<'_> {
         all.streams.push(stream);
         all.readers.push(readers);
         all.stamped.push(stamped);
+        let definition = connection.definition.as_deref();
+        let schema = echo::schema(&connection.type_name, definition);
+        all.schemas.push(schema.filter(|_| compared));
         all.announced();
         want
     }

@@ -1,12 +1,16 @@
 //! What the claims of a mission amount to: every reason to believe in a node, a topic or an edge.
 
+mod closed;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
 use crate::bag::Connection;
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Claim, ClaimRecord, Claims, Degree, Name, SourceId};
+use crate::evidence::SOURCES;
+use crate::evidence::claim::{Claim, ClaimRecord, Claims, Degree, EvidenceLine, Name, SourceId};
+use crate::evidence::proof::closed::Closed;
 use crate::evidence::rhythm::Rhythm;
 use crate::evidence::times::SeriesId;
 
@@ -129,32 +133,50 @@ pub(crate) struct Findings<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: &'a mut Claims,
     pub(crate) proofs: Vec<Proof>,
-    /// The mission's last moment.
-    end: Stamp,
+    /// Reasons that were put into words by who gave them, while somebody asks why.
+    pub(crate) worded: BTreeSet<(Key, SourceId)>,
+    /// Publications whose messages are those of another topic, byte by byte.
+    pub(crate) copies: BTreeSet<(Name, Name)>,
+    /// The mission's first and last moment.
+    pub(crate) mission: (Stamp, Stamp),
     /// Why times could not be read, if so.
     pub(crate) failed: Option<io::Error>,
     publishers: BTreeMap<Name, BTreeSet<Name>>,
+    subscribers: BTreeMap<Name, BTreeSet<Name>>,
     nodes: BTreeSet<Name>,
+    closed: Option<Closed>,
 }
 
 impl<'a> Findings<'a> {
-    pub(crate) fn new(streams: &'a [Stream], facts: &'a mut Claims, end: Stamp) -> Self {
+    pub(crate) fn new(
+        streams: &'a [Stream],
+        facts: &'a mut Claims,
+        mission: (Stamp, Stamp),
+    ) -> Self {
         Self {
-            end,
+            mission,
             streams,
             facts,
             proofs: Vec::new(),
+            worded: BTreeSet::new(),
+            copies: BTreeSet::new(),
             failed: None,
             publishers: BTreeMap::new(),
+            subscribers: BTreeMap::new(),
             nodes: BTreeSet::new(),
+            closed: None,
         }
     }
 
     /// Adds a reason.
     pub(crate) fn prove(&mut self, proof: Proof) {
         match proof.what {
-            Key::Node(node) | Key::Subscribe(_, node) => {
+            Key::Node(node) => {
                 self.nodes.insert(node);
+            }
+            Key::Subscribe(topic, node) => {
+                self.nodes.insert(node);
+                self.subscribers.entry(topic).or_default().insert(node);
             }
             Key::Publish(node, topic) => {
                 self.nodes.insert(node);
@@ -163,6 +185,123 @@ impl<'a> Findings<'a> {
             Key::Topic(_) => {}
         }
         self.proofs.push(proof);
+    }
+
+    /// Adds a reason, with the words it rests on for those who ask why; `time` if it is a matter of one.
+    pub(crate) fn because(
+        &mut self,
+        proof: Proof,
+        time: Option<Stamp>,
+        words: impl FnOnce(&Self) -> String,
+    ) {
+        if self.facts.is_watched(proof.what.names()) {
+            let text = words(self);
+            self.worded.insert((proof.what, proof.source));
+            self.facts.pieces.push(EvidenceLine {
+                time,
+                source: SOURCES.get(proof.source).map_or("", |s| s.word),
+                degree: proof.degree,
+                text,
+            });
+        }
+        self.prove(proof);
+    }
+
+    /// Adds what a rule infers, alive as long as `basis`, unless it is known already or something stronger is known
+    /// against it.
+    pub(crate) fn infer(
+        &mut self,
+        source: SourceId,
+        what: Key,
+        basis: Key,
+        words: impl FnOnce(&Self) -> String,
+    ) {
+        if !self.knows(what) && !self.denies(what) {
+            let proof = Proof {
+                what,
+                source,
+                degree: Degree::Inferred,
+                when: Validity::Like(basis),
+            };
+            self.because(proof, None, words);
+        }
+    }
+
+    /// The same for a topic whose messages name no publisher: the node publishes it whenever there are messages.
+    pub(crate) fn infer_publisher(
+        &mut self,
+        source: SourceId,
+        node: Name,
+        topic: Name,
+        words: impl Fn(&Self) -> String,
+    ) {
+        let what = Key::Publish(node, topic);
+        if self.knows(what) || self.denies(what) {
+            return;
+        }
+        for (at, stream) in self.streams.iter().enumerate() {
+            if stream.topic == topic && stream.publisher.is_none() {
+                let proof = Proof {
+                    what,
+                    source,
+                    degree: Degree::Inferred,
+                    when: Validity::Messages(at),
+                };
+                self.because(proof, None, &words);
+            }
+        }
+    }
+
+    /// Whether somebody gave a reason for this element already.
+    pub(crate) fn knows(&self, what: Key) -> bool {
+        match what {
+            Key::Node(node) => self.nodes.contains(&node),
+            Key::Topic(topic) => self.is_recorded(topic),
+            Key::Publish(node, topic) => self.publishers(topic).any(|n| n == node),
+            Key::Subscribe(topic, node) => self.subscribers(topic).any(|n| n == node),
+        }
+    }
+
+    /// Whether a complete list, or every message's own header, speaks against an edge.
+    pub(crate) fn denies(&mut self, what: Key) -> bool {
+        let closed = match self.closed.take() {
+            Some(closed) => closed,
+            None => Closed::new(self),
+        };
+        let denies = closed.denies(what);
+        self.closed = Some(closed);
+        denies
+    }
+
+    /// Whether a bag has a connection of this topic, be it without messages.
+    pub(crate) fn is_recorded(&self, topic: Name) -> bool {
+        self.streams.iter().any(|s| s.topic == topic)
+    }
+
+    /// The type of a recorded topic as ROS 1 writes it, without `/msg`; empty if no bag tells it.
+    pub(crate) fn kind(&self, topic: Name) -> String {
+        let stream = self.streams.iter().find(|s| s.topic == topic);
+        stream.map_or_else(String::new, |s| {
+            s.connection.type_name.replacen("/msg/", "/", 1)
+        })
+    }
+
+    /// How many publishers a topic had when its recording began; `None` if the bag does not tell.
+    pub(crate) fn offers(&self, topic: Name) -> Option<u32> {
+        offered(&self.facts.offers, self.streams, topic)
+    }
+
+    /// The known node that a logger belongs to: the one of its name, or the nearest above it.
+    pub(crate) fn owner(&self, logger: &str) -> Option<Name> {
+        let mut above = logger;
+        while !above.is_empty() {
+            let node = self.facts.known(above);
+            if let Some(node) = node.filter(|n| self.nodes.contains(n)) {
+                return Some(node);
+            }
+            above = &above[..above.rfind('/').unwrap_or(0)];
+        }
+        None
     }
 
     /// Everybody who names this topic as its own, as publisher or subscriber.
@@ -175,6 +314,23 @@ impl<'a> Findings<'a> {
     /// Everybody who is known to publish `topic` so far.
     pub(crate) fn publishers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
         self.publishers.get(&topic).into_iter().flatten().copied()
+    }
+
+    /// Everybody who is known to subscribe `topic` so far.
+    pub(crate) fn subscribers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
+        self.subscribers.get(&topic).into_iter().flatten().copied()
+    }
+
+    /// All subscriptions known so far, as topic and node.
+    pub(crate) fn subscriptions(&self) -> impl Iterator<Item = (Name, Name)> + '_ {
+        let all = self.subscribers.iter();
+        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*topic, *node)))
+    }
+
+    /// All publications known so far, as node and topic.
+    pub(crate) fn publications(&self) -> impl Iterator<Item = (Name, Name)> + '_ {
+        let all = self.publishers.iter();
+        all.flat_map(|(topic, nodes)| nodes.iter().map(move |node| (*node, *topic)))
     }
 
     /// Every node known so far.
@@ -224,11 +380,13 @@ impl<'a> Findings<'a> {
     /// The node that a name without its namespace means: the only known one that ends so, else one of this name.
     pub(crate) fn meant(&self, node: Name) -> Name {
         let text = self.text(node);
-        let mut ending = self
-            .nodes
-            .iter()
-            .filter(|n| self.text(**n).ends_with(&*text));
-        match (self.nodes.contains(&node), ending.next(), ending.next()) {
+        let loggers = self.facts.list.iter().filter_map(|fact| match fact.claim {
+            Claim::Logger(name, _) => Some(name),
+            _ => None,
+        });
+        let names: BTreeSet<Name> = loggers.chain(self.nodes.iter().copied()).collect();
+        let mut ending = names.iter().filter(|n| self.text(**n).ends_with(&*text));
+        match (names.contains(&node), ending.next(), ending.next()) {
             (false, Some(only), None) => *only,
             _ => node,
         }
@@ -269,7 +427,7 @@ impl<'a> Findings<'a> {
         for sign in signs {
             rhythm.hear(*sign);
         }
-        !rhythm.broke_off(self.end)
+        !rhythm.broke_off(self.mission.1)
     }
 
     /// What the claims say without any rule: nodes, topics, publications and subscriptions. `lasting` tells whether
@@ -345,6 +503,17 @@ impl<'a> Findings<'a> {
         ends.dedup();
         (signs, ends)
     }
+}
+
+/// How many publishers were offered on a topic, at most in one bag.
+pub(crate) fn offered(
+    offers: &BTreeMap<usize, u32>,
+    streams: &[Stream],
+    topic: Name,
+) -> Option<u32> {
+    let of_topic = |at: &usize| streams.get(*at).is_some_and(|s| s.topic == topic);
+    let counts = offers.iter().filter(|(at, _)| of_topic(at));
+    counts.map(|(_, count)| *count).max()
 }
 
 /// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.

@@ -1,25 +1,35 @@
 //! A kind of evidence: what it reads, and where its claims go. One file per kind.
 
 pub(crate) mod action;
+pub(crate) mod anonymous;
 pub(crate) mod bond;
 pub(crate) mod connection;
+pub(crate) mod contract;
 pub(crate) mod diagnostics;
 pub(crate) mod discovery;
 pub(crate) mod dynamic_reconfigure;
+pub(crate) mod echo;
 pub(crate) mod equal_stamps;
 pub(crate) mod lifecycle;
 pub(crate) mod links;
+pub(crate) mod log_text;
 pub(crate) mod metrics;
 pub(crate) mod only_publisher;
 pub(crate) mod parameter_events;
+pub(crate) mod payload;
+pub(crate) mod private_name;
 pub(crate) mod qos;
+pub(crate) mod qos_overrides;
 pub(crate) mod recorder;
 pub(crate) mod rosgraph;
 pub(crate) mod rosout;
 pub(crate) mod rosout_ros2;
 pub(crate) mod rosout_rule;
 pub(crate) mod service_event;
+pub(crate) mod sim_time;
+pub(crate) mod sister;
 pub(crate) mod statistics;
+pub(crate) mod tf_pair;
 pub(crate) mod topic_statistics;
 
 use crate::base::time::Stamp;

@@ -7,6 +7,7 @@ mod budget;
 mod csv;
 mod dot;
 pub(crate) mod launch;
+pub(crate) mod nearest;
 mod python;
 mod substitution;
 mod tree;
@@ -39,7 +40,7 @@ pub struct Entry {
     pub element: Element,
     /// From when, in nanoseconds after the mission's start; `None`: from the start.
     pub from_ns: Option<i64>,
-    /// Until when; `None`: to the end.
+    /// Until when, exclusive; `None`: to the end.
     pub to_ns: Option<i64>,
     /// Whether it only declares what should run (a launch file) and does not state what did.
     pub declared: bool,

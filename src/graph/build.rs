@@ -23,7 +23,7 @@ use self::values::Values;
 use self::windows::Windows;
 use super::{Elements, Graph, NodeId};
 use crate::base::error::Result;
-use crate::base::notice::Notices;
+use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
 use crate::evidence::collector::{Collected, spool_error};
@@ -77,11 +77,13 @@ struct Builder<'a> {
     rates: Traffic,
     restarts: Restarts,
     values: Values,
+    /// Names of the user's that the bag does not know.
+    strange: Vec<Notice>,
 }
 
 impl<'a> Builder<'a> {
     fn new(collected: &mut Collected, windows: &'a [Span], options: &Options) -> io::Result<Self> {
-        let (proofs, values) = prove(collected, options)?;
+        let (proofs, values, strange) = prove(collected, options)?;
         let start = collected.span.map_or(Stamp(0), |s| s.start);
         let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
         Ok(Self {
@@ -92,6 +94,7 @@ impl<'a> Builder<'a> {
             rates: BTreeMap::new(),
             restarts: Restarts::new(),
             values,
+            strange,
         })
     }
 
@@ -108,10 +111,10 @@ impl<'a> Builder<'a> {
                 grace: options.grace,
             },
         );
+        let strange = std::mem::take(&mut self.strange);
         let mut built = self.assemble(collected);
-        built
-            .notices
-            .extend(options.topology.notices.iter().cloned());
+        let told = options.topology.notices.iter().cloned();
+        built.notices.extend(told.chain(strange));
         Ok(built)
     }
 
@@ -149,7 +152,14 @@ impl<'a> Builder<'a> {
                         continue;
                     };
                     let place = streams.iter().position(|s| s == at).unwrap_or(0);
-                    follow(track, rates, place, stream.latched, self.mission.1);
+                    follow(
+                        track,
+                        rates,
+                        place,
+                        stream.latched,
+                        self.mission.1,
+                        proof.degree,
+                    );
                     if !deaths.is_empty() {
                         let times = collected.messages.times(stream.times)?;
                         track.bound_all(&times, &deaths);
@@ -217,8 +227,15 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Puts the messages of one stream on a track.
-fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end: Stamp) {
+/// Puts the messages of one stream on a track, which `degree` ties them to.
+fn follow(
+    track: &mut Liveness,
+    rates: &Rates,
+    place: usize,
+    latched: bool,
+    end: Stamp,
+    degree: Degree,
+) {
     let Some(spoke) = rates.traces.get(place).copied().flatten() else {
         track.extent = track.extent.max(Extent::Whole);
         return;
@@ -232,6 +249,6 @@ fn follow(track: &mut Liveness, rates: &Rates, place: usize, latched: bool, end:
             .map_or(Some(spoke.first), |l| Some(l.min(spoke.first)));
     }
     for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
-        track.mark(tally.window, Degree::Measured);
+        track.mark(tally.window, degree);
     }
 }

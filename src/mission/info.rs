@@ -7,16 +7,16 @@ mod why;
 
 use serde::Serialize;
 
-pub use advice::advice;
+use advice::advice;
 pub(crate) use survey::survey_table;
 pub use survey::{SurveyRow, survey_text};
 pub use text::text;
 pub use why::why;
 
+use crate::base::name::is_recorder;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, NodeId};
 use crate::mission::Mission;
-use crate::mission::activity::records;
 
 /// All that `bagreel info` tells of one mission. Written as JSON with these names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,7 +39,9 @@ pub struct Info {
     pub publishes_by_degree: Degrees,
     /// How many subscriptions are known how well.
     pub subscribes_by_degree: Degrees,
-    /// Topics that carry messages and of which no subscriber is known.
+    /// Topics that carry messages and of which no publisher is known.
+    pub topics_without_publisher: usize,
+    /// Topics that carry messages and of which no subscriber is known; the recorder is none.
     pub topics_without_subscriber: usize,
     /// Each kind of evidence found, with what it proves.
     pub evidence: Vec<EvidenceInfo>,
@@ -93,6 +95,14 @@ impl Degrees {
     }
 }
 
+impl FromIterator<Degree> for Degrees {
+    fn from_iter<T: IntoIterator<Item = Degree>>(degrees: T) -> Self {
+        let mut all = Self::default();
+        degrees.into_iter().for_each(|degree| all.add(degree));
+        all
+    }
+}
+
 /// A kind of evidence and how much it proves.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct EvidenceInfo {
@@ -123,6 +133,8 @@ pub struct TopicInfo {
     pub publishers: Vec<String>,
     /// Who subscribes it, as far as known.
     pub subscribers: Vec<String>,
+    /// Publishers that the bag counts and nobody names; `None` if it counts none.
+    pub unknown_publishers: Option<u32>,
     /// Quality of service, if known.
     pub qos: Option<String>,
     /// Messages per equal part of the mission.
@@ -159,8 +171,8 @@ pub fn info(mission: &Mission) -> Info {
     let sent = sent(mission);
     let topics = topics(mission);
     let nodes = elements.nodes.iter().enumerate().map(|(id, node)| {
-        let own = |edge: &&Edge| edge.node as usize == id;
-        let subscribed = || elements.subscribes.iter().filter(own);
+        let own = |edge: &&crate::graph::Edge| edge.node as usize == id;
+        let subscribed = || listeners(mission).map(|(_, edge)| edge).filter(own);
         let received = subscribed()
             .map(|edge| topics[edge.topic as usize].count)
             .sum();
@@ -176,29 +188,36 @@ pub fn info(mission: &Mission) -> Info {
             received: (subscribed().count() > 0).then_some(received),
         }
     });
-    let heard = heard(mission);
-    let silent_ears = topics
-        .iter()
-        .zip(heard)
-        .filter(|(topic, heard)| topic.count > 0 && !heard)
-        .count();
-    Info {
+    let mut info = Info {
         schema: "bagreel.info/1",
         bags: bags(mission),
         start_ns: mission.span.start.0,
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: counted(&best.nodes),
-        publishes_by_degree: counted(&best.publishes),
-        subscribes_by_degree: counted(&best.of_listeners(mission)),
-        topics_without_subscriber: silent_ears,
+        nodes_by_degree: best.nodes.iter().copied().collect(),
+        publishes_by_degree: best.publishes.iter().copied().collect(),
+        subscribes_by_degree: listeners(mission)
+            .map(|(id, _)| best.subscribes[id])
+            .collect(),
+        topics_without_publisher: lacking(&topics, |t| t.publishers.is_empty()),
+        topics_without_subscriber: lacking(&topics, |t| t.subscribers.is_empty()),
         evidence: evidence(mission),
         nodes: nodes.collect(),
         topics,
-        advice: advice(mission, silent_ears),
+        advice: Vec::new(),
         notices: mission.notices.iter().map(|n| n.text).collect(),
-    }
+    };
+    info.advice = advice(&info, is_ros1(mission));
+    info
+}
+
+/// Whether the bags come from ROS 1, in whatever format; `None` for a mission that nobody recorded.
+fn is_ros1(mission: &Mission) -> Option<bool> {
+    let bag = mission.bags.first()?;
+    let mut facts = bag.facts.iter();
+    let profile = facts.any(|(key, value)| key == "profile" && value == "ros1");
+    Some(bag.format == "rosbag1" || profile)
 }
 
 /// Any part of this module as JSON, ending in a new line.
@@ -253,40 +272,26 @@ impl BestDegrees {
         }
         best
     }
-
-    /// Of the subscriptions, those that are no recorder's.
-    fn of_listeners(&self, mission: &Mission) -> Vec<Degree> {
-        let edges = mission.elements.subscribes.iter().zip(&self.subscribes);
-        let own = edges.filter(|(edge, _)| !is_recorders(mission, edge));
-        own.map(|(_, degree)| *degree).collect()
-    }
-}
-
-/// Whether an edge belongs to a recorder or a player, which listen to everything and are no part of the robot.
-fn is_recorders(mission: &Mission, edge: &Edge) -> bool {
-    records(&mission.elements.nodes[edge.node as usize])
-}
-
-/// Whether each topic has a subscriber that is no recorder.
-fn heard(mission: &Mission) -> Vec<bool> {
-    let mut heard = vec![false; mission.elements.topics.len()];
-    let edges = mission.elements.subscribes.iter();
-    for edge in edges.filter(|edge| !is_recorders(mission, edge)) {
-        heard[edge.topic as usize] = true;
-    }
-    heard
 }
 
 fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
-fn counted(degrees: &[Degree]) -> Degrees {
-    let mut all = Degrees::default();
-    for degree in degrees {
-        all.add(*degree);
-    }
-    all
+/// Subscriptions with their ids, without those of the recorder, who is no part of the robot.
+fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
+    let elements = &mission.elements;
+    let is_recorder = |edge: &Edge| {
+        let node = &elements.nodes[edge.node as usize];
+        is_recorder(node.name.as_str()) || node.evidence.words().any(|word| word == "recorder")
+    };
+    let edges = elements.subscribes.iter().enumerate();
+    edges.filter(move |(_, edge)| !is_recorder(edge))
+}
+
+/// How many topics with messages lack something.
+fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
+    topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
 }
 
 /// Messages that each node sent; `None` where no count is known.
@@ -314,6 +319,7 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
             bytes: None,
             publishers: Vec::new(),
             subscribers: Vec::new(),
+            unknown_publishers: topic.unknown_publishers,
             qos: topic.qos.as_deref().map(str::to_owned),
             activity: vec![0; mission.windows.len()],
         })
@@ -332,7 +338,7 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
     for edge in &elements.publishes {
         topics[edge.topic as usize].publishers.push(name(edge.node));
     }
-    for edge in &elements.subscribes {
+    for (_, edge) in listeners(mission) {
         topics[edge.topic as usize]
             .subscribers
             .push(name(edge.node));
@@ -362,7 +368,7 @@ fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {
         source,
         nodes: count(&mut elements.nodes.iter().map(|n| n.evidence), source),
         publishes: count(&mut elements.publishes.iter().map(|e| e.evidence), source),
-        subscribes: count(&mut elements.subscribes.iter().map(|e| e.evidence), source),
+        subscribes: count(&mut listeners(mission).map(|(_, e)| e.evidence), source),
     });
     rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0)
         .collect()

@@ -61,7 +61,7 @@ pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     let (mut mission, _) = explain(reading, watch)?;
     if reading.verify && mission_file(&reading.inputs)?.is_none() {
         watch.stage(Stage::Verify);
-        let second = build(Recorded::read(reading, true, watch)?, reading, watch)?;
+        let second = build(&mut Recorded::read(reading, true, watch)?, reading, watch)?;
         compare(&mut mission, &second);
     }
     Ok(mission)
@@ -77,9 +77,9 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
     if let Some(path) = mission_file(&reading.inputs)? {
         return Ok((reread(path, reading)?, Vec::new()));
     }
-    let recorded = Recorded::read(reading, false, watch)?;
-    let pieces = recorded.collected.why();
-    Ok((build(recorded, reading, watch)?, pieces))
+    let mut recorded = Recorded::read(reading, false, watch)?;
+    let mission = build(&mut recorded, reading, watch)?;
+    Ok((mission, recorded.collected.why()))
 }
 
 /// The path of the evolution that is the only input; `None` for bags.
@@ -135,7 +135,7 @@ impl Recorded {
         let range = known
             .map(|span| window::range(&reading.division, span))
             .transpose()?;
-        let mut collector = Collector::new(reading.collect.clone());
+        let mut collector = Collector::new(affordable(reading));
         let mut bags = Vec::new();
         for reader in &mut readers {
             let mut progress = |done, total| watch.progress(done, total);
@@ -155,6 +155,17 @@ impl Recorded {
             range,
         })
     }
+}
+
+/// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
+/// use if every payload were read.
+fn affordable(reading: &Reading) -> collector::Options {
+    let mut options = reading.collect.clone();
+    let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
+    if sizes.fold(0, u64::saturating_add) > options.payload_bytes {
+        options.payload_bytes = 0;
+    }
+    options
 }
 
 fn no_messages(inputs: &[Input]) -> Error {
@@ -181,15 +192,15 @@ pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>
     Ok(all)
 }
 
-fn build(mut recorded: Recorded, reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
+fn build(recorded: &mut Recorded, reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     watch.stage(Stage::Graphs);
     let windows = window::divide(&reading.division, recorded.range)?;
-    let mut mission = graphs(&mut recorded, &windows, reading)?;
+    let mut mission = graphs(recorded, &windows, reading)?;
     if reading.skip_unchanged {
         let merged = merged(&mission, &windows);
-        mission = graphs(&mut recorded, &merged, reading)?;
+        mission = graphs(recorded, &merged, reading)?;
     }
-    mission.activity = activity(&mut recorded, &mission, reading)?;
+    mission.activity = activity(recorded, &mission, reading)?;
     mission.ledger.phases = phases(&mission.elements, &mission.activity);
     if reading.division.length == Length::Auto {
         let text = format!("the period is {}; `--period` takes another", windows.period);

@@ -150,6 +150,7 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
                 first: None,
                 last: None,
                 qos: None,
+                unknown_publishers: None,
             })
             .collect(),
     }

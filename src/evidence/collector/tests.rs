@@ -144,6 +144,7 @@ fn roscpp_names_what_it_publishes() {
     assert_eq!(
         claims("/rosout", "rosgraph_msgs/Log", Some("/a"), &record),
         [
+            "LogsFrom /a a.cpp",
             "Node /a",
             "Publish /a /rosout",
             "Publish /a /scan",
@@ -157,7 +158,12 @@ fn rospy_names_what_it_publishes_and_subscribes() {
     let record = Payload::log("/a", "hello", "a.py", &["/scan"]);
     assert_eq!(
         claims("/rosout_agg", "rosgraph_msgs/Log", Some("/rosout"), &record),
-        ["Lists /a /scan", "Node /a", "Snapshot topics of /a"]
+        [
+            "Lists /a /scan",
+            "LogsFrom /a a.py",
+            "Node /a",
+            "Snapshot topics of /a"
+        ]
     );
 }
 
@@ -271,6 +277,7 @@ fn every_layout_survives_any_cut() {
 fn flow() -> Collector {
     let mut collector = Collector::new(Options {
         infer_stamps: true,
+        payload_bytes: 0,
         why: vec!["/detector".into(), "/image".into()],
         ..Options::default()
     });

@@ -14,7 +14,7 @@ fn a_log_record_of_ros2_names_its_logger() {
         .u32(1);
     assert_eq!(
         claims("/rosout", "rcl_interfaces/msg/Log", None, &record),
-        ["Logger /r1/nav /rosout"]
+        ["Logger /r1/nav /rosout", "LogsFrom /r1/nav f"]
     );
 }
 

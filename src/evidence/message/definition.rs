@@ -53,6 +53,20 @@ pub(crate) const OLD_LOG: Shape = Shape {
     ..LOG
 };
 
+/// `rcl_interfaces/msg/Log`.
+pub(crate) const LOG2: Shape = Shape {
+    type_name: "rcl_interfaces/Log",
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[
+        (
+            "",
+            "Time stamp;byte level;string name;string msg;string file;string function;uint32 line",
+        ),
+        TIME2,
+    ],
+};
+
 impl Shape {
     /// Whether the messages of a connection can be read.
     pub(crate) fn fit(&self, connection: &Connection) -> Fit {

@@ -3,14 +3,14 @@
 use crate::evidence::message::cursor::{Cursor, Result};
 use crate::evidence::message::definition::outline;
 
-/// A part of a message. Numbers are not kept.
+/// A part of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
     Text(String),
     /// An unsigned number of one byte.
     Byte(u8),
-    /// Any other number.
-    Number,
+    /// Any other number, with its value if it is a whole number.
+    Number(Option<i128>),
     List(Vec<Self>),
     /// Fields by name.
     Fields(Vec<(String, Self)>),
@@ -61,6 +61,20 @@ impl Schema {
         Self(outline(definition))
     }
 
+    /// The schema of a definition's text, if the message itself holds words or whole numbers.
+    pub(crate) fn of_words(definition: &str) -> Option<Self> {
+        const KINDS: [&str; 7] = [
+            "string", "int16", "uint16", "int32", "uint32", "int64", "uint64",
+        ];
+        let schema = Self::of_text(definition);
+        let (_, own) = schema.0.first()?;
+        let holds = own.split(';').any(|field| {
+            let kind = field.split(' ').next().unwrap_or_default();
+            KINDS.contains(&kind)
+        });
+        holds.then_some(schema)
+    }
+
     /// A schema of ours: the message's fields under the empty name, then those of the messages inside it.
     pub(crate) fn of_fields(fields: &[(&str, &str)]) -> Self {
         let own = |(name, fields): &(&str, &str)| ((*name).to_owned(), (*fields).to_owned());
@@ -109,22 +123,34 @@ impl Schema {
 
     fn one(&self, payload: &mut Cursor<'_>, kind: &str, depth: usize) -> Result<Value> {
         match kind {
-            "string" => return payload.string().map(|text| Value::Text(text.to_owned())),
-            "byte" => return payload.u8().map(Value::Byte),
-            "int16" | "uint16" => payload.u16().map(drop)?,
-            "int32" | "uint32" | "float32" => payload.u32().map(drop)?,
-            "int64" | "uint64" | "float64" => payload.u64().map(drop)?,
+            "string" => payload.string().map(|text| Value::Text(text.to_owned())),
+            "byte" => payload.u8().map(Value::Byte),
+            "int16" => whole(payload.u16()?.cast_signed()),
+            "uint16" => whole(payload.u16()?),
+            "int32" => whole(payload.u32()?.cast_signed()),
+            "uint32" => whole(payload.u32()?),
+            "int64" => whole(payload.i64()?),
+            "uint64" => whole(payload.u64()?),
+            "float32" => payload.u32().map(|_| Value::Number(None)),
+            "float64" => payload.u64().map(|_| Value::Number(None)),
             _ => {
                 let known = self.0.iter().map(|(n, f)| (n.as_str(), f.as_str())).skip(1);
                 let fields = known.chain(BUILT_IN).find(|(name, _)| *name == kind);
-                return match fields {
+                match fields {
                     Some((_, fields)) if depth < DEEPEST => self.fields(payload, fields, depth + 1),
                     _ => Err(payload.wrong("a known type")),
-                };
+                }
             }
         }
-        Ok(Value::Number)
     }
+}
+
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "an arm among others that may fail"
+)]
+fn whole(number: impl Into<i128>) -> Result<Value> {
+    Ok(Value::Number(Some(number.into())))
 }
 
 #[cfg(test)]

@@ -1,22 +1,24 @@
 //! Data flow, when asked for: a node that publishes messages whose header stamps equal those of an input just before,
 //! again and again, subscribes that input.
 //!
-//! Fails where nodes stamp their output anew, where two nodes on the same input always answer in the same order (the
-//! later one seems to listen to the earlier one), and where sources are triggered together.
+//! Fails where nodes stamp their output anew, and where sources are triggered together. Where two inputs could be meant
+//! and nothing tells them apart, nothing is said.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceContext;
 use crate::bag::{Connection, Encoding};
 use crate::base::time::Stamp;
-use crate::evidence::claim::{Degree, EvidenceLine, Name, SourceId};
+use crate::evidence::claim::{Name, SourceId};
 use crate::evidence::message::cursor::Cursor;
 use crate::evidence::message::definition::outline;
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Findings, Key};
+use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
 
-/// Bytes from a payload's start to the end of its header's stamp, in either encoding.
-pub(crate) const HEAD: usize = 12;
+/// Bytes from a payload's start to the end of its first header's stamp, in either encoding, be it behind the length of a
+/// list.
+pub(crate) const HEAD: usize = 16;
 
 /// Fewer equal stamps than this are chance.
 const FEWEST: u64 = 10;
@@ -24,19 +26,34 @@ const FEWEST: u64 = 10;
 const SHARE: u64 = 60;
 /// Of a hundred pairs with equal stamps so many must have the input first.
 const ORDERED: u64 = 95;
+/// Inputs with so many of a hundred matches of the best one are as good as it.
+const AS_GOOD: u64 = 97;
 /// More streams than this with one stamp are a clock, not a flow.
 const MOST_AT_ONCE: usize = 32;
 /// Log times are kept in these units, modulo 2^32.
 const UNIT_NS: i64 = 10_000;
 /// The longest a node takes to answer, in units (1 s).
 const ANSWER: i32 = 100_000;
+/// Log records carry the stamps of what they are about.
+const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
+/// Lists whose first element begins with a header.
+const LISTS: [&str; 3] = [
+    "tf2_msgs/TFMessage",
+    "tf/tfMessage",
+    "visualization_msgs/MarkerArray",
+];
 
-/// Whether a connection's messages begin with a header, as far as the bag tells.
+/// Whether a connection's messages begin with a header, or with a list of what does, as far as the bag tells.
 pub(crate) fn is_stamped(connection: &Connection) -> bool {
+    if LOGS.contains(&connection.topic.as_str()) {
+        return false;
+    }
     let definition = connection.definition.as_deref().unwrap_or_default();
-    if definition.trim().is_empty() {
+    if definition.trim().is_empty() || is_list(connection) {
         let kind = &connection.type_name;
-        return kind.starts_with("sensor_msgs/") || kind.ends_with("Stamped");
+        return kind.starts_with("sensor_msgs/")
+            || kind.ends_with("Stamped")
+            || is_list(connection);
     }
     let fields = outline(definition);
     fields
@@ -44,10 +61,18 @@ pub(crate) fn is_stamped(connection: &Connection) -> bool {
         .is_some_and(|(_, fields)| fields.starts_with("Header "))
 }
 
+fn is_list(connection: &Connection) -> bool {
+    LISTS.contains(&connection.type_name.replacen("/msg/", "/", 1).as_str())
+}
+
 /// Keeps the stamp of a message, together with its log time.
 pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
-    let encoding = &heard.stream.connection.encoding;
+    let connection = &heard.stream.connection;
+    let encoding = &connection.encoding;
     let stamp = Cursor::new(encoding, first_bytes).and_then(|mut payload| {
+        if is_list(connection) && payload.u32()? == 0 {
+            return Ok(Stamp(0));
+        }
         if *encoding == Encoding::Ros1 {
             payload.u32()?;
         }
@@ -66,69 +91,168 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
     }
 }
 
-/// What equal stamps say about two streams.
+/// What equal stamps say about two flows.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pair {
     equal: u64,
     /// How often the input came first, and not long before.
     before: u64,
-    /// How long before, in units, all together.
-    ahead: u64,
+    /// How long before, in seconds.
+    lag: Spread,
+}
+
+/// Messages of one topic by one publisher, or by all publishers of one role.
+#[derive(Clone, Debug)]
+struct Flow {
+    topic: Name,
+    /// Who sends it, if that is known: the nodes, and the role they share.
+    nodes: Vec<Name>,
+    role: String,
+    kind: String,
+    messages: u64,
+}
+
+/// All flows with what their stamps have in common.
+struct Flows {
+    all: Vec<Flow>,
+    pairs: BTreeMap<(usize, usize), Pair>,
 }
 
 pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let flows = flows(known);
+    for (output, flow) in flows.all.iter().enumerate() {
+        let copied = flow
+            .nodes
+            .iter()
+            .any(|n| known.copies.contains(&(*n, flow.topic)));
+        if flow.nodes.is_empty() || copied {
+            continue;
+        }
+        let Some(input) = input(known, &flows, output) else {
+            continue;
+        };
+        let (topic, matches) = (flows.all[input].topic, flows.pairs[&(input, output)].before);
+        for node in &flow.nodes {
+            let basis = Key::Publish(*node, flow.topic);
+            known.infer(source, Key::Subscribe(topic, *node), basis, |known| {
+                let [from, to] = [topic, flow.topic].map(|n| known.text(n));
+                let total = flow.messages;
+                format!(
+                    "{matches} of {total} messages of {to} carry the stamp of a message of {from} just before"
+                )
+            });
+        }
+    }
+}
+
+/// The flow that an output answers, if only one can be meant.
+fn input(known: &Findings<'_>, flows: &Flows, output: usize) -> Option<usize> {
+    let flow = &flows.all[output];
+    let good = flows.pairs.iter().filter(|((input, to), pair)| {
+        *to == output
+            && flows.all[*input].topic != flow.topic
+            && pair.before >= FEWEST
+            && pair.before * 100 >= flow.messages * SHARE
+            && pair.before * 100 >= pair.equal * ORDERED
+            && !flow
+                .nodes
+                .iter()
+                .any(|n| known.knows(Key::Publish(*n, flows.all[*input].topic)))
+    });
+    let good: Vec<(usize, Pair)> = good.map(|((input, _), pair)| (*input, *pair)).collect();
+    let most = good.iter().map(|(_, pair)| pair.before).max()?;
+    let best: Vec<_> = good
+        .into_iter()
+        .filter(|(_, pair)| pair.before * 100 >= most * AS_GOOD)
+        .collect();
+    let best = without_siblings(flows, flow, best)?;
+    if let [(only, _)] = best[..] {
+        return Some(only);
+    }
+    let clear = |(at, pair): &&(usize, Pair)| {
+        let mut others = best.iter().filter(|(other, _)| other != at);
+        others.all(|(_, other)| pair.lag.is_clearly_less(&other.lag))
+    };
+    best.iter().find(clear).map(|(at, _)| *at)
+}
+
+/// Of flows that one publisher sends with one stamp, the one that is meant: of the output's type, else the only one that
+/// is no `CameraInfo`; `None` if that cannot be told.
+fn without_siblings(
+    flows: &Flows,
+    output: &Flow,
+    inputs: Vec<(usize, Pair)>,
+) -> Option<Vec<(usize, Pair)>> {
+    let mut families: BTreeMap<&[Name], Vec<(usize, Pair)>> = BTreeMap::new();
+    let mut left = Vec::new();
+    for (at, pair) in inputs {
+        match &flows.all[at].nodes[..] {
+            [] => left.push((at, pair)),
+            nodes => families.entry(nodes).or_default().push((at, pair)),
+        }
+    }
+    for family in families.into_values() {
+        let kind = |(at, _): &&(usize, Pair)| flows.all[*at].kind.as_str();
+        let same = family.iter().filter(|f| kind(f) == output.kind);
+        let data = family
+            .iter()
+            .filter(|f| kind(f) != "sensor_msgs/CameraInfo");
+        let [same, data]: [Vec<_>; 2] = [same.copied().collect(), data.copied().collect()];
+        match (&family[..], &same[..], &data[..]) {
+            ([one], ..) | (_, [one], _) | (_, [], [one]) => left.push(*one),
+            _ => return None,
+        }
+    }
+    Some(left)
+}
+
+/// Pools the streams and compares their stamps.
+fn flows(known: &mut Findings<'_>) -> Flows {
     let streams: Vec<usize> = known.facts.headers.keys().copied().collect();
     let series: Vec<_> = known.facts.headers.values().copied().collect();
-    let nodes: Vec<_> = streams.iter().map(|at| publisher(known, *at)).collect();
+    let mut pooled: BTreeMap<(String, String), Flow> = BTreeMap::new();
+    let mut keys = Vec::new();
+    for (at, id) in streams.iter().zip(&series) {
+        let topic = known.streams[*at].topic;
+        let node = publisher(known, *at);
+        let role = node.map_or_else(String::new, |n| role(&known.text(n)));
+        let key = (known.text(topic).to_string(), role.clone());
+        let flow = pooled.entry(key.clone()).or_insert_with(|| Flow {
+            topic,
+            nodes: Vec::new(),
+            role,
+            kind: known.kind(topic),
+            messages: 0,
+        });
+        flow.messages += known.facts.times.count(*id);
+        flow.nodes.extend(node.filter(|n| !flow.nodes.contains(n)));
+        keys.push(key);
+    }
+    let order: Vec<_> = pooled.keys().cloned().collect();
+    let flow_at: Vec<usize> = keys
+        .iter()
+        .map(|key| order.binary_search(key).unwrap_or(0))
+        .collect();
+    let all: Vec<Flow> = pooled.into_values().collect();
     let mut pairs: BTreeMap<(usize, usize), Pair> = BTreeMap::new();
-    let mut group: Vec<Timed> = Vec::new();
+    let mut group: Vec<(Timed, usize)> = Vec::new();
     let merged = known.facts.times.merge(&series, |timed| {
-        if group.first().is_some_and(|first| first.time != timed.time) {
-            compare(&group, &nodes, &mut pairs);
+        if group
+            .first()
+            .is_some_and(|(first, _)| first.time != timed.time)
+        {
+            compare(&group, &all, &mut pairs);
             group.clear();
         }
         if group.len() <= MOST_AT_ONCE {
-            group.push(timed);
+            group.push((timed, flow_at[timed.series]));
         }
     });
     if let Err(error) = merged {
         known.failed = Some(error);
     }
-    compare(&group, &nodes, &mut pairs);
-    let mut best: BTreeMap<usize, (usize, Pair)> = BTreeMap::new();
-    for ((input, output), pair) in pairs {
-        let messages = known.facts.times.count(series[output]);
-        let often = pair.before >= FEWEST && pair.before * 100 >= messages * SHARE;
-        if often && pair.before * 100 >= pair.equal * ORDERED {
-            let better = best
-                .get(&output)
-                .is_none_or(|(_, other)| rank(pair) > rank(*other));
-            if better {
-                best.insert(output, (input, pair));
-            }
-        }
-    }
-    for (output, (input, pair)) in best {
-        let messages = known.facts.times.count(series[output]);
-        if let Some(node) = nodes[output] {
-            flow(
-                source,
-                known,
-                node,
-                streams[input],
-                streams[output],
-                (pair.before, messages),
-            );
-        }
-    }
-}
-
-/// The input that comes right before its output is the one: of two that match alike, the nearer.
-fn rank(pair: Pair) -> (u64, std::cmp::Reverse<u64>) {
-    (
-        pair.before,
-        std::cmp::Reverse(pair.ahead / pair.before.max(1)),
-    )
+    compare(&group, &all, &mut pairs);
+    Flows { all, pairs }
 }
 
 /// The node that publishes a stream, as far as it is known to be one.
@@ -140,60 +264,38 @@ fn publisher(known: &Findings<'_>, at: usize) -> Option<Name> {
     })
 }
 
+/// A node's name without the numbers that are new in every run.
+fn role(node: &str) -> String {
+    node.trim_end_matches(|c: char| c.is_ascii_digit() || c == '_')
+        .to_owned()
+}
+
 /// Counts the pairs among messages with one stamp.
-fn compare(group: &[Timed], nodes: &[Option<Name>], pairs: &mut BTreeMap<(usize, usize), Pair>) {
+fn compare(group: &[(Timed, usize)], all: &[Flow], pairs: &mut BTreeMap<(usize, usize), Pair>) {
     if group.len() < 2 || group.len() > MOST_AT_ONCE {
         return;
     }
-    for output in group.iter().filter(|t| nodes[t.series].is_some()) {
-        for input in group
+    let mut counted = BTreeSet::new();
+    for (output, to) in group.iter().filter(|(_, to)| !all[*to].nodes.is_empty()) {
+        for (input, from) in group
             .iter()
-            .filter(|t| nodes[t.series] != nodes[output.series])
+            .filter(|(_, from)| is_other(&all[*from], &all[*to]))
         {
-            let pair = pairs.entry((input.series, output.series)).or_default();
+            if !counted.insert((from, to)) {
+                continue;
+            }
+            let pair = pairs.entry((*from, *to)).or_default();
             let ahead = output.size.wrapping_sub(input.size).cast_signed();
             pair.equal += 1;
             if (0..=ANSWER).contains(&ahead) {
                 pair.before += 1;
-                pair.ahead += u64::from(ahead.unsigned_abs());
+                pair.lag.add(f64::from(ahead) * UNIT_NS as f64 / 1e9);
             }
         }
     }
 }
 
-/// The node subscribes the input for as long as it publishes the output.
-fn flow(
-    source: SourceId,
-    known: &mut Findings<'_>,
-    node: Name,
-    input: usize,
-    output: usize,
-    (matches, messages): (u64, u64),
-) {
-    let (topic, basis) = (known.streams[input].topic, known.streams[output].topic);
-    let [name, from, to] = [node, topic, basis].map(|n| known.text(n));
-    let text = format!(
-        "{matches} of {messages} messages of {to} carry the stamp of a message of {from} just before"
-    );
-    let names = [&*name, &*from];
-    if !known.facts.watched.is_empty()
-        && known
-            .facts
-            .watched
-            .iter()
-            .all(|w| names.contains(&w.as_str()))
-    {
-        known.facts.pieces.push(EvidenceLine {
-            time: None,
-            source: "equal_stamps",
-            degree: Degree::Inferred,
-            text,
-        });
-    }
-    known.prove(Proof {
-        what: Key::Subscribe(topic, node),
-        source,
-        degree: Degree::Inferred,
-        when: Validity::Like(Key::Publish(node, basis)),
-    });
+/// Whether two flows come from different senders, as far as is known.
+fn is_other(one: &Flow, other: &Flow) -> bool {
+    one.topic != other.topic && (one.role.is_empty() || one.role != other.role)
 }

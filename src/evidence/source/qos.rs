@@ -29,6 +29,9 @@ pub(crate) fn announced(heard: &mut SourceContext<'_>) {
     };
     let mut offers = offers(&text);
     offers.sort();
+    if let Ok(count @ 1..) = u32::try_from(offers.len()) {
+        heard.facts.offers.insert(heard.place, count);
+    }
     let same = offers.chunk_by(|a, b| a == b).map(|same| {
         let times = if same.len() > 1 {
             format!("{} × ", same.len())

@@ -6,18 +6,20 @@ use super::SourceContext;
 use crate::base::name::is_recorder;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::log::LogRecord;
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+/// Where the recorder's source lies, whatever the folder above: of `rosbag` and of `rosbag2_transport`.
+const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
 
 /// A recorder is known by the file its log records come from, whatever it is called.
 pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
-    payload.header()?;
-    payload.u8()?;
-    let name = payload.string()?;
-    let text = payload.string()?;
-    if payload.string()?.ends_with("rosbag/src/recorder.cpp") {
-        let node = heard.name(name);
+    let record = LogRecord::read(payload)?;
+    let file = record.file.replace('\\', "/");
+    if FILES.iter().any(|end| file.ends_with(end)) {
+        let node = heard.name(&record.logger);
         heard.claim(Claim::Node(node), Degree::Stated, || {
-            format!("{name} records: {text}")
+            format!("{} records: {}", record.logger, record.text)
         });
     }
     Ok(())
@@ -25,16 +27,25 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 
 /// With one recorder among the nodes it is the one that wrote the bag; several cannot be told apart.
 pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let told = known.facts.list.iter().filter(|fact| fact.source == source);
+    let told = told.filter_map(|fact| match fact.claim {
+        Claim::Node(node) => Some(node),
+        _ => None,
+    });
     let nodes = known.nodes().iter().copied();
-    let recorders: Vec<Name> = nodes.filter(|n| is_recorder(&known.text(*n))).collect();
-    if let [recorder] = recorders[..] {
-        let topics: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
-        for topic in topics {
+    let named = nodes.filter(|node| is_recorder(&known.text(*node)));
+    let recorders: BTreeSet<Name> = told.chain(named).collect();
+    if recorders.len() != 1 {
+        return;
+    }
+    let topics: BTreeSet<Name> = known.streams.iter().map(|s| s.topic).collect();
+    for recorder in recorders {
+        for topic in &topics {
             known.prove(Proof {
-                what: Key::Subscribe(topic, recorder),
+                what: Key::Subscribe(*topic, recorder),
                 source,
                 degree: Degree::Stated,
-                when: Validity::Like(Key::Topic(topic)),
+                when: Validity::Like(Key::Topic(*topic)),
             });
         }
     }

@@ -9,7 +9,7 @@ use super::SourceContext;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
 use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Findings, Key, Proof, Reliability, Validity};
 
 pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
     let seq = payload.header()?;
@@ -75,6 +75,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         };
         let own = known.publishers(topic).any(|p| p == node);
         let others = known.publishers(topic).any(|p| p != node);
+        if !own && is_broadcaster(known, node, topic) {
+            continue;
+        }
         let silent = advertised.as_ref().is_some_and(|all| !all.contains(&topic));
         let what = match (own, others || silent) {
             (true, _) => Key::Publish(node, topic),
@@ -92,6 +95,27 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
             },
         });
     }
+}
+
+/// Whether a node that names `/tf` as its own sends it rather than listens: a listener of tf2 names `/tf_static` too. Asked
+/// only where headers do not tell all publishers.
+fn is_broadcaster(known: &mut Findings<'_>, node: Name, topic: Name) -> bool {
+    let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
+    let told = of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole);
+    let text = known.text(topic);
+    let twin = match text.strip_suffix("/tf_static") {
+        Some(space) => format!("{space}/tf"),
+        None if text.ends_with("/tf") => format!("{text}_static"),
+        None => return false,
+    };
+    let twin = known.facts.known(&twin);
+    let names = |twin| {
+        let facts = known.facts.list.iter();
+        facts
+            .map(|f| f.claim)
+            .any(|c| c == Claim::Lists(node, twin))
+    };
+    !told && !twin.is_some_and(names)
 }
 
 /// Every topic that a recorder of all topics has seen advertised; `None` if none tells. Such a recorder goes on to

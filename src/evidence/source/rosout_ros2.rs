@@ -4,25 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::SourceContext;
-use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::{Shape, TIME2};
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
-
-/// `rcl_interfaces/msg/Log`.
-pub(crate) const SHAPE: Shape = Shape {
-    type_name: "rcl_interfaces/Log",
-    md5: "",
-    encoding: Encoding::Cdr,
-    fields: &[
-        (
-            "",
-            "Time stamp;byte level;string name;string msg;string file;string function;uint32 line",
-        ),
-        TIME2,
-    ],
-};
 
 pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
     payload.time()?;

@@ -61,6 +61,12 @@ impl File<'_> {
             self.time(fields.get("start"))?,
             self.time(fields.get("end"))?,
         );
+        if let (Some(from), Some(to)) = (from_ns, to_ns)
+            && to < from
+        {
+            let reason = format!("the end of `{name}` lies before its start");
+            return Err(self.wrong(name, &reason));
+        }
         let node = resolved(name);
         let entry = |element| Entry {
             element,

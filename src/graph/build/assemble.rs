@@ -11,7 +11,7 @@ use super::windows::Windows;
 use crate::base::time::Span;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::Collected;
-use crate::evidence::proof::{Key, Reliability};
+use crate::evidence::proof::{Key, Reliability, offered};
 use crate::graph::{
     Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, State, Topic, TopicState,
 };
@@ -42,9 +42,15 @@ pub(crate) fn assemble(
         traffic,
         nodes: BTreeMap::new(),
         topics: BTreeMap::new(),
+        publishers: BTreeMap::new(),
         sent: BTreeMap::new(),
     };
     all.count_sent();
+    for what in tracks.keys() {
+        if let Key::Publish(_, topic) = what {
+            *all.publishers.entry(*topic).or_default() += 1;
+        }
+    }
     for (what, track) in tracks {
         match *what {
             Key::Node(node) => all.node(node, track),
@@ -65,6 +71,8 @@ struct Assembly<'a> {
     traffic: &'a Traffic,
     nodes: BTreeMap<Name, NodeId>,
     topics: BTreeMap<Name, u32>,
+    /// How many nodes are known to publish each topic.
+    publishers: BTreeMap<Name, u32>,
     /// Messages of each known publisher: per topic, then per window.
     sent: BTreeMap<Name, BTreeMap<Name, BTreeMap<usize, u64>>>,
 }
@@ -170,6 +178,7 @@ impl Assembly<'_> {
             first,
             last,
             qos: self.values.quality(name),
+            unknown_publishers: self.unknown_publishers(name),
         });
         let tallies = traffic.map_or(&[][..], |(_, rates)| &rates.tallies);
         let mut tallies = tallies.iter().peekable();
@@ -188,6 +197,13 @@ impl Assembly<'_> {
                 });
             }
         }
+    }
+
+    /// How many publishers of a topic the bag counts beyond those that are known.
+    fn unknown_publishers(&self, topic: Name) -> Option<u32> {
+        let counted = offered(&self.collected.facts.offers, &self.collected.streams, topic)?;
+        let known = self.publishers.get(&topic).copied().unwrap_or(0);
+        Some(counted.saturating_sub(known))
     }
 
     fn publish(&mut self, node: Name, topic: Name, track: &Liveness) {

@@ -1,33 +1,37 @@
 //! Everything that is known about a mission: what sources conclude and the user tells, under names in order.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
+use std::sync::Arc;
 
 use super::Options;
 use super::roles::role;
 use super::values::Values;
+use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::Collected;
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
 use crate::evidence::times::Stamps;
+use crate::evidence::topology::nearest::nearest;
 use crate::evidence::topology::{Element, Entry};
 use crate::evidence::{Degree, EvidenceLine, SOURCES};
 
-/// All proofs and stated values. Names are numbered anew in the order of their texts.
+/// All proofs and stated values, and which of the user's names are strange. Names are numbered anew in the order of their texts.
 pub(crate) fn prove(
     collected: &mut Collected,
     options: &Options,
-) -> io::Result<(Vec<Proof>, Values)> {
+) -> io::Result<(Vec<Proof>, Values, Vec<Notice>)> {
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
-    let mut known = Findings::new(&collected.streams, &mut collected.facts, end);
+    let mut known = Findings::new(&collected.streams, &mut collected.facts, (start, end));
     known.take_at_their_word(|source| SOURCES.get(source).is_some_and(|s| s.lasting));
     for (row, source) in SOURCES.iter().enumerate() {
         for conclude in source.conclude {
             conclude(row, &mut known);
         }
     }
+    let strange = strangers(&known, &options.topology.entries);
     for entry in &options.topology.entries {
         told(&mut known, entry, (start, end));
     }
@@ -54,7 +58,44 @@ pub(crate) fn prove(
         stream.speaker = stream.publisher.map(role);
     }
     let values = Values::new(&mut collected.facts, role)?;
-    Ok((proofs, values))
+    Ok((proofs, values, strange))
+}
+
+/// Names of the user's that nothing in the bags bears: topics, and nodes that come close to one that is known.
+fn strangers(known: &Findings<'_>, entries: &[Entry]) -> Vec<Notice> {
+    let texts = |names: &mut dyn Iterator<Item = Name>| -> BTreeSet<Arc<str>> {
+        names.map(|name| known.text(name)).collect()
+    };
+    let nodes = texts(&mut known.nodes().iter().copied());
+    let topics = texts(&mut known.streams.iter().map(|s| s.topic));
+    let mut told = BTreeMap::new();
+    for entry in entries.iter().filter(|e| !e.declared) {
+        let (node, topic) = match &entry.element {
+            Element::Node(node) => (Some(node), None),
+            Element::Topic(topic) => (None, Some(topic)),
+            Element::Publish(node, topic) | Element::Subscribe(node, topic) => {
+                (Some(node), Some(topic))
+            }
+        };
+        for (what, name, all) in [("node", node, &nodes), ("topic", topic, &topics)] {
+            let Some(name) = name.filter(|name| !all.contains(name.as_str())) else {
+                continue;
+            };
+            let near = nearest(name, all.iter().map(AsRef::as_ref));
+            // A bag hides nodes, which is why the user names them; topics it does not hide.
+            if near.is_some() || what == "topic" {
+                told.entry((what, name)).or_insert((&entry.place, near));
+            }
+        }
+    }
+    let notice = |((what, name), (place, near)): ((&str, &String), (&String, Option<&str>))| {
+        let near = near.map_or_else(String::new, |near| {
+            format!("; the nearest name is `{near}`")
+        });
+        let text = format!("{place}: no {what} of the bag is called `{name}`{near}");
+        Notice::new(NoticeKind::Note, text)
+    };
+    told.into_iter().map(notice).collect()
 }
 
 /// Puts into words what rests on no single message, for elements that somebody asked about.
@@ -74,6 +115,9 @@ fn explain(known: &mut Findings<'_>, messages: &Stamps) {
         ) else {
             continue;
         };
+        if known.worded.contains(&(proof.what, proof.source)) {
+            continue;
+        }
         let (time, text) = match &proof.when {
             Validity::Messages(at) | Validity::First(at) => {
                 let times = known.streams[*at].times;
@@ -119,10 +163,12 @@ fn told(known: &mut Findings<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
         Element::Subscribe(node, topic) => Key::Subscribe(name(topic), name(node)),
     };
     let at = |offset: Option<i64>, without| offset.map_or(without, |ns| mission.0.plus(ns));
+    // The end itself is not in it any more.
+    let last = |to: Option<i64>| to.map_or(mission.1, |ns| mission.0.plus(ns).plus(-1));
     let when = match (entry.from_ns, entry.to_ns) {
         (None, None) => Validity::Whole,
         (from, to) => Validity::Signs {
-            signs: vec![at(from, mission.0), at(to, mission.1)],
+            signs: vec![at(from, mission.0), last(to).max(at(from, mission.0))],
             ends: Vec::new(),
             held: false,
         },

@@ -1,48 +1,84 @@
-//! What a recording would have needed to tell more, with the command to copy.
+//! What would tell more: of this recording now, of the next one by another command.
 
-use crate::mission::Mission;
+use super::Info;
+use crate::evidence::Evidence;
 
-/// What to do next time so that the bag says what it does not say now; `deaf` topics carry messages and have no known
-/// subscriber. Empty if nothing is missing, and for evolutions, which nobody records.
-pub fn advice(mission: &Mission, deaf: usize) -> Vec<String> {
+/// What to do so that more is known than now: first with this bag, then when recording. Empty if nothing is missing, and
+/// for missions that nobody recorded (`is_ros1` is `None`).
+pub(super) fn advice(info: &Info, is_ros1: Option<bool>) -> Vec<String> {
+    match is_ros1 {
+        None => Vec::new(),
+        Some(true) => ros1(info),
+        Some(false) => ros2(info),
+    }
+}
+
+fn has(info: &Info, topic: &str) -> bool {
+    info.topics.iter().any(|t| t.name == topic)
+}
+
+fn ros1(info: &Info) -> Vec<String> {
     let mut advice = Vec::new();
-    let Some(bag) = mission.bags.first() else {
+    let deaf = info.topics_without_subscriber;
+    if !has(info, "/rosout") {
+        advice.push(
+            "the bag has no `/rosout`, which names nodes that publish nothing else: record it too"
+                .to_owned(),
+        );
+    }
+    if deaf > 0 && !has(info, "/statistics") {
+        advice.extend(from_files(info));
+        advice.push(format!(
+            "{deaf} topics have no known subscriber; before the nodes start run `rosparam set /enable_statistics true`, \
+             then `rosbag record -a`"
+        ));
+    }
+    advice
+}
+
+fn ros2(info: &Info) -> Vec<String> {
+    let mut advice = Vec::new();
+    if has(info, "/rosgraph") || info.topics_without_publisher + info.topics_without_subscriber == 0
+    {
         return advice;
-    };
-    let elements = &mission.elements;
-    let is_ros1 = bag.format == "rosbag1"
-        || bag
-            .facts
-            .iter()
-            .any(|(key, value)| key == "profile" && value == "ros1");
-    let has = |name: &str| elements.topics.iter().any(|t| t.name.as_str() == name);
-    if is_ros1 {
-        if !has("/rosout") {
-            advice.push("the bag has no `/rosout`, which names nodes that publish nothing else: record it too".to_owned());
-        }
-        if deaf > 0 && !has("/statistics") {
+    }
+    advice.push(format!(
+        "rosbag2 stores who talks to whom of no topic: {} without a known publisher, {} without a known subscriber",
+        info.topics_without_publisher, info.topics_without_subscriber
+    ));
+    advice.extend(from_files(info));
+    for (topic, tells) in [
+        ("/rosout", "nodes that log"),
+        (
+            "/parameter_events",
+            "nodes that start, and the ends that they declare",
+        ),
+    ] {
+        if !has(info, topic) {
             advice.push(format!(
-                "{deaf} topics have no known subscriber; before the nodes start run `rosparam set /enable_statistics true`, \
-                 then `rosbag record -a`"
-            ));
-        }
-    } else {
-        for (topic, tells) in [
-            ("/rosout", "nodes that log"),
-            ("/parameter_events", "nodes that start"),
-        ] {
-            if !has(topic) {
-                advice.push(format!(
-                    "the bag has no `{topic}`, which names {tells}: record it too"
-                ));
-            }
-        }
-        if deaf > 0 && !has("/rosgraph") {
-            advice.push(format!(
-                "{deaf} topics have no known subscriber and rosbag2 stores no publisher; run the node `rosgraph_monitor_node` of \
-                 the package `rosgraph_monitor`, then `ros2 bag record --all`: its topic `/rosgraph` tells the whole graph"
+                "the bag has no `{topic}`, which names {tells}: record it too"
             ));
         }
     }
+    advice.push(
+        "next time run `ros2 run rosgraph_monitor rosgraph_monitor_node`, then `ros2 bag record --all`: its topic `/rosgraph` \
+         tells the whole graph"
+            .to_owned(),
+    );
+    advice
+}
+
+/// What files of the user's add to the bag as it is.
+fn from_files(info: &Info) -> Vec<String> {
+    let mut advice = Vec::new();
+    let named = info.nodes.len();
+    if named > 0 && Evidence::all_words().any(|word| word == "source") {
+        advice.push(format!(
+            "`--source FOLDER` reads from their source code what the nodes known by name ({named}) publish and subscribe"
+        ));
+    }
+    advice.push(
+        "`--topology FILE` adds what you know: a launch file, a graph saved by rqt_graph, a table of nodes".to_owned(),
+    );
     advice
 }

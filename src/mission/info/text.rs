@@ -60,10 +60,23 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
         how_many("subscription", info.subscribes_by_degree)
     )?;
     let with = info.topics.iter().filter(|t| t.count > 0).count();
+    let unknown: u32 = info
+        .topics
+        .iter()
+        .filter_map(|t| t.unknown_publishers)
+        .sum();
+    let counted = match unknown as usize {
+        0 => String::new(),
+        n => format!(
+            " (the bag counts {} that nobody names)",
+            words::count(n, "publisher")
+        ),
+    };
     writeln!(
         out,
-        "of {with} topics with messages, {} have no known subscriber",
-        info.topics_without_subscriber
+        "of {with} topics with messages, {} have a known publisher{counted}, {} a known subscriber",
+        with - info.topics_without_publisher,
+        with - info.topics_without_subscriber
     )?;
     for row in &info.evidence {
         let parts = [

@@ -43,6 +43,7 @@ impl Names {
                 first: None,
                 last: None,
                 qos: None,
+                unknown_publishers: None,
             })
     }
 
@@ -64,6 +65,7 @@ impl Names {
             topic.types.dedup();
             topic.evidence = topic.evidence.and(raw.rest.evidence());
             topic.qos = raw.qos.as_deref().map(Arc::from).or(topic.qos.take());
+            topic.unknown_publishers = raw.unknown_publishers.or(topic.unknown_publishers);
             widen(&mut topic.first, &mut topic.last, raw.rest.life());
         }
         for raw in &window.publishes {

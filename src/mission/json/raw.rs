@@ -113,6 +113,7 @@ pub(crate) struct RawTopic {
     pub(crate) median_period_s: Option<f64>,
     pub(crate) max_gap_s: Option<f64>,
     pub(crate) qos: Option<String>,
+    pub(crate) unknown_publishers: Option<u32>,
     #[serde(flatten)]
     pub(crate) rest: RawState,
 }

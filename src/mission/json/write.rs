@@ -234,6 +234,7 @@ struct TopicRow<'a> {
     median_period_s: Option<f64>,
     max_gap_s: Option<f64>,
     qos: Option<&'a str>,
+    unknown_publishers: Option<u32>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
 }
@@ -253,6 +254,7 @@ impl<'a> TopicRow<'a> {
             median_period_s: state.median_period_s,
             max_gap_s: state.max_gap_s,
             qos: topic.qos.as_deref(),
+            unknown_publishers: topic.unknown_publishers,
             first_ns: nanos(topic.first),
             last_ns: nanos(topic.last),
         }

@@ -1,0 +1,90 @@
+//! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): whose parameters were declared or set.
+
+use crate::bag::Encoding;
+use crate::evidence::message::cursor::{Cursor, Result};
+use crate::evidence::message::definition::{Shape, TIME2};
+
+/// `rcl_interfaces/msg/ParameterEvent`.
+pub(crate) const SHAPE: Shape = Shape {
+    type_name: "rcl_interfaces/ParameterEvent",
+    md5: "",
+    encoding: Encoding::Cdr,
+    fields: &[
+        (
+            "",
+            "Time stamp;string node;Parameter[] new_parameters;Parameter[] changed_parameters;Parameter[] deleted_parameters",
+        ),
+        ("Parameter", "string name;ParameterValue value"),
+        (
+            "ParameterValue",
+            "byte type;byte bool_value;int64 integer_value;float64 double_value;string string_value;byte[] byte_array_value;\
+             byte[] bool_array_value;int64[] integer_array_value;float64[] double_array_value;string[] string_array_value",
+        ),
+        TIME2,
+    ],
+};
+
+/// A parameter that was declared or set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Parameter<'a> {
+    pub(crate) name: &'a str,
+    /// Its value, if that is a truth value.
+    pub(crate) truth: Option<bool>,
+}
+
+/// What happened to a node's parameters.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Event<'a> {
+    /// The node's full name; empty if the writer named none.
+    pub(crate) node: &'a str,
+    /// The new and the changed ones.
+    pub(crate) set: Vec<Parameter<'a>>,
+}
+
+impl<'a> Event<'a> {
+    /// Reads a whole event.
+    ///
+    /// # Errors
+    /// If the payload has another layout.
+    pub(crate) fn read(payload: &mut Cursor<'a>) -> Result<Self> {
+        payload.time()?;
+        let node = payload.string()?;
+        let mut set = Vec::new();
+        for list in 0..3 {
+            for _ in 0..payload.length(4)? {
+                let parameter = parameter(payload)?;
+                // The third list holds those deleted.
+                set.extend((list < 2).then_some(parameter));
+            }
+        }
+        payload.finish()?;
+        Ok(Self { node, set })
+    }
+}
+
+/// `rcl_interfaces/msg/ParameterType`: the number of truth values.
+const BOOL: u8 = 1;
+
+fn parameter<'a>(payload: &mut Cursor<'a>) -> Result<Parameter<'a>> {
+    let name = payload.string()?;
+    let (kind, truth) = (payload.u8()?, payload.u8()?);
+    payload.i64()?;
+    payload.f64()?;
+    payload.skip_string()?;
+    for least in [1, 1] {
+        let count = payload.length(least)?;
+        payload.bytes(count)?;
+    }
+    for _ in 0..2 {
+        for _ in 0..payload.length(8)? {
+            payload.u64()?;
+        }
+    }
+    for _ in 0..payload.length(4)? {
+        payload.skip_string()?;
+    }
+    Ok(Parameter {
+        name,
+        truth: (kind == BOOL).then_some(truth != 0),
+    })
+}

@@ -1,0 +1,223 @@
+//! Contracts of well-known nodes: what a node of a known package publishes and subscribes under its default names, as
+//! `contracts.csv` lists it. It counts where the bag names the node and has the topic with that type.
+//!
+//! A row with source files is for nodes whose log records come from one of them, by its name or, if the row names none,
+//! whatever they are called; a node of that name that logs from other files only is another program.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use std::sync::Arc;
+
+use super::SourceContext;
+use crate::bag::Encoding;
+use crate::base::csv;
+use crate::base::name::{last_part, namespace};
+use crate::evidence::claim::{Claim, Degree, Name, SourceId};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::log::LogRecord;
+use crate::evidence::proof::{Findings, Key};
+
+const TABLE: &str = include_str!("contracts.csv");
+
+/// Keeps the file that a node logs from.
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let record = LogRecord::read(payload)?;
+    let file = record.file_name();
+    if !record.logger.is_empty() && !file.is_empty() {
+        let (logger, file) = (heard.name(&record.logger), heard.name(file));
+        heard.claim(Claim::LogsFrom(logger, file), Degree::Stated, String::new);
+    }
+    Ok(())
+}
+
+/// A row of the table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Contract {
+    /// The node's own name, without a namespace; empty for any.
+    node: String,
+    /// The source files that it logs from; none if that is not known.
+    files: Vec<String>,
+    /// The version of ROS, `1` or `2`; empty for either.
+    ros: String,
+    publishes: bool,
+    /// As a node names it: `scan` in its namespace, `~/map` below its name, `/tf` for all.
+    topic: String,
+    kind: String,
+    package: String,
+}
+
+/// The rows of the table; what is no row is left out.
+fn contracts() -> Vec<Contract> {
+    let rows = csv::records(TABLE).unwrap_or_default();
+    rows.into_iter()
+        .skip(1)
+        .filter_map(|(_, row)| contract(&row))
+        .collect()
+}
+
+fn contract(row: &[String]) -> Option<Contract> {
+    let [node, files, ros, role, topic, kind, package, _source] = row else {
+        return None;
+    };
+    Some(Contract {
+        node: node.clone(),
+        files: files.split_whitespace().map(str::to_owned).collect(),
+        ros: ros.clone(),
+        publishes: role == "publishes",
+        topic: topic.clone(),
+        kind: kind.clone(),
+        package: package.clone(),
+    })
+}
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let files = files(known);
+    let mut streams = known.streams.iter();
+    let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
+    let foreign = if is_ros1 { "2" } else { "1" };
+    let nodes = known.nodes().clone();
+    let mut publishers: BTreeMap<Name, Vec<(Name, Contract)>> = BTreeMap::new();
+    for contract in contracts().into_iter().filter(|c| c.ros != foreign) {
+        for node in nodes.iter().copied() {
+            let name = known.text(node);
+            if !is_meant(&contract, &name, files.get(&node)) {
+                continue;
+            }
+            let topic = known.facts.known(&resolved(&contract.topic, &name));
+            let Some(topic) = topic.filter(|t| known.kind(*t) == contract.kind) else {
+                continue;
+            };
+            if contract.publishes {
+                publishers
+                    .entry(topic)
+                    .or_default()
+                    .push((node, contract.clone()));
+            } else if !known.knows(Key::Publish(node, topic)) {
+                let what = Key::Subscribe(topic, node);
+                known.infer(source, what, Key::Node(node), |known| {
+                    words(known, node, &contract)
+                });
+            }
+        }
+    }
+    for (topic, nodes) in publishers {
+        publish(source, known, topic, &nodes);
+    }
+}
+
+/// Draws the publishers of a topic, unless there would be more than the bag says there were.
+fn publish(source: SourceId, known: &mut Findings<'_>, topic: Name, nodes: &[(Name, Contract)]) {
+    let all: BTreeSet<Name> = known
+        .publishers(topic)
+        .chain(nodes.iter().map(|n| n.0))
+        .collect();
+    if known.offers(topic).is_some_and(|n| all.len() > n as usize) {
+        return;
+    }
+    for (node, contract) in nodes {
+        known.infer_publisher(source, *node, topic, |known| words(known, *node, contract));
+    }
+}
+
+fn words(known: &Findings<'_>, node: Name, contract: &Contract) -> String {
+    let verb = if contract.publishes {
+        "publishes"
+    } else {
+        "subscribes"
+    };
+    format!(
+        "{} is taken for the one of package {}, which {verb} {}",
+        known.text(node),
+        contract.package,
+        contract.topic
+    )
+}
+
+/// The files that each node logs from.
+fn files(known: &Findings<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
+    let mut files: BTreeMap<Name, BTreeSet<Arc<str>>> = BTreeMap::new();
+    for fact in &known.facts.list {
+        if let Claim::LogsFrom(logger, file) = fact.claim
+            && let Some(node) = known.owner(&known.text(logger))
+        {
+            files.entry(node).or_default().insert(known.text(file));
+        }
+    }
+    files
+}
+
+/// Whether a row is about a node of this name that logs from these files.
+fn is_meant(contract: &Contract, node: &str, files: Option<&BTreeSet<Arc<str>>>) -> bool {
+    let own = |files: &BTreeSet<Arc<str>>| contract.files.iter().any(|f| files.contains(&**f));
+    match (contract.node.is_empty(), contract.files.is_empty()) {
+        (true, _) => files.is_some_and(own),
+        (false, true) => last_part(node) == contract.node,
+        (false, false) => last_part(node) == contract.node && files.is_none_or(own),
+    }
+}
+
+/// A topic's full name as a node means it by default.
+fn resolved(topic: &str, node: &str) -> String {
+    match topic.strip_prefix("~/") {
+        Some(private) => format!("{node}/{private}"),
+        None if topic.starts_with('/') => topic.to_owned(),
+        None => format!("{}/{topic}", namespace(node).trim_end_matches('/')),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_of_the_table_is_read_and_names_its_source() {
+        let rows = csv::records(TABLE).unwrap();
+        assert!(rows.len() > 60);
+        for (line, row) in rows.iter().skip(1) {
+            let contract = contract(row).unwrap_or_else(|| panic!("line {line} has other columns"));
+            assert!(row[7].starts_with("https://"), "line {line} has no source");
+            assert!(
+                ["publishes", "subscribes"].contains(&&*row[3]),
+                "line {line}"
+            );
+            assert!(["", "1", "2"].contains(&&*contract.ros), "line {line}");
+            assert!(
+                !contract.node.is_empty() || !contract.files.is_empty(),
+                "line {line}"
+            );
+            assert!(contract.kind.matches('/').count() == 1, "line {line}");
+        }
+    }
+
+    #[test]
+    fn a_node_of_another_program_is_not_meant() {
+        let row = [
+            "amcl",
+            "amcl_node.cpp",
+            "",
+            "subscribes",
+            "scan",
+            "a/B",
+            "amcl",
+            "https://x",
+        ];
+        let contract = contract(&row.map(str::to_owned)).unwrap();
+        let files = |file: &str| BTreeSet::from([Arc::from(file)]);
+        assert!(is_meant(&contract, "/r1/amcl", None));
+        assert!(is_meant(
+            &contract,
+            "/r1/amcl",
+            Some(&files("amcl_node.cpp"))
+        ));
+        assert!(!is_meant(&contract, "/r1/amcl", Some(&files("node.py"))));
+        assert!(!is_meant(&contract, "/r1/amcl_2", None));
+    }
+
+    #[test]
+    fn topics_are_resolved_by_the_nodes_namespace() {
+        assert_eq!(resolved("scan", "/r1/amcl"), "/r1/scan");
+        assert_eq!(resolved("scan", "/amcl"), "/scan");
+        assert_eq!(resolved("~/odom", "/base"), "/base/odom");
+        assert_eq!(resolved("/tf", "/r1/base"), "/tf");
+    }
+}

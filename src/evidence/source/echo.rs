@@ -1,0 +1,302 @@
+//! Log texts that repeat a recorded message (`Publishing: 'Hello 3'`, `I heard: [Hello 3]`): the node that logs publishes
+//! or subscribes that topic, by its own words and by who was first.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use super::SourceContext;
+use crate::base::time::Stamp;
+use crate::evidence::claim::{Degree, Name, SourceId};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::dynamic::{Schema, Value};
+use crate::evidence::message::log::LogRecord;
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::texts::{Said, Shown};
+
+/// Fewer different values than this are chance; numbers are more often equal than words.
+const FEWEST: usize = 3;
+const FEWEST_NUMBERS: usize = 5;
+/// A text and the message that it repeats lie no further apart.
+const NEAR_NS: i64 = 1_000_000_000;
+const NEAR_NUMBERS_NS: i64 = 200_000_000;
+/// Of a hundred texts of one form so many must repeat a message.
+const SHARE: usize = 80;
+/// Shorter words are in too many texts.
+const SHORTEST: usize = 3;
+/// Payloads longer than this hold no text that somebody logs.
+const LONGEST: usize = 1024;
+/// Of one message no more values than this are kept.
+const MOST_VALUES: usize = 4;
+/// Forms of texts that are looked at more closely.
+const MOST_FORMS: usize = 4096;
+/// Messages compared with one text.
+const MOST_NEAR: usize = 256;
+
+/// Keeps the text of a log record.
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let record = LogRecord::read(payload)?;
+    if let Some(time) = heard.time
+        && record.text.len() <= LONGEST
+        && !record.file.ends_with("recorder.cpp")
+    {
+        heard.facts.spoken.say(time, &record.logger, record.text);
+    }
+    Ok(())
+}
+
+/// Keeps the words and numbers in a message.
+pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &Schema, payload: &[u8]) {
+    if payload.len() > LONGEST {
+        return;
+    }
+    let value = Cursor::new(&heard.stream.connection.encoding, payload)
+        .and_then(|mut payload| schema.read(&mut payload));
+    if let (Ok(value), Some(time)) = (value, heard.time) {
+        let mut values = Vec::new();
+        collect(&value, &mut values);
+        for (field, value) in values.iter().enumerate() {
+            heard.facts.spoken.show(time, (heard.place, field), value);
+        }
+    }
+}
+
+/// How to take the messages of a connection apart; `None` for those that hold no words or numbers of their own.
+pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<Schema> {
+    let plain = type_name.replacen("/msg/", "/", 1);
+    if [
+        "rosgraph_msgs/",
+        "rcl_interfaces/",
+        "tf2_msgs/",
+        "tf/",
+        "roslib/",
+        "bond/",
+    ]
+    .iter()
+    .any(|package| plain.starts_with(package))
+    {
+        return None;
+    }
+    let known = match plain.as_str() {
+        "std_msgs/String" => "string data",
+        "std_msgs/Int32" => "int32 data",
+        "std_msgs/Int64" | "example_interfaces/Int64" => "int64 data",
+        "std_msgs/UInt32" => "uint32 data",
+        _ => return Schema::of_words(definition?),
+    };
+    Some(Schema::of_fields(&[("", known)]))
+}
+
+/// The words and whole numbers directly in a message.
+fn collect(value: &Value, into: &mut Vec<String>) {
+    let Value::Fields(fields) = value else { return };
+    for (_, field) in fields.iter().take(16) {
+        let text = match field {
+            Value::Text(text) if text.trim().len() >= SHORTEST => text.trim().to_owned(),
+            Value::Number(Some(number)) => number.to_string(),
+            _ => continue,
+        };
+        if into.len() < MOST_VALUES {
+            into.push(text);
+        }
+    }
+}
+
+/// The texts of one form, by one node, about one topic.
+#[derive(Debug, Default)]
+struct Echo {
+    values: BTreeSet<Box<str>>,
+    texts: BTreeSet<(Stamp, Box<str>)>,
+    /// How often the text came before the message.
+    first: usize,
+}
+
+/// A node, the text before and after the value, a topic.
+type Form = (Name, String, String, Name);
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let (said, shown) = known.facts.spoken.sorted();
+    let echoes = echoes(known, &said, &shown);
+    let mut by_node: BTreeMap<Name, Vec<&str>> = BTreeMap::new();
+    for text in &said {
+        if let Some(node) = known.owner(&text.logger) {
+            by_node.entry(node).or_default().push(&text.text);
+        }
+    }
+    let enough = echoes
+        .iter()
+        .filter(|(_, echo)| echo.values.len() >= FEWEST);
+    let strong: Vec<_> = enough
+        .take(MOST_FORMS)
+        .filter(|((node, before, after, _), echo)| {
+            let texts = by_node.get(node).map_or(&[][..], |texts| texts);
+            is_strong(echo, before, after, texts)
+        })
+        .collect();
+    for ((node, before, after, topic), echo) in &strong {
+        let same = |other: &&(&Form, &Echo)| {
+            let (n, b, a, _) = other.0;
+            (n, b, a) == (node, before, after)
+        };
+        // A text that repeats two topics may mean either.
+        if strong.iter().filter(same).count() > 1 {
+            continue;
+        }
+        if let Some(what) = end(known, *node, *topic, before, after, echo) {
+            tell(source, known, what, (before, after), echo);
+        }
+    }
+}
+
+/// Everything that could be an echo.
+fn echoes(known: &Findings<'_>, said: &[Said], shown: &[Shown]) -> BTreeMap<Form, Echo> {
+    let mut echoes: BTreeMap<Form, Echo> = BTreeMap::new();
+    for text in said {
+        let Some(node) = known.owner(&text.logger) else {
+            continue;
+        };
+        let from = shown.partition_point(|s| s.time < text.time.plus(-NEAR_NS));
+        let near = shown[from..].iter().take(MOST_NEAR);
+        for message in near.take_while(|s| s.time <= text.time.plus(NEAR_NS)) {
+            let apart = text.time.since(message.time);
+            if is_number(&message.value) && apart.abs() > NEAR_NUMBERS_NS {
+                continue;
+            }
+            let Some(place) = place(&text.text, &message.value) else {
+                continue;
+            };
+            let topic = known.streams[message.stream].topic;
+            let form = (
+                node,
+                text.text[..place.start].to_owned(),
+                text.text[place.end..].to_owned(),
+                topic,
+            );
+            let echo = echoes.entry(form).or_default();
+            echo.values.insert(message.value.clone());
+            if echo.texts.insert((text.time, text.text.clone())) {
+                echo.first += usize::from(apart < 0);
+            }
+        }
+    }
+    echoes
+}
+
+/// Where a value stands in a text on its own, not inside a longer word or number.
+fn place(text: &str, value: &str) -> Option<Range<usize>> {
+    let start = text.find(value)?;
+    let end = start + value.len();
+    let is_part = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+    let (before, after) = (
+        text[..start].chars().next_back(),
+        text[end..].chars().next(),
+    );
+    let more = is_number(value)
+        && (matches!(before, Some('.' | '-'))
+            || text[end..].starts_with('.')
+                && text[end + 1..].starts_with(|c: char| c.is_ascii_digit()));
+    (!is_part(before) && !is_part(after) && !more).then_some(start..end)
+}
+
+fn is_number(value: &str) -> bool {
+    value.bytes().all(|b| b.is_ascii_digit() || b == b'-')
+}
+
+/// Whether enough different values were repeated, by nearly all texts of this form.
+fn is_strong(echo: &Echo, before: &str, after: &str, by_node: &[&str]) -> bool {
+    let numbers = echo.values.iter().all(|v| is_number(v));
+    let fewest = if numbers { FEWEST_NUMBERS } else { FEWEST };
+    if echo.values.len() < fewest || (numbers && verb(before, after).is_none()) {
+        return false;
+    }
+    if before.is_empty() && after.is_empty() {
+        return true;
+    }
+    let length = before.len() + after.len();
+    let form = by_node
+        .iter()
+        .filter(|text| text.len() >= length && text.starts_with(before) && text.ends_with(after));
+    echo.texts.len() * 100 >= form.count() * SHARE
+}
+
+/// What a text says of itself: whether it tells of a message sent, or received.
+fn verb(before: &str, after: &str) -> Option<bool> {
+    let text = format!("{before} {after}").to_lowercase();
+    let has = |words: &[&str]| words.iter().any(|word| text.contains(word));
+    let sent = has(&["publish"]);
+    let received = has(&["heard", "receiv", "subscri", "got ", "callback"]);
+    (sent != received).then_some(sent)
+}
+
+/// The edge that an echo tells of: by the publishers known, else by the verb, else by who was first.
+fn end(
+    known: &Findings<'_>,
+    node: Name,
+    topic: Name,
+    before: &str,
+    after: &str,
+    echo: &Echo,
+) -> Option<Key> {
+    let (all, first) = (echo.texts.len(), echo.first);
+    let (publish, subscribe) = (Key::Publish(node, topic), Key::Subscribe(topic, node));
+    if known.publishers(topic).any(|p| p == node) {
+        return None;
+    }
+    let later = first * 5 <= all;
+    if known.publishers(topic).next().is_some() {
+        let says = verb(before, after) != Some(true);
+        return (later && says).then_some(subscribe);
+    }
+    match verb(before, after) {
+        Some(true) => Some(publish),
+        Some(false) => later.then_some(subscribe),
+        None => (first * 10 >= all * 9).then_some(publish),
+    }
+}
+
+fn tell(
+    source: SourceId,
+    known: &mut Findings<'_>,
+    what: Key,
+    (before, after): (&str, &str),
+    echo: &Echo,
+) {
+    if known.knows(what) || known.denies(what) {
+        return;
+    }
+    let proof = Proof {
+        what,
+        source,
+        degree: Degree::Stated,
+        when: Validity::Signs {
+            signs: echo.texts.iter().map(|(time, _)| *time).collect(),
+            ends: Vec::new(),
+            held: false,
+        },
+    };
+    let first = echo.texts.first().map(|(time, _)| *time);
+    known.because(proof, first, |_| {
+        let (texts, values) = (echo.texts.len(), echo.values.len());
+        format!("{texts} log texts `{before}…{after}` repeat {values} different messages")
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_stands_on_its_own() {
+        assert_eq!(place("I heard: [Hello 3]", "Hello 3"), Some(10..17));
+        assert_eq!(place("I heard: [Hello 31]", "Hello 3"), None);
+        assert_eq!(place("rate 2.5", "5"), None);
+        assert_eq!(place("got 5.", "5"), Some(4..5));
+        assert_eq!(place("n=-5", "5"), None);
+    }
+
+    #[test]
+    fn texts_say_whether_they_sent_or_received() {
+        assert_eq!(verb("Publishing: '", "'"), Some(true));
+        assert_eq!(verb("I heard: [", "]"), Some(false));
+        assert_eq!(verb("state ", ""), None);
+    }
+}

@@ -1,0 +1,172 @@
+//! Log texts in which a node names a topic that it publishes or subscribes: of rclcpp and rclpy about incompatible quality
+//! of service, of Gazebo's plugins, its bridge and rosserial about their endpoints.
+
+use super::SourceContext;
+use crate::evidence::claim::{Claim, Degree, SourceId};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::log::LogRecord;
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let record = LogRecord::read(payload)?;
+    // What a recorder or a player says of topics is about others.
+    if record.logger.is_empty() || ["recorder.cpp", "player.cpp"].contains(&record.file_name()) {
+        return Ok(());
+    }
+    if let Some((publishes, topic)) = named(record.text) {
+        let (node, of) = (heard.name(&record.logger), heard.name(topic));
+        let claim = if publishes {
+            Claim::SaysPublish(node, of)
+        } else {
+            Claim::SaysSubscribe(node, of)
+        };
+        heard.claim(claim, Degree::Stated, String::new);
+    }
+    Ok(())
+}
+
+/// What stands before a topic, what behind it, and whether the speaker publishes it.
+const FORMS: &[(&str, &str, bool)] = &[
+    // rclcpp and rclpy: the other end is new, so the speaker has this one.
+    (
+        "New subscription discovered on topic '",
+        "', requesting incompatible QoS",
+        true,
+    ),
+    (
+        "New publisher discovered on topic '",
+        "', offering incompatible QoS",
+        false,
+    ),
+    // gazebo_ros_pkgs of ROS 2; camera, depth, points, infrared.
+    ("Advertise odometry on [", "]", true),
+    ("Advertise wheel state on [", "]", true),
+    ("Advertise joint states on [", "]", true),
+    ("Advertise state on [", "]", true),
+    ("Publishing camera info to [", "]", true),
+    ("Publishing depth camera info to [", "]", true),
+    ("Publishing pointcloud to [", "]", true),
+    ("Publishing images to [", "]", true),
+    ("Publishing depth images to [", "]", true),
+    ("Publishing joint states to [", "]", true),
+    ("Publishing contact states to [", "]", true),
+    ("Publishing to [", "]", true),
+    ("Subscribed to [", "]", false),
+    ("Subscribing to [", "]", false),
+    ("Subscribing to topic [", "]", false),
+    // ros_gz_bridge and ros_ign_bridge: Gazebo on the one side, ROS on the other.
+    ("Creating GZ->ROS Bridge: [", "", true),
+    ("Creating IGN->ROS Bridge: [", "", true),
+    ("Creating ROS->GZ Bridge: [", "", false),
+    ("Creating ROS->IGN Bridge: [", "", false),
+    // rosserial_python.
+    ("Setup publisher on ", " [", true),
+    ("Setup subscriber on ", " [", false),
+];
+
+/// The topic that a text names, and whether its speaker publishes it.
+fn named(text: &str) -> Option<(bool, &str)> {
+    let (before, after, publishes) = FORMS.iter().find(|(before, ..)| text.starts_with(before))?;
+    let rest = &text[before.len()..];
+    let topic = match (after.is_empty(), publishes) {
+        (false, _) => rest.split_once(after)?.0,
+        // `/gz/name (gz.msgs.Clock) -> /name (rosgraph_msgs/msg/Clock)`: ROS stands behind the arrow, or before it.
+        (true, true) => rest.split_once("-> ")?.1.split(' ').next()?,
+        (true, false) => rest.split(' ').next()?,
+    };
+    let is_name = |c: char| c.is_ascii_alphanumeric() || "/_~".contains(c);
+    (!topic.is_empty() && topic.chars().all(is_name)).then_some((*publishes, topic))
+}
+
+/// Only topics of the bag count: a text may mean a device or a file.
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    for (fact, signs, ends) in known.claims(source) {
+        let (logger, topic, publishes) = match fact.claim {
+            Claim::SaysPublish(logger, topic) => (logger, topic, true),
+            Claim::SaysSubscribe(logger, topic) => (logger, topic, false),
+            _ => continue,
+        };
+        let Some(node) = known.owner(&known.text(logger)) else {
+            continue;
+        };
+        let full = resolved(&known.text(topic), &known.text(node));
+        let Some(topic) = known.facts.known(&full).filter(|t| known.is_recorded(*t)) else {
+            continue;
+        };
+        let what = if publishes {
+            Key::Publish(node, topic)
+        } else {
+            Key::Subscribe(topic, node)
+        };
+        if known.denies(what) {
+            continue;
+        }
+        let first = signs.first().copied();
+        let proof = Proof {
+            what,
+            source,
+            degree: Degree::Stated,
+            when: Validity::Signs {
+                signs,
+                ends,
+                held: false,
+            },
+        };
+        let verb = if publishes { "publishes" } else { "subscribes" };
+        known.because(proof, first, |known| {
+            format!("{} logs that it {verb} {full}", known.text(logger))
+        });
+    }
+}
+
+/// A topic's full name as a node means it.
+fn resolved(topic: &str, node: &str) -> String {
+    let space = node.rsplit_once('/').map_or("", |(space, _)| space);
+    match topic.strip_prefix('~') {
+        Some(private) => format!("{node}/{}", private.trim_start_matches('/')),
+        None if topic.starts_with('/') => topic.to_owned(),
+        None => format!("{space}/{topic}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_name_their_topic_and_side() {
+        let texts = [
+            ("Advertise odometry on [/odom]", Some((true, "/odom"))),
+            ("Subscribed to [/cmd_vel]", Some((false, "/cmd_vel"))),
+            (
+                "New subscription discovered on topic '/scan', requesting incompatible QoS. No messages will be sent to it.",
+                Some((true, "/scan")),
+            ),
+            (
+                "Creating GZ->ROS Bridge: [/world/clock (gz.msgs.Clock) -> /clock (rosgraph_msgs/msg/Clock)] (Lazy 0)",
+                Some((true, "/clock")),
+            ),
+            (
+                "Creating ROS->GZ Bridge: [/cmd_vel (geometry_msgs/msg/Twist) -> /model/cmd (gz.msgs.Twist)] (Lazy 0)",
+                Some((false, "/cmd_vel")),
+            ),
+            (
+                "Setup publisher on chatter [std_msgs/String]",
+                Some((true, "chatter")),
+            ),
+            ("Publishing odom transforms between [odom] and [base]", None),
+            ("Subscribed to topic '/map'", None),
+        ];
+        for (text, expected) in texts {
+            assert_eq!(named(text), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn names_are_resolved_as_their_node_means_them() {
+        assert_eq!(resolved("odom", "/r1/base"), "/r1/odom");
+        assert_eq!(resolved("odom", "/base"), "/odom");
+        assert_eq!(resolved("~/odom", "/r1/base"), "/r1/base/odom");
+        assert_eq!(resolved("/odom", "/r1/base"), "/odom");
+    }
+}

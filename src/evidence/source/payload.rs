@@ -1,0 +1,294 @@
+//! Messages passed on byte by byte (relay, throttle, mux, drop, republish): whoever publishes the copies subscribes the
+//! topic that had them first.
+//!
+//! Compared are length and the first bytes, by a hash; a content that comes again in its own topic (an empty message, a
+//! constant) says nothing and is counted once.
+
+use std::collections::hash_map::DefaultHasher;
+use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
+use std::hash::Hasher as _;
+
+use super::SourceContext;
+use crate::base::time::Stamp;
+use crate::evidence::claim::{Name, SourceId};
+use crate::evidence::proof::{Findings, Key};
+use crate::evidence::spread::Spread;
+
+/// Fewer equal messages than this are chance.
+const FEWEST: u64 = 10;
+/// Of a hundred different messages of an output so many must be copies.
+const SHARE: u64 = 90;
+/// How many times as often the input must come first as the output.
+const FIRST: u64 = 3;
+/// The longest that a message takes to be passed on.
+const RECENT_NS: i64 = 2_000_000_000;
+/// Log records are passed on by a node that is known anyway.
+const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
+
+/// Bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
+pub(crate) const HEAD: usize = 16 << 10;
+
+/// Keeps the hash of a payload of `size` bytes that begins so.
+pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
+    let mut hasher = DefaultHasher::new();
+    hasher.write_u32(size);
+    hasher.write(beginning);
+    let [a, b, c, d, ..] = hasher.finish().to_le_bytes();
+    if let Some(time) = heard.time {
+        let hash = u32::from_le_bytes([a, b, c, d]);
+        heard.facts.payload(heard.place, time, hash);
+    }
+}
+
+/// One topic by one publisher, over all bags.
+type Flow = (Name, Option<Name>);
+
+/// What the messages of two flows have in common.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pair {
+    /// How often the one had it before the other.
+    before: u64,
+    lag: Spread,
+}
+
+/// What was found by going through all messages once.
+#[derive(Debug, Default)]
+struct Matches {
+    pairs: BTreeMap<(usize, usize), Pair>,
+    /// By flow: how many of its different messages were seen before in exactly these other flows.
+    origins: BTreeMap<usize, BTreeMap<Vec<usize>, u64>>,
+    distinct: BTreeMap<usize, u64>,
+}
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let (flows, matches) = matches(known);
+    for (output, total) in &matches.distinct {
+        let (basis, _) = flows[*output];
+        let Some(node) = publisher(known, flows[*output]) else {
+            continue;
+        };
+        let inputs = inputs(known, &flows, &matches, *output, node);
+        let copied = copied(&matches, *output, &inputs);
+        if copied < FEWEST || copied * 100 < total * SHARE {
+            continue;
+        }
+        known.copies.insert((node, basis));
+        for input in nearest(&matches, *output, &inputs) {
+            let topic = flows[input].0;
+            let what = Key::Subscribe(topic, node);
+            known.infer(source, what, Key::Publish(node, basis), |known| {
+                let count = matches.pairs[&(input, *output)].before;
+                let [from, to] = [topic, basis].map(|n| known.text(n));
+                format!(
+                    "{count} of {total} different messages of {to} are byte by byte those of {from} just before"
+                )
+            });
+        }
+    }
+}
+
+/// The node that publishes a flow, as far as it is known to be one.
+fn publisher(known: &Findings<'_>, (topic, publisher): Flow) -> Option<Name> {
+    publisher.or_else(|| {
+        let mut all = known.publishers(topic);
+        all.next().filter(|_| all.next().is_none())
+    })
+}
+
+/// Goes through all messages in order of time.
+fn matches(known: &mut Findings<'_>) -> (Vec<Flow>, Matches) {
+    let kept = known.facts.payloads.clone();
+    let kept = kept.into_iter().filter(|(at, _)| {
+        let topic = &known.streams[*at].connection.topic;
+        !LOGS.contains(&topic.as_str())
+    });
+    let (places, series): (Vec<usize>, Vec<_>) = kept.unzip();
+    let flow_of = |at: &usize| (known.streams[*at].topic, known.streams[*at].publisher);
+    let named: BTreeMap<_, Flow> = places
+        .iter()
+        .map(|at| {
+            (
+                (
+                    known.text(flow_of(at).0),
+                    flow_of(at).1.map(|n| known.text(n)),
+                ),
+                flow_of(at),
+            )
+        })
+        .collect();
+    let flows: Vec<Flow> = named.into_values().collect();
+    let place = |flow: Flow| flows.iter().position(|f| *f == flow).unwrap_or(0);
+    let flow_at: Vec<usize> = places.iter().map(|at| place(flow_of(at))).collect();
+    let mut walk = Walk::default();
+    let merged = known.facts.times.merge(&series, |timed| {
+        walk.take(timed.time, flow_at[timed.series], timed.size);
+    });
+    if let Err(error) = merged {
+        known.failed = Some(error);
+    }
+    (flows, walk.found)
+}
+
+/// The way through all messages.
+#[derive(Debug, Default)]
+struct Walk {
+    found: Matches,
+    /// Contents each flow had so far.
+    seen: HashSet<(usize, u32)>,
+    /// Who had a content lately, and when.
+    recent: HashMap<u32, Vec<(Stamp, usize)>>,
+    queue: VecDeque<(Stamp, u32)>,
+}
+
+impl Walk {
+    fn take(&mut self, time: Stamp, flow: usize, hash: u32) {
+        while let Some((old, hash)) = self.queue.front().copied()
+            && time.since(old) > RECENT_NS
+        {
+            self.queue.pop_front();
+            if let Some(owners) = self.recent.get_mut(&hash) {
+                owners.retain(|(t, _)| time.since(*t) <= RECENT_NS);
+                if owners.is_empty() {
+                    self.recent.remove(&hash);
+                }
+            }
+        }
+        if !self.seen.insert((flow, hash)) {
+            return;
+        }
+        *self.found.distinct.entry(flow).or_default() += 1;
+        let owners = self.recent.entry(hash).or_default();
+        let mut origins = Vec::new();
+        for (before, input) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
+            let pair = self.found.pairs.entry((*input, flow)).or_default();
+            pair.before += 1;
+            pair.lag.add(time.since(*before) as f64 / 1e9);
+            origins.push(*input);
+        }
+        if !origins.is_empty() {
+            origins.sort_unstable();
+            *self
+                .found
+                .origins
+                .entry(flow)
+                .or_default()
+                .entry(origins)
+                .or_default() += 1;
+        }
+        owners.push((time, flow));
+        self.queue.push_back((time, hash));
+    }
+}
+
+/// The flows of the same type by others that had enough of an output's messages first.
+fn inputs(
+    known: &Findings<'_>,
+    flows: &[Flow],
+    matches: &Matches,
+    output: usize,
+    node: Name,
+) -> Vec<usize> {
+    let kind = |topic: Name| known.kind(topic);
+    let before = |a, b| matches.pairs.get(&(a, b)).map_or(0, |pair| pair.before);
+    let is_input = |input: &usize| {
+        let (topic, _) = flows[*input];
+        let often = before(*input, output);
+        topic != flows[output].0
+            && kind(topic) == kind(flows[output].0)
+            && often >= FEWEST
+            && often >= FIRST * before(output, *input)
+            && !known.knows(Key::Publish(node, topic))
+    };
+    (0..flows.len()).filter(is_input).collect()
+}
+
+/// How many different messages of an output one of these inputs had before.
+fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
+    let origins = matches.origins.get(&output).into_iter().flatten();
+    origins
+        .filter(|(from, _)| from.iter().any(|f| inputs.contains(f)))
+        .map(|(_, count)| count)
+        .sum()
+}
+
+/// Of two inputs that have the same messages, which lie on one path, the one with clearly less spread of lag; neither
+/// if that cannot be told.
+fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
+    let pair = |input: usize| matches.pairs[&(input, output)];
+    let together = |a: usize, b: usize| -> u64 {
+        let origins = matches.origins.get(&output).into_iter().flatten();
+        let both = origins.filter(|(from, _)| from.contains(&a) && from.contains(&b));
+        both.map(|(_, count)| count).sum()
+    };
+    let is_path = |a, b| together(a, b) * 2 >= pair(a).before.min(pair(b).before);
+    let beats = |a: usize, b: usize| pair(a).lag.is_clearly_less(&pair(b).lag);
+    let rivals = |a: usize| inputs.iter().copied().filter(move |b| *b != a);
+    inputs
+        .iter()
+        .copied()
+        .filter(|a| rivals(*a).all(|b| !is_path(*a, b) || beats(*a, b)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Flow, milliseconds, content.
+    fn walked(messages: &[(usize, i64, u32)]) -> Matches {
+        let mut walk = Walk::default();
+        let mut sorted = messages.to_vec();
+        sorted.sort_by_key(|m| m.1);
+        for (flow, at, hash) in sorted {
+            walk.take(Stamp(at * 1_000_000), flow, hash);
+        }
+        walk.found
+    }
+
+    #[test]
+    fn only_different_contents_count() {
+        let found = walked(&[
+            (0, 0, 7),
+            (1, 1, 7),
+            (0, 10, 7),
+            (1, 11, 7),
+            (0, 20, 8),
+            (1, 21, 8),
+        ]);
+        assert_eq!(found.pairs[&(0, 1)].before, 2);
+        assert_eq!(found.distinct, [(0, 2), (1, 2)].into());
+    }
+
+    #[test]
+    fn what_is_long_ago_is_no_input() {
+        assert!(walked(&[(0, 0, 7), (1, 2_500, 7)]).pairs.is_empty());
+    }
+
+    #[test]
+    fn in_a_chain_the_last_link_but_one_is_the_input() {
+        // 0 → 1 with a wild lag, 1 → 2 with a steady one.
+        let messages: Vec<_> = (0..40_u32)
+            .flat_map(|n| {
+                let (at, wild) = (i64::from(n) * 100, i64::from(n * 7 % 40));
+                [(0, at, n), (1, at + 1 + wild, n), (2, at + 3 + wild, n)]
+            })
+            .collect();
+        assert_eq!(nearest(&walked(&messages), 2, &[0, 1]), [1]);
+    }
+
+    #[test]
+    fn of_two_copies_of_one_topic_neither_is_the_others_input() {
+        let messages: Vec<_> = (0..40_u32)
+            .flat_map(|n| {
+                let at = i64::from(n) * 100;
+                [
+                    (0, at, n),
+                    (1, at + 1 + i64::from(n * 7 % 10), n),
+                    (2, at + 20 + i64::from(n * 3 % 10), n),
+                ]
+            })
+            .collect();
+        let inputs = nearest(&walked(&messages), 2, &[0, 1]);
+        assert!(!inputs.contains(&1), "{inputs:?}");
+    }
+}

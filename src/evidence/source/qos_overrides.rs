@@ -1,0 +1,65 @@
+//! `qos_overrides.<topic>.publisher|subscription.<policy>` in parameter events of ROS 2: rclcpp declares these
+//! parameters when it makes that very publisher or subscription.
+
+use std::collections::BTreeSet;
+
+use super::SourceContext;
+use crate::evidence::claim::{Claim, Degree};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::parameters::Event;
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let event = Event::read(payload)?;
+    let ends: BTreeSet<_> = event.set.iter().filter_map(|p| end(p.name)).collect();
+    for (topic, publishes) in ends {
+        let (node, of) = (heard.name(event.node), heard.name(topic));
+        let (word, claim) = if publishes {
+            ("publisher", Claim::Publish(node, of))
+        } else {
+            ("subscription", Claim::Subscribe(node, of))
+        };
+        heard.claim(claim, Degree::Stated, || {
+            format!("{} declares qos_overrides.{topic}.{word}", event.node)
+        });
+    }
+    Ok(())
+}
+
+/// The topic in the name of a parameter, and whether a publisher is meant. An entity may carry an id of its own
+/// (`publisher_front`).
+fn end(parameter: &str) -> Option<(&str, bool)> {
+    let rest = parameter.strip_prefix("qos_overrides.")?;
+    let (entity, _policy) = rest.rsplit_once('.')?;
+    let (topic, entity) = entity.rsplit_once('.')?;
+    let kind = entity.split('_').next()?;
+    let publishes = match kind {
+        "publisher" => true,
+        "subscription" => false,
+        _ => return None,
+    };
+    topic.starts_with('/').then_some((topic, publishes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_names_its_topic_and_end() {
+        assert_eq!(
+            end("qos_overrides./tf.publisher.depth"),
+            Some(("/tf", true))
+        );
+        assert_eq!(
+            end("qos_overrides./a/scan.subscription_left.history"),
+            Some(("/a/scan", false))
+        );
+        for other in [
+            "use_sim_time",
+            "qos_overrides./tf.depth",
+            "qos_overrides.tf.x.y",
+        ] {
+            assert_eq!(end(other), None);
+        }
+    }
+}

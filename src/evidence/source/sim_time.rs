@@ -1,0 +1,24 @@
+//! `use_sim_time` in parameter events of ROS 2: a node that runs by simulated time subscribes `/clock`.
+
+use super::SourceContext;
+use crate::evidence::claim::{Claim, Degree};
+use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::parameters::Event;
+
+pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+    let event = Event::read(payload)?;
+    let set = event.set.iter().rev().find(|p| p.name == "use_sim_time");
+    let Some(simulated) = set.and_then(|p| p.truth).filter(|_| !event.node.is_empty()) else {
+        return Ok(());
+    };
+    let (node, clock) = (heard.name(event.node), heard.name("/clock"));
+    let claim = if simulated {
+        Claim::Subscribe(node, clock)
+    } else {
+        Claim::Unsubscribe(node, clock)
+    };
+    heard.claim(claim, Degree::Inferred, || {
+        format!("{} sets use_sim_time to {simulated}", event.node)
+    });
+    Ok(())
+}

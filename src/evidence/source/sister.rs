@@ -1,0 +1,90 @@
+//! Sister namespaces: a node whose twin in another namespace publishes the same topics there, and is known to subscribe
+//! one, subscribes it too.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::evidence::claim::{Name, SourceId};
+use crate::evidence::proof::{Findings, Key};
+
+/// Twins publish at least so many topics of their namespace: one alone may be chance.
+const FEWEST: usize = 2;
+
+/// A node with its namespace, and the topics it publishes inside it.
+struct Twin {
+    node: Name,
+    space: String,
+    own: BTreeSet<String>,
+}
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    for twins in families(known).into_values() {
+        for one in &twins {
+            let alike = twins
+                .iter()
+                .filter(|other| other.node != one.node && other.own == one.own);
+            for other in alike {
+                copy(source, known, one, other);
+            }
+        }
+    }
+}
+
+/// The nodes that share their last part, each with its namespace and publications.
+fn families(known: &Findings<'_>) -> BTreeMap<String, Vec<Twin>> {
+    let mut published: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
+    for (node, topic) in known.publications() {
+        published.entry(node).or_default().push(topic);
+    }
+    let mut families: BTreeMap<String, Vec<Twin>> = BTreeMap::new();
+    for (node, topics) in published {
+        let name = known.text(node);
+        let Some((space, last)) = name.rsplit_once('/').filter(|(space, _)| !space.is_empty())
+        else {
+            continue;
+        };
+        let own: BTreeSet<String> = topics
+            .iter()
+            .filter_map(|t| inside(&known.text(*t), space))
+            .collect();
+        if own.len() >= FEWEST {
+            families.entry(last.to_owned()).or_default().push(Twin {
+                node,
+                space: space.to_owned(),
+                own,
+            });
+        }
+    }
+    for twins in families.values_mut() {
+        twins.sort_by(|a, b| a.space.cmp(&b.space));
+    }
+    families
+}
+
+/// A topic's name inside a namespace.
+fn inside(topic: &str, space: &str) -> Option<String> {
+    let rest = topic.strip_prefix(space)?;
+    rest.starts_with('/').then(|| rest.to_owned())
+}
+
+/// What `from` subscribes, `to` subscribes as well, if the bag has that topic.
+fn copy(source: SourceId, known: &mut Findings<'_>, from: &Twin, to: &Twin) {
+    let subscribed = known.subscriptions().filter(|(_, node)| *node == from.node);
+    let topics: Vec<Name> = subscribed.map(|(topic, _)| topic).collect();
+    for topic in topics {
+        let twin = match inside(&known.text(topic), &from.space) {
+            Some(rest) => known.facts.known(&format!("{}{rest}", to.space)),
+            None => Some(topic),
+        };
+        let own = |twin| known.knows(Key::Publish(to.node, twin));
+        if let Some(twin) = twin.filter(|t| known.is_recorded(*t) && !own(*t)) {
+            let what = Key::Subscribe(twin, to.node);
+            known.infer(source, what, Key::Node(to.node), |known| {
+                format!(
+                    "{} publishes the same topics in its namespace and subscribes {}",
+                    known.text(from.node),
+                    known.text(topic)
+                )
+            });
+        }
+    }
+}

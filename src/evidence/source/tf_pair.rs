@@ -1,0 +1,29 @@
+//! A listener of `/tf` is a listener of `/tf_static`, and the other way round: tf2 always subscribes both.
+
+use crate::evidence::claim::{Name, SourceId};
+use crate::evidence::proof::{Findings, Key};
+
+const PAIR: [&str; 2] = ["tf", "tf_static"];
+
+pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+    let listened: Vec<(Name, Name)> = known.subscriptions().collect();
+    for (topic, node) in listened {
+        let text = known.text(topic);
+        let Some((space, last)) = text.rsplit_once('/') else {
+            continue;
+        };
+        let Some(at) = PAIR.iter().position(|name| *name == last) else {
+            continue;
+        };
+        let twin = known.facts.known(&format!("{space}/{}", PAIR[1 - at]));
+        if let Some(twin) = twin.filter(|t| known.kind(*t) == "tf2_msgs/TFMessage") {
+            let basis = Key::Subscribe(topic, node);
+            known.infer(source, Key::Subscribe(twin, node), basis, |known| {
+                format!(
+                    "{} subscribes {text}, and tf2 always subscribes both",
+                    known.text(node)
+                )
+            });
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What nodes log and what small messages hold, as text side by side, so that a log text that repeats a message can be
+//! found. Bounded: a mission with more keeps what came first.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::base::time::Stamp;
+
+/// A text of a logger.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Said {
+    pub(crate) time: Stamp,
+    pub(crate) logger: Arc<str>,
+    pub(crate) text: Box<str>,
+}
+
+/// A value in a message of the stream at a place.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Shown {
+    pub(crate) time: Stamp,
+    pub(crate) stream: usize,
+    /// The place of its field in the message.
+    pub(crate) field: usize,
+    pub(crate) value: Box<str>,
+}
+
+/// Texts of both sides.
+#[derive(Debug, Default)]
+pub(crate) struct Texts {
+    said: Vec<Said>,
+    shown: Vec<Shown>,
+    /// Bytes of texts on either side.
+    bytes: [usize; 2],
+}
+
+/// Bytes of texts kept on either side.
+const MOST: usize = 4 << 20;
+/// What a short text takes besides its bytes.
+const ENTRY: usize = 48;
+
+impl Texts {
+    /// Takes in a text of a logger.
+    pub(crate) fn say(&mut self, time: Stamp, logger: &str, text: &str) {
+        self.bytes[0] += text.len() + ENTRY;
+        if self.bytes[0] <= MOST {
+            self.said.push(Said {
+                time,
+                logger: logger.into(),
+                text: text.into(),
+            });
+        }
+    }
+
+    /// Takes in a value in a message.
+    pub(crate) fn show(&mut self, time: Stamp, (stream, field): (usize, usize), value: &str) {
+        self.bytes[1] += value.len() + ENTRY;
+        if self.bytes[1] <= MOST {
+            self.shown.push(Shown {
+                time,
+                stream,
+                field,
+                value: value.into(),
+            });
+        }
+    }
+
+    /// Both sides, sorted; of values that a field repeats only the first.
+    pub(crate) fn sorted(&self) -> (Vec<Said>, Vec<Shown>) {
+        let (mut said, mut shown) = (self.said.clone(), self.shown.clone());
+        said.sort_unstable();
+        shown.sort_unstable();
+        let mut last: BTreeMap<(usize, usize), Box<str>> = BTreeMap::new();
+        shown.retain(|message| {
+            let place = (message.stream, message.field);
+            let before = last.insert(place, message.value.clone());
+            before.is_none_or(|value| value != message.value)
+        });
+        (said, shown)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_field_repeats_is_kept_once() {
+        let mut texts = Texts::default();
+        for (time, value) in [(3, "b"), (1, "a"), (2, "a"), (4, "a")] {
+            texts.show(Stamp(time), (0, 0), value);
+        }
+        let times: Vec<_> = texts.sorted().1.iter().map(|s| s.time.0).collect();
+        assert_eq!(times, [1, 3, 4]);
+    }
+
+    #[test]
+    fn either_side_is_bounded() {
+        let mut texts = Texts::default();
+        let long = "x".repeat(1 << 20);
+        (0..9).for_each(|n| texts.say(Stamp(n), "/a", &long));
+        texts.show(Stamp(0), (0, 0), "kept");
+        let (said, shown) = texts.sorted();
+        assert_eq!((said.len(), shown.len()), (3, 1));
+    }
+}

@@ -1,0 +1,649 @@
+//! Edges that no header names: hand-made missions, and what is concluded from each.
+
+use std::collections::BTreeSet;
+
+use bagreel::bag::{Connection, ConnectionId, Encoding, Message, Sink as _};
+use bagreel::base::time::{Span, Stamp};
+use bagreel::evidence::collector::{Collected, Collector, Options};
+use bagreel::evidence::topology::{Element, Entry, Topology};
+use bagreel::evidence::{Degree, EvidenceLine};
+use bagreel::graph::{self, Built};
+
+use crate::support::cdr::Cdr;
+use crate::support::{ORIGIN, Recording};
+
+const SECOND: i64 = 1_000_000_000;
+
+/// Everything that is collected from a recording.
+fn collected(bag: &Recording, options: Options) -> Collected {
+    let mut collector = Collector::new(options);
+    let mut progress = |_, _| ();
+    let mut sink = collector.bag(&mut progress);
+    for (id, publisher) in (0..).zip(&bag.publishers) {
+        let is_ros2 = publisher.type_name.contains("/msg/");
+        let some = |text: &str| (!text.is_empty()).then(|| text.into());
+        sink.connection(&Connection {
+            id: ConnectionId(id),
+            topic: publisher.topic.as_str().into(),
+            type_name: publisher.type_name.as_str().into(),
+            definition: some(&publisher.definition),
+            type_hash: None,
+            publisher: (!publisher.node.is_empty()).then(|| publisher.node.as_str().into()),
+            latching: publisher.latching,
+            qos: some(&publisher.qos),
+            encoding: if is_ros2 {
+                Encoding::Cdr
+            } else {
+                Encoding::Ros1
+            },
+        });
+    }
+    for (publisher, time, data) in &bag.messages {
+        let id = ConnectionId(u32::try_from(*publisher).unwrap());
+        sink.stamps(id, &[Stamp(*time)], None);
+        sink.message(Message {
+            connection: id,
+            time: Stamp(*time),
+            data,
+            size: u32::try_from(data.len()).unwrap(),
+        });
+    }
+    collector.finish().unwrap()
+}
+
+/// What is concluded from a recording, with the pieces of evidence on `why`.
+fn concluded(bag: &Recording, options: Options) -> (Built, Vec<EvidenceLine>) {
+    let mut collected = collected(bag, options);
+    let span = collected.span.unwrap();
+    let built = graph::build(&mut collected, &[span], &graph::Options::default()).unwrap();
+    (built, collected.why())
+}
+
+/// Every edge that a kind of evidence proves: `/node > /topic degree` or `/topic > /node degree`.
+fn proved(bag: &Recording, by: &str, options: Options) -> Vec<String> {
+    let (built, _) = concluded(bag, options);
+    let all = &built.elements;
+    let by = |evidence: bagreel::evidence::Evidence| evidence.words().any(|word| word == by);
+    let node = |id: u32| all.nodes[id as usize].name.as_str();
+    let topic = |id: u32| all.topics[id as usize].name.as_str();
+    let degree = |states: &[graph::EdgeState], id: usize| {
+        let state = states.iter().find(|s| s.id as usize == id);
+        state.map_or("never", |s| s.degree.word())
+    };
+    let graph = &built.graphs[0];
+    let publishes = all
+        .publishes
+        .iter()
+        .enumerate()
+        .filter(|(_, e)| by(e.evidence));
+    let subscribes = all
+        .subscribes
+        .iter()
+        .enumerate()
+        .filter(|(_, e)| by(e.evidence));
+    let mut lines: Vec<String> = publishes
+        .map(|(id, e)| {
+            let degree = degree(&graph.publishes, id);
+            format!("{} > {} {degree}", node(e.node), topic(e.topic))
+        })
+        .collect();
+    lines.extend(subscribes.map(|(id, e)| {
+        let degree = degree(&graph.subscribes, id);
+        format!("{} > {} {degree}", topic(e.topic), node(e.node))
+    }));
+    lines
+}
+
+fn edges(bag: &Recording, by: &str) -> Vec<String> {
+    proved(bag, by, Options::default())
+}
+
+impl Recording {
+    fn at(&mut self, publisher: usize, millis: i64, payload: Vec<u8>) {
+        self.messages
+            .push((publisher, ORIGIN + millis * 1_000_000, payload));
+    }
+
+    /// A topic of ROS 2, whose messages name no publisher.
+    fn topic2(&mut self, topic: &str, kind: &str) -> usize {
+        self.publisher("", topic, kind)
+    }
+}
+
+fn text1(text: &str) -> Vec<u8> {
+    let length = u32::try_from(text.len()).unwrap();
+    [&length.to_le_bytes(), text.as_bytes()].concat()
+}
+
+/// `rosgraph_msgs/Log`.
+fn log1(node: &str, text: &str, file: &str, topics: &[&str]) -> Vec<u8> {
+    let header = [vec![0; 12], text1("")].concat();
+    let parts = [
+        header,
+        vec![2],
+        text1(node),
+        text1(text),
+        text1(file),
+        text1("f"),
+    ];
+    let mut payload = parts.concat();
+    payload.extend(7_u32.to_le_bytes());
+    payload.extend(u32::try_from(topics.len()).unwrap().to_le_bytes());
+    for topic in topics {
+        payload.extend(text1(topic));
+    }
+    payload
+}
+
+/// `rcl_interfaces/msg/Log`.
+fn log2(logger: &str, text: &str, file: &str) -> Vec<u8> {
+    let head = Cdr::default().time(SECOND).u8(20);
+    let record = head.text(logger).text(text).text(file).text("f");
+    record.u32(7).done()
+}
+
+/// `rcl_interfaces/msg/ParameterEvent` with new parameters, all of them truth values.
+fn parameters(node: &str, set: &[(&str, bool)]) -> Vec<u8> {
+    let mut event = Cdr::default().time(SECOND).text(node);
+    event = event.u32(u32::try_from(set.len()).unwrap());
+    for (name, value) in set {
+        event = event.text(name).u8(1).u8(u8::from(*value)).u64(0).f64(0.0);
+        event = event.text("").u32(0).u32(0).u32(0).u32(0).u32(0);
+    }
+    event.u32(0).u32(0).done()
+}
+
+/// A camera at 10 Hz; a throttle that passes every second image on.
+fn throttled() -> Recording {
+    let mut bag = Recording::default();
+    let input = bag.publisher("/camera", "/image", "sensor_msgs/Image");
+    let output = bag.publisher("/throttle", "/image_slow", "sensor_msgs/Image");
+    let other = bag.publisher("/other", "/image_other", "sensor_msgs/Image");
+    for n in 0..60_u32 {
+        let at = i64::from(n) * 100;
+        bag.at(input, at, n.to_le_bytes().repeat(50));
+        if n % 2 == 0 {
+            bag.at(output, at + 3, n.to_le_bytes().repeat(50));
+        }
+        bag.at(other, at + 3, (n + 1000).to_le_bytes().repeat(50));
+    }
+    bag
+}
+
+#[test]
+fn who_sends_copies_subscribes_the_originals() {
+    assert_eq!(
+        edges(&throttled(), "payload"),
+        ["/image > /throttle inferred"]
+    );
+}
+
+#[test]
+fn payloads_are_not_read_where_none_may_be_compared() {
+    let options = Options {
+        payload_bytes: 0,
+        ..Options::default()
+    };
+    assert!(proved(&throttled(), "payload", options).is_empty());
+}
+
+#[test]
+fn a_mux_subscribes_all_its_inputs() {
+    let mut bag = Recording::default();
+    let teleop = bag.publisher("/teleop", "/cmd_teleop", "geometry_msgs/Twist");
+    let nav = bag.publisher("/nav", "/cmd_nav", "geometry_msgs/Twist");
+    let mux = bag.publisher("/mux", "/cmd_vel", "geometry_msgs/Twist");
+    for n in 0..60_u32 {
+        let from = if n < 30 { teleop } else { nav };
+        let payload = n.to_le_bytes().repeat(12);
+        bag.at(from, i64::from(n) * 100, payload.clone());
+        bag.at(mux, i64::from(n) * 100 + 2, payload);
+    }
+    assert_eq!(
+        edges(&bag, "payload"),
+        ["/cmd_nav > /mux inferred", "/cmd_teleop > /mux inferred"]
+    );
+}
+
+#[test]
+fn equal_constants_are_no_copies() {
+    let mut bag = Recording::default();
+    for (node, topic, from) in [("/a", "/beat_a", 0), ("/b", "/beat_b", 3)] {
+        let beat = bag.publisher(node, topic, "std_msgs/Bool");
+        bag.send(beat, (from, 9000), 100, &[1]);
+    }
+    assert!(edges(&bag, "payload").is_empty());
+}
+
+/// A talker and a listener of ROS 2 that log what they send and hear, and a node that counts.
+fn chatter(says: &str, hears: &str) -> Recording {
+    let mut bag = Recording::default();
+    let topic = bag.topic2("/chatter", "std_msgs/msg/String");
+    let log = bag.topic2("/rosout", "rcl_interfaces/msg/Log");
+    for n in 0..6 {
+        let at = n * 1000;
+        let hello = format!("Hello {n}");
+        bag.at(
+            log,
+            at,
+            log2("speaker", &says.replace('%', &hello), "a.cpp"),
+        );
+        bag.at(topic, at + 1, Cdr::default().text(&hello).done());
+        bag.at(
+            log,
+            at + 2,
+            log2("hearer", &hears.replace('%', &hello), "b.cpp"),
+        );
+        bag.at(log, at + 2, log2("counter", &format!("{n} done"), "c.cpp"));
+    }
+    bag
+}
+
+#[test]
+fn log_texts_that_repeat_a_message_tell_who_sends_and_who_hears_it() {
+    let expected = ["/speaker > /chatter stated", "/chatter > /hearer stated"];
+    assert_eq!(
+        edges(&chatter("Publishing: '%'", "I heard: [%]"), "echo"),
+        expected
+    );
+    // Without a verb the one who is first sends.
+    assert_eq!(edges(&chatter("say %", "and %"), "echo"), expected);
+    // Without a verb nothing is known of who comes later, unless somebody is known to send.
+    assert!(edges(&chatter("idle", "and %"), "echo").is_empty());
+}
+
+#[test]
+fn log_texts_name_topics() {
+    let mut bag = Recording::default();
+    let log = bag.topic2("/rosout", "rcl_interfaces/msg/Log");
+    for (topic, kind) in [
+        ("/odom", "nav_msgs/msg/Odometry"),
+        ("/scan", "sensor_msgs/msg/LaserScan"),
+    ] {
+        let topic = bag.topic2(topic, kind);
+        bag.at(topic, 10, vec![0, 1, 0, 0]);
+    }
+    let scan =
+        "New subscription discovered on topic '/scan', requesting incompatible QoS. No messages …";
+    for text in [
+        "Advertise odometry on [/odom]",
+        scan,
+        "Subscribed to [/nowhere]",
+    ] {
+        bag.at(log, 20, log2("base", text, "plugin.cpp"));
+    }
+    bag.at(
+        log,
+        20,
+        log2(
+            "rosbag2_recorder",
+            "Subscribed to [/odom]",
+            "x/recorder.cpp",
+        ),
+    );
+    assert_eq!(
+        edges(&bag, "log_text"),
+        ["/base > /odom stated", "/base > /scan stated"]
+    );
+}
+
+#[test]
+fn parameters_tell_the_ends_and_the_clock_of_their_node() {
+    let mut bag = Recording::default();
+    let events = bag.topic2("/parameter_events", "rcl_interfaces/msg/ParameterEvent");
+    let set = [
+        ("qos_overrides./tf.publisher.depth", false),
+        ("qos_overrides./scan.subscription.reliability", false),
+        ("use_sim_time", true),
+    ];
+    bag.at(events, 0, parameters("/r1/nav", &set));
+    bag.at(
+        events,
+        5,
+        parameters("/r1/other", &[("use_sim_time", false)]),
+    );
+    bag.at(events, 900, parameters("/r1/nav", &[]));
+    assert_eq!(
+        edges(&bag, "qos_overrides"),
+        ["/r1/nav > /tf stated", "/scan > /r1/nav stated"]
+    );
+    assert_eq!(edges(&bag, "sim_time"), ["/clock > /r1/nav inferred"]);
+}
+
+/// A mission of ROS 2 whose nodes only log.
+fn logging(nodes: &[(&str, &str)], topics: &[(&str, &str)]) -> Recording {
+    let mut bag = Recording::default();
+    let log = bag.topic2("/rosout", "rcl_interfaces/msg/Log");
+    for (node, file) in nodes {
+        let logger = node.trim_start_matches('/').replace('/', ".");
+        bag.at(log, 0, log2(&logger, "up", file));
+    }
+    for (topic, kind) in topics {
+        let topic = bag.topic2(topic, kind);
+        bag.at(topic, 500, vec![0, 1, 0, 0, 9]);
+    }
+    bag
+}
+
+#[test]
+fn a_topic_below_a_node_is_the_nodes() {
+    let bag = logging(
+        &[("/arm", "a.cpp"), ("/r1/nav", "b.cpp")],
+        &[
+            ("/arm/state", "a/msg/State"),
+            ("/arm/command", "a/msg/Command"),
+            ("/r1/scan", "a/msg/Scan"),
+        ],
+    );
+    assert_eq!(edges(&bag, "private_name"), ["/arm > /arm/state inferred"]);
+}
+
+#[test]
+fn well_known_nodes_keep_their_contracts() {
+    let topics = [
+        ("/r1/joint_states", "sensor_msgs/msg/JointState"),
+        ("/r1/scan", "sensor_msgs/msg/PointCloud2"),
+        ("/tf", "tf2_msgs/msg/TFMessage"),
+    ];
+    let nodes = [
+        ("/r1/robot_state_publisher", "robot_state_publisher.cpp"),
+        ("/r1/amcl", "amcl_node.cpp"),
+    ];
+    let bag = logging(&nodes, &topics);
+    assert_eq!(
+        edges(&bag, "contract"),
+        [
+            "/r1/robot_state_publisher > /tf inferred",
+            "/r1/joint_states > /r1/robot_state_publisher inferred"
+        ]
+    );
+    // A node of that name from another file is another program.
+    let bag = logging(&[("/r1/robot_state_publisher", "mine.py")], &topics);
+    assert!(edges(&bag, "contract").is_empty());
+}
+
+#[test]
+fn a_contract_claims_no_more_publishers_than_the_bag_counts() {
+    let nodes = [("/rplidar_node", "a.cpp"), ("/urg_node", "b.cpp")];
+    let mut bag = logging(&nodes, &[("/scan", "sensor_msgs/msg/LaserScan")]);
+    let offer =
+        "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: volatile\n";
+    bag.publishers[1].qos = offer.to_owned();
+    assert!(edges(&bag, "contract").is_empty());
+    bag.publishers[1].qos = offer.repeat(2);
+    assert_eq!(edges(&bag, "contract").len(), 2);
+}
+
+#[test]
+fn publishers_that_nobody_names_are_counted() {
+    let mut bag = logging(
+        &[("/rplidar_node", "a.cpp")],
+        &[("/scan", "sensor_msgs/msg/LaserScan")],
+    );
+    let offer =
+        "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: volatile\n";
+    bag.publishers[1].qos = offer.repeat(3);
+    let (built, _) = concluded(&bag, Options::default());
+    let unknown: Vec<_> = built
+        .elements
+        .topics
+        .iter()
+        .map(|t| t.unknown_publishers)
+        .collect();
+    assert_eq!(unknown, [None, Some(2)]);
+}
+
+/// A mission of ROS 1 with a rospy node that names its topics.
+fn listed(node: &str, topics: &[&str]) -> Recording {
+    let mut bag = Recording::default();
+    let tf = bag.publisher("/base", "/tf", "tf2_msgs/TFMessage");
+    let fixed = bag.publisher("/base", "/tf_static", "tf2_msgs/TFMessage");
+    let log = bag.publisher(node, "/rosout", "rosgraph_msgs/Log");
+    bag.send(tf, (0, 3000), 100, &[0; 4]);
+    bag.send(fixed, (0, 1), 1, &[0; 4]);
+    bag.at(log, 50, log1(node, "up", "node.py", topics));
+    bag
+}
+
+#[test]
+fn a_closed_list_speaks_against_rules() {
+    // The node listens to `/tf_static` by its own list, which leaves `/tf` out.
+    assert!(edges(&listed("/amcl", &["/rosout", "/tf_static"]), "tf_pair").is_empty());
+    // roscpp's list holds no subscriptions, so it says nothing against them.
+    let mut bag = listed("/amcl", &["/rosout"]);
+    let log = bag.publishers.len() - 1;
+    bag.messages.retain(|m| m.0 != log);
+    let text = "Retrying connection to [127.0.0.1:4] for topic [/tf_static]";
+    bag.at(log, 50, log1("/amcl", text, "a.cpp", &["/rosout"]));
+    assert_eq!(edges(&bag, "tf_pair"), ["/tf > /amcl inferred"]);
+}
+
+#[test]
+fn a_twin_in_another_namespace_subscribes_the_same() {
+    let mut bag = Recording::default();
+    for robot in ["/r1", "/r2"] {
+        for topic in ["plan", "costmap"] {
+            let node = format!("{robot}/planner");
+            let place = bag.publisher(&node, &format!("{robot}/{topic}"), "nav_msgs/Path");
+            bag.send(place, (0, 5000), 100, &[1; 8]);
+        }
+        let odom = bag.publisher(
+            &format!("{robot}/base"),
+            &format!("{robot}/odom"),
+            "nav_msgs/Odometry",
+        );
+        bag.send(odom, (0, 5000), 100, &[2; 8]);
+    }
+    let log = bag.publisher("/r1/planner", "/rosout", "rosgraph_msgs/Log");
+    let text = "Retrying connection to [127.0.0.1:4] for topic [/r1/odom]";
+    bag.at(
+        log,
+        50,
+        log1(
+            "/r1/planner",
+            text,
+            "p.cpp",
+            &["/rosout", "/r1/plan", "/r1/costmap"],
+        ),
+    );
+    assert_eq!(edges(&bag, "sister"), ["/r2/odom > /r2/planner inferred"]);
+}
+
+#[test]
+fn an_anonymous_node_lives_since_the_moment_in_its_name() {
+    let mut bag = Recording::default();
+    let start = ORIGIN / 1_000_000 + 2_000;
+    let beat = bag.publisher("/base", "/beat", "std_msgs/Empty");
+    let found = bag.publisher(&format!("/probe_77_{start}"), "/found", "std_msgs/Empty");
+    bag.send(beat, (0, 9000), 100, &[]);
+    bag.send(found, (8000, 9000), 100, &[]);
+    let (built, _) = concluded(&bag, Options::default());
+    let mut nodes = built.elements.nodes.iter();
+    let probe = nodes
+        .find(|n| n.name.as_str().starts_with("/probe"))
+        .unwrap();
+    assert_eq!(probe.first, Some(Stamp(ORIGIN + 2 * SECOND)));
+}
+
+#[test]
+fn the_recorder_is_known_by_its_file_in_any_folder() {
+    for file in [
+        "/tmp/ros-noetic-rosbag-1.16.0/src/recorder.cpp",
+        "/ws/src/rosbag/src/recorder.cpp",
+    ] {
+        let mut bag = Recording::default();
+        let log = bag.publisher("/my_recording", "/rosout", "rosgraph_msgs/Log");
+        bag.at(
+            log,
+            0,
+            log1(
+                "/my_recording",
+                "Subscribing to /rosout",
+                file,
+                &["/rosout"],
+            ),
+        );
+        assert_eq!(edges(&bag, "recorder"), ["/rosout > /my_recording stated"]);
+    }
+}
+
+#[test]
+fn diagnostics_speak_before_lists_are_read() {
+    let mut bag = Recording::default();
+    // One connection for all, as tools that merge connections leave it.
+    let log = bag.publisher("/a", "/rosout", "rosgraph_msgs/Log");
+    let diagnostics = bag.publisher("/a", "/diagnostics", "diagnostic_msgs/DiagnosticArray");
+    for node in ["/a", "/b"] {
+        bag.at(
+            log,
+            50,
+            log1(node, "up", "node.py", &["/rosout", "/diagnostics"]),
+        );
+        let name = format!("{}: rate", &node[1..]);
+        let status = [
+            vec![0; 12],
+            text1(""),
+            1_u32.to_le_bytes().to_vec(),
+            vec![0],
+            text1(&name),
+        ];
+        let rest = [text1(""), text1(""), 0_u32.to_le_bytes().to_vec()];
+        bag.at(diagnostics, 60, [status.concat(), rest.concat()].concat());
+    }
+    let (built, _) = concluded(&bag, Options::default());
+    let topics = &built.elements.topics;
+    let subscribed = built
+        .elements
+        .subscribes
+        .iter()
+        .map(|e| topics[e.topic as usize].name.as_str());
+    assert!(subscribed.into_iter().all(|topic| topic != "/diagnostics"));
+}
+
+#[test]
+fn every_degree_but_measured_stays_what_it_is_while_messages_come() {
+    let bag = logging(&[("/arm", "a.cpp")], &[("/arm/state", "a/msg/State")]);
+    let (built, _) = concluded(&bag, Options::default());
+    let degrees: Vec<_> = built.graphs[0].publishes.iter().map(|s| s.degree).collect();
+    assert_eq!(degrees, [Degree::Inferred, Degree::Stated]);
+}
+
+#[test]
+fn conclusions_are_among_the_evidence_of_those_who_ask_why() {
+    let options = Options {
+        why: vec!["/throttle".to_owned(), "/image".to_owned()],
+        ..Options::default()
+    };
+    let (_, pieces) = concluded(&throttled(), options);
+    let texts: Vec<_> = pieces.iter().map(|p| (p.source, p.text.as_str())).collect();
+    assert_eq!(
+        texts,
+        [(
+            "payload",
+            "30 of 30 different messages of /image_slow are byte by byte those of /image just before"
+        )]
+    );
+}
+
+/// A robot of two nodes, with what the user tells of it besides.
+fn told(entries: Vec<Entry>, windows: &[(i64, i64)]) -> Built {
+    let mut bag = Recording::default();
+    let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
+    bag.send(scan, (0, 10_001), 100, &[1; 8]);
+    let mut collected = collected(&bag, Options::default());
+    let second = |s: i64| collected.span.unwrap().start.plus(s * SECOND);
+    let windows: Vec<Span> = windows
+        .iter()
+        .map(|(from, to)| Span {
+            start: second(*from),
+            end: second(*to),
+        })
+        .collect();
+    let topology = Topology {
+        entries,
+        notices: Vec::new(),
+    };
+    let options = graph::Options {
+        topology,
+        ..graph::Options::default()
+    };
+    graph::build(&mut collected, &windows, &options).unwrap()
+}
+
+fn entry(element: Element, to_s: Option<i64>) -> Entry {
+    Entry {
+        element,
+        from_ns: to_s.map(|_| 0),
+        to_ns: to_s.map(|s| s * SECOND),
+        declared: false,
+        place: "robot.csv line 2".to_owned(),
+    }
+}
+
+#[test]
+fn the_end_that_the_user_gives_is_exclusive() {
+    let node = || Element::Node("/slam".to_owned());
+    let there = |end| {
+        let built = told(vec![entry(node(), Some(end))], &[(0, 5), (5, 10)]);
+        let nodes = built.graphs.iter().map(|g| g.nodes.len());
+        nodes.collect::<Vec<_>>()
+    };
+    // With the node `/rosout`, which every mission of ROS 1 has.
+    assert_eq!(there(5), [3, 2]);
+    assert_eq!(there(6), [3, 3]);
+}
+
+#[test]
+fn names_of_the_users_that_the_bag_does_not_know_are_told_with_the_nearest() {
+    let entries = vec![
+        entry(
+            Element::Subscribe("/slam".to_owned(), "/scna".to_owned()),
+            None,
+        ),
+        entry(Element::Node("/lidra".to_owned()), None),
+        entry(
+            Element::Subscribe("/viewer".to_owned(), "/scan".to_owned()),
+            None,
+        ),
+    ];
+    let built = told(entries, &[(0, 10)]);
+    let notices: Vec<_> = built.notices.iter().map(|n| n.text).collect();
+    assert_eq!(
+        notices,
+        [
+            "robot.csv line 2: no node of the bag is called `/lidra`; the nearest name is `/lidar`",
+            "robot.csv line 2: no topic of the bag is called `/scna`; the nearest name is `/scan`"
+        ]
+    );
+}
+
+#[test]
+fn what_the_user_states_and_headers_say_is_among_the_evidence() {
+    let mut bag = Recording::default();
+    let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
+    bag.send(scan, (0, 1000), 100, &[1; 8]);
+    let options = Options {
+        why: vec!["/scan".to_owned()],
+        ..Options::default()
+    };
+    let mut collected = collected(&bag, options);
+    let whole = collected.span.unwrap();
+    let topology = Topology {
+        entries: vec![entry(
+            Element::Subscribe("/slam".to_owned(), "/scan".to_owned()),
+            None,
+        )],
+        notices: Vec::new(),
+    };
+    let options = graph::Options {
+        topology,
+        ..graph::Options::default()
+    };
+    graph::build(&mut collected, &[whole], &options).unwrap();
+    let sources: BTreeSet<_> = collected
+        .why()
+        .into_iter()
+        .map(|piece| piece.source)
+        .collect();
+    assert_eq!(sources, ["connection", "topology"].into());
+}

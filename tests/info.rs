@@ -1,0 +1,104 @@
+//! What `info` tells of a recording, and what it advises.
+
+use std::path::Path;
+
+use bagreel::bag::Input;
+use bagreel::mission::info::{Info, info};
+use bagreel::pipeline::{Reading, Unwatched, explain, read};
+
+use crate::support::cdr::Cdr;
+use crate::support::{ORIGIN, Recording, mcap};
+
+fn example(name: &str) -> Vec<Input> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples")
+        .join(name);
+    vec![Input::Path(path)]
+}
+
+fn told(inputs: Vec<Input>) -> Info {
+    let reading = Reading {
+        inputs,
+        ..Reading::default()
+    };
+    info(&read(&reading, &mut Unwatched).unwrap())
+}
+
+/// A recording of ROS 2 by a recorder that logs, as a file in a folder of its own.
+fn recorded() -> (tempfile::TempDir, Vec<Input>) {
+    let mut bag = Recording::default();
+    let log = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
+    let scan = bag.publisher("", "/scan", "sensor_msgs/msg/LaserScan");
+    let file = "./src/rosbag2_transport/recorder.cpp";
+    let text = "Subscribed to topic '/scan'";
+    let record = Cdr::default().time(1).u8(20).text("my_recorder").text(text);
+    let record = record.text(file).text("f").u32(7).done();
+    bag.messages.push((log, ORIGIN, record));
+    bag.messages
+        .push((scan, ORIGIN + 1_000_000_000, vec![0, 1, 0, 0, 9]));
+    let options = mcap::Options {
+        profile: "ros2",
+        ..mcap::Options::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    std::fs::write(&path, mcap::write(&bag, &options)).unwrap();
+    (folder, vec![Input::Path(path)])
+}
+
+#[test]
+fn the_recorder_is_no_subscriber_and_withholds_no_advice() {
+    let (_folder, inputs) = recorded();
+    let info = told(inputs);
+    assert_eq!(info.subscribes_by_degree.total(), 0);
+    assert!(info.topics.iter().all(|t| t.subscribers.is_empty()));
+    assert_eq!(info.topics_without_subscriber, 2);
+    let recorder = info
+        .evidence
+        .iter()
+        .find(|e| e.source == "recorder")
+        .unwrap();
+    assert_eq!((recorder.nodes, recorder.subscribes), (1, 0));
+    assert!(
+        info.advice.iter().any(|line| line.contains("`/rosgraph`")),
+        "{:?}",
+        info.advice
+    );
+}
+
+#[test]
+fn advice_on_ros2_says_what_is_missing_what_files_add_and_what_would_have_told_all() {
+    let info = told(example("courier.mcap"));
+    let missing = format!(
+        "{} without a known publisher, {} without a known subscriber",
+        info.topics_without_publisher, info.topics_without_subscriber
+    );
+    assert!(info.topics_without_publisher > 0);
+    assert!(info.advice[0].ends_with(&missing), "{:?}", info.advice);
+    assert!(
+        info.advice
+            .iter()
+            .any(|line| line.starts_with("`--topology FILE`"))
+    );
+    let last = info.advice.last().unwrap();
+    assert!(last.contains("rosgraph_monitor_node") && last.contains("ros2 bag record --all"));
+}
+
+#[test]
+fn the_evidence_of_an_edge_includes_what_was_concluded() {
+    let mut reading = Reading {
+        inputs: example("warehouse.bag"),
+        ..Reading::default()
+    };
+    let mut why = |names: [&str; 2]| {
+        reading.collect.why = names.map(str::to_owned).to_vec();
+        let (_, pieces) = explain(&reading, &mut Unwatched).unwrap();
+        pieces
+            .into_iter()
+            .map(|piece| piece.source)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(why(["/robot1/scan_throttle", "/robot1/scan"]), ["payload"]);
+    assert!(why(["/robot1/amcl", "/tf"]).contains(&"connection"));
+    assert!(why(["/robot1/amcl", "/tf"]).contains(&"tf_pair"));
+}
