@@ -142,6 +142,20 @@ fn text(
     Ok(())
 }
 
+/// A small table of texts as text: the names of the columns, then a row a line.
+pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = WriterBuilder::new()
+        .terminator(Terminator::Any(b'\n'))
+        .from_writer(Vec::new());
+    // Writing to memory cannot fail, and rows are as long as the head.
+    let _ = writer.write_record(columns);
+    for row in rows {
+        let _ = writer.write_record(row.iter().map(|text| cell(text, false).into_owned()));
+    }
+    let bytes = writer.into_inner().unwrap_or_default();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
 /// A text as it may stand in a cell: control characters are shown, not obeyed, unless it is a message's own `data`, and
 /// what a spreadsheet would take for a formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none of
 /// these signs.
