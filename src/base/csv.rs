@@ -1,10 +1,12 @@
 //! Tables as comma-separated values (RFC 4180).
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
 use super::table::{Batch, Column, Kind, Texts, Values, span};
+use super::words::visible;
 
 /// A table being written: the names of its columns, then a row a line. A list is written as JSON, with `NaN` and
 /// `Infinity` as Python's and JavaScript's readers take them; what is unknown is empty.
@@ -82,7 +84,8 @@ fn value(column: &Column, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Res
         Values::F64(v) if v[at].is_finite() => number(v[at], to),
         Values::F64(v) => odd(v[at], in_list, to),
         Values::Texts(v) if column.kind == Kind::Bytes => bytes(v.get(at), to),
-        Values::Texts(v) => text(v, at, in_list, to),
+        // Columns in which nothing is unknown are a message's fields.
+        Values::Texts(v) => text(v, at, in_list, column.valid.is_none(), to),
     }
 }
 
@@ -115,9 +118,16 @@ fn bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
     write!(to, "{}", if bytes.is_empty() { "[]" } else { "]" })
 }
 
-fn text(texts: &Texts, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
+fn text(
+    texts: &Texts,
+    at: usize,
+    in_list: bool,
+    is_data: bool,
+    to: &mut Vec<u8>,
+) -> io::Result<()> {
     if !in_list {
-        to.extend_from_slice(texts.get(at));
+        let text = String::from_utf8_lossy(texts.get(at));
+        to.extend_from_slice(cell(&text, is_data).as_bytes());
         return Ok(());
     }
     to.push(b'"');
@@ -132,7 +142,7 @@ fn text(texts: &Texts, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result
     Ok(())
 }
 
-/// A small table as text: the names of its columns, then a row a line.
+/// A small table of texts as text: the names of the columns, then a row a line.
 pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = WriterBuilder::new()
         .terminator(Terminator::Any(b'\n'))
@@ -140,10 +150,24 @@ pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>
     // Writing to memory cannot fail, and rows are as long as the head.
     let _ = writer.write_record(columns);
     for row in rows {
-        let _ = writer.write_record(row);
+        let _ = writer.write_record(row.iter().map(|text| cell(text, false).into_owned()));
     }
     let bytes = writer.into_inner().unwrap_or_default();
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// A text as it may stand in a cell: control characters are shown, not obeyed, unless it is a message's own `data`, and
+/// what a spreadsheet would take for a formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none of
+/// these signs.
+pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
+    let is_formula =
+        text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    let shown = if is_data { text.into() } else { visible(text) };
+    if is_formula {
+        format!("'{shown}").into()
+    } else {
+        shown
+    }
 }
 
 /// A row with its line, 1...
@@ -175,6 +199,22 @@ pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
 mod tests {
     use super::*;
     use crate::base::table::Cell;
+
+    #[test]
+    fn no_cell_is_a_formula() {
+        for (text, shown) in [
+            ("=cmd|'/c calc'!A1", "'=cmd|'/c calc'!A1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("\t=1", "'\\u{9}=1"),
+            ("-5.5", "-5.5"),
+            ("-5+cmd", "'-5+cmd"),
+            ("/a\u{1b}[2J\n::error::", "/a\\u{1b}[2J\\u{a}::error::"),
+            ("/größe", "/größe"),
+        ] {
+            assert_eq!(cell(text, false), shown);
+        }
+        assert_eq!(cell("two\nlines", true), "two\nlines");
+    }
 
     #[test]
     fn cells_are_quoted_where_they_must_be() {

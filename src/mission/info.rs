@@ -18,7 +18,6 @@ use crate::base::words::visible_json;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, NodeId};
 use crate::mission::Mission;
-use crate::mission::activity::records;
 
 /// All that `bagreel info` tells of one mission. Written as JSON with these names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
