@@ -38,11 +38,11 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["build", "diff", "sending", "window"]]),
     ("mission", &[&["activity", "ledger"], &["events", "json", "phases"], &["info"]]),
     ("view", &[
-        &["cluster", "collapse", "filter", "names", "runs", "union"],
+        &["cluster", "collapse", "counts", "filter", "lives", "names", "runs", "settle", "union"],
         &["options"],
         &["group", "select"],
         &["items"],
-        &["caption", "counts", "hidden", "marks", "state"],
+        &["caption", "hidden", "marks", "state"],
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
