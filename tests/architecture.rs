@@ -71,6 +71,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "evidence/source/qos",
             "evidence/topology",
             "export/html",
+            "mission/events",
             "mission/info",
             "mission/json",
         ],
