@@ -24,4 +24,5 @@ mod properties;
 mod reading;
 mod ros2_example;
 mod support;
+mod telling;
 mod warehouse;
