@@ -136,6 +136,7 @@ fn the_index_behind_a_chunk_answers_for_what_the_chunk_has_lost() {
     let mut chunks = bytes.windows(4).enumerate().filter(|(_, w)| w == b"zstd");
     let chunk = chunks.nth(1).unwrap().0;
     let mut lost = 0;
+    let (_, whole) = read_bytes("x.mcap", &bytes);
     let body = chunk + 12;
     let len = u64::from_le_bytes(bytes[chunk + 4..body].try_into().unwrap());
     let end = body + usize::try_from(len).unwrap();
@@ -144,7 +145,12 @@ fn the_index_behind_a_chunk_answers_for_what_the_chunk_has_lost() {
         bytes[at] ^= 0x10;
         let (report, kept) = read_bytes("x.mcap", &bytes);
         assert_eq!(kept.stamps.len(), truth, "byte {at}: {:?}", kept.notices);
-        assert!(!report.complete, "byte {at}: a wrong checksum and no word");
+        // Some bits of a Zstandard frame mean nothing.
+        let harmless = kept.payloads() == whole.payloads();
+        assert!(
+            harmless || !report.complete,
+            "byte {at}: a wrong checksum and no word"
+        );
         lost += usize::from(kept.messages.len() < truth);
     }
     assert!(
