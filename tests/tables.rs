@@ -239,21 +239,19 @@ fn a_survey_loses_no_recording() {
 #[test]
 fn a_recorder_is_no_subscriber() {
     let dir = tempfile::tempdir().unwrap();
-    let nodes = "Name,Publish,Subscribe\n/record_12345,[],['/scan']\n/mapper,[],['/scan']\n";
-    fs::write(dir.path().join("nodes.csv"), nodes).unwrap();
-    let args = [
-        "info",
-        COURIER,
-        "--topology",
-        "nodes.csv",
-        "--format",
-        "json",
-    ];
-    let output = bagreel(dir.path(), &args);
-    let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let degrees = info["subscribes_by_degree"].as_object().unwrap();
-    let counted: u64 = degrees.values().map(|n| n.as_u64().unwrap()).sum();
-    assert_eq!(counted, 1);
+    let counted = |nodes: &str| -> u64 {
+        let text = format!("Name,Publish,Subscribe\n{nodes}");
+        fs::write(dir.path().join("nodes.csv"), text).unwrap();
+        let topology = ["--topology", "nodes.csv", "--format", "json"];
+        let output = bagreel(dir.path(), &[&["info", COURIER][..], &topology].concat());
+        let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let degrees = info["subscribes_by_degree"].as_object().unwrap();
+        degrees.values().map(|n| n.as_u64().unwrap()).sum()
+    };
+    let recorder = counted("/record_12345,[],['/scan']\n");
+    let both = counted("/record_12345,[],['/scan']\n/listens,[],['/scan']\n");
+    assert_eq!(both, recorder + 1);
+    assert_eq!(recorder, counted("/record_12345,[],[]\n"));
 }
 
 #[test]
