@@ -103,6 +103,7 @@ impl Mission {
                 .collect();
             window.changes = changes.next(window.span, &window.graph, &inside);
         }
+        self.ledger = Ledger::from_changes(&self.elements, &self.windows);
     }
 
     /// Nanoseconds from the mission's start to `at`.

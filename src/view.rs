@@ -10,21 +10,25 @@ mod frames;
 mod group;
 mod hidden;
 mod items;
+mod lives;
 mod marks;
 mod names;
 mod options;
 pub mod runs;
 mod select;
+mod settle;
 mod state;
 pub mod union;
 
 use std::sync::Arc;
 
 use crate::base::notice::Notices;
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
+use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::{Element, State};
 use crate::mission::Mission;
+use crate::mission::ledger::{EntryId, Kind};
 
 pub use collapse::Candidate;
 pub use filter::NameFilter;
@@ -136,21 +140,23 @@ pub struct Arrow {
     pub members: Vec<Element>,
 }
 
-/// What happened to an item or arrow since the window before.
+/// What happened to an item or arrow in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Mark {
-    /// It was not there.
+    /// It began.
     Added,
-    /// It is gone: listed in this one window as a ghost.
+    /// It ended: listed in this one window as a ghost.
     Removed,
-    /// Its rate rose by more than the threshold.
+    /// Its rate rose.
     Faster,
-    /// Its rate fell by more than the threshold.
+    /// Its rate fell.
     Slower,
-    /// A topic whose publishers were replaced by others.
+    /// A topic whose messages come from other senders.
     HandedOver,
-    /// A node that began anew under the same name.
+    /// A node that ended and came back.
     Restarted,
+    /// It paused.
+    Paused,
     /// Its lifecycle state, type or quality of service changed.
     Changed,
     /// Something inside a group or a collapsed namespace was added, removed or changed.
@@ -179,35 +185,105 @@ pub struct Shown {
     pub degree: Degree,
     /// What happened to it.
     pub mark: Option<Mark>,
-    /// Messages per second, if known (0 for a ghost).
+    /// Messages per second in the window, if known (0 for a ghost).
     pub hz: Option<f64>,
-    /// Messages per second in the window before, where `mark` is `Faster` or `Slower`.
-    pub from_hz: Option<f64>,
+    /// Messages per second from one change of its rate to the next, which this window lies between.
+    pub steady_hz: Option<f64>,
+    /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
+    pub rates: Option<(f64, f64)>,
+    /// Whether it is silent or away all through the window, with a beginning and an end in the ledger.
+    pub is_paused: bool,
+    /// The headlines that `mark` tells, sorted: places in the ledger.
+    pub entries: Vec<EntryId>,
+    /// What happened inside a folded namespace.
+    pub inside: Option<Box<Counts>>,
     /// Messages in the window, if known.
     pub count: Option<u64>,
     /// The lifecycle state of a node, if it has one.
     pub lifecycle: Option<Arc<str>>,
 }
 
-/// How many changes of each kind a window shows, for chips and captions; they count the viewed graph.
+impl Shown {
+    /// An element of which nothing more is known.
+    pub fn plain(id: u32, state: State, degree: Degree) -> Self {
+        Self {
+            id,
+            state,
+            degree,
+            mark: None,
+            hz: None,
+            steady_hz: None,
+            rates: None,
+            is_paused: false,
+            entries: Vec::new(),
+            inside: None,
+            count: None,
+            lifecycle: None,
+        }
+    }
+}
+
+/// How many headlines of each kind a window tells, for chips and captions. They count the whole graph, whatever is
+/// drawn as one box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Nodes that appeared.
+    /// Nodes that started.
     pub nodes_added: usize,
-    /// Nodes that vanished.
+    /// Nodes that stopped.
     pub nodes_removed: usize,
-    /// Topics that appeared.
+    /// Topics of unknown publisher that appeared.
     pub topics_added: usize,
-    /// Topics that vanished.
+    /// Topics of unknown publisher that vanished.
     pub topics_removed: usize,
-    /// Edges that appeared between items that were there before.
+    /// Connections that living nodes made.
     pub edges_added: usize,
-    /// Edges that vanished between items that are still there.
+    /// Connections that living nodes gave up.
     pub edges_removed: usize,
-    /// Topics whose rate changed.
+    /// Nodes that ended and came back.
+    pub restarted: usize,
+    /// Nodes and topics that paused.
+    pub silent: usize,
+    /// Topics with other senders.
+    pub handed_over: usize,
+    /// Rates that changed.
     pub rates: usize,
-    /// Hand-overs, restarts, lifecycle and other changes.
-    pub others: usize,
+    /// Lifecycle states, types and qualities of service that changed.
+    pub values: usize,
+}
+
+/// A headline of the ledger, as a window tells it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Headline {
+    /// Its place in the ledger.
+    pub entry: EntryId,
+    /// What kind of thing happened.
+    pub kind: Kind,
+    /// To whom or what.
+    pub what: Element,
+    /// When.
+    pub time: Stamp,
+}
+
+/// A few words of a caption, and for how many headlines they stand.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Phrase {
+    /// The words: `/robot1/planner started`.
+    pub text: String,
+    /// How many headlines they tell, 1...
+    pub headlines: usize,
+}
+
+impl Headline {
+    /// The start of a node.
+    #[cfg(test)]
+    pub(crate) fn started() -> Self {
+        Self {
+            entry: 0,
+            kind: Kind::Started,
+            what: Element::Node(0),
+            time: Stamp(0),
+        }
+    }
 }
 
 /// One window of the picture.
@@ -225,10 +301,46 @@ pub struct Frame {
     pub items: Vec<Shown>,
     /// Arrows in the window, ghosts included, sorted by id.
     pub arrows: Vec<Shown>,
-    /// Changes counted.
-    pub tally: Counts,
-    /// What changed, in words, the most important first: `camera_driver appeared`; empty when nothing did.
-    pub caption: Vec<String>,
+    /// What happened in it, in the order of the ledger. Chips, caption, marks and timeline all tell this.
+    pub headlines: Vec<Headline>,
+    /// The headlines counted.
+    pub counts: Counts,
+    /// The headlines in words, the most important first.
+    pub caption: Vec<Phrase>,
+}
+
+impl Frame {
+    /// A window in which nothing is.
+    pub fn empty(index: usize, span: Span) -> Self {
+        Self {
+            index,
+            span,
+            partial: false,
+            messages: 0,
+            items: Vec::new(),
+            arrows: Vec::new(),
+            headlines: Vec::new(),
+            counts: Counts::default(),
+            caption: Vec::new(),
+        }
+    }
+
+    /// The caption in at most so many phrases, the rest counted: `a started; b stopped; and 3 more`.
+    pub fn words(&self, most: usize) -> String {
+        let mut parts: Vec<String> = self
+            .caption
+            .iter()
+            .take(most)
+            .map(|p| p.text.clone())
+            .collect();
+        let rest: usize = self.caption.iter().skip(most).map(|p| p.headlines).sum();
+        match rest {
+            0 => {}
+            n if parts.is_empty() => parts.push(words::count(n, "change")),
+            n => parts.push(format!("and {n} more")),
+        }
+        parts.join("; ")
+    }
 }
 
 /// The whole sequence as the picture shows it. Items are sorted by (kind, name), arrows by (from, to, kind),
@@ -248,10 +360,9 @@ pub struct View {
 impl View {
     /// Whether window `k` shows a change.
     pub fn is_changed(&self, k: usize) -> bool {
-        self.frames.get(k).is_some_and(|frame| {
-            let mut shown = frame.items.iter().chain(&frame.arrows);
-            shown.any(|s| s.mark.is_some()) || !frame.caption.is_empty()
-        })
+        self.frames
+            .get(k)
+            .is_some_and(|frame| !frame.headlines.is_empty())
     }
 
     /// The place of the window that shows most; the first of several.

@@ -16,9 +16,10 @@ use bagreel::draw::text::Fonts;
 use bagreel::export::run;
 use bagreel::export::sequence::{Drawings, Options, Sequence};
 use bagreel::export::{Output, Written};
-use bagreel::graph;
+use bagreel::graph::{self, Element};
 use bagreel::mission::Mission;
-use bagreel::view::{Counts, Frame, View};
+use bagreel::mission::ledger::Kind;
+use bagreel::view::{Counts, Frame, Headline, View};
 
 /// A disc that moves through every window, over discs in all colours.
 struct Discs;
@@ -78,11 +79,17 @@ fn mission(windows: usize) -> (Mission, View) {
         messages: 0,
         items: Vec::new(),
         arrows: Vec::new(),
-        tally: Counts::default(),
-        caption: (index % 2 == 1)
-            .then(|| "it moved".to_owned())
+        headlines: (index % 2 == 1)
+            .then_some(Headline {
+                entry: 0,
+                kind: Kind::Started,
+                what: Element::Node(0),
+                time: second(index),
+            })
             .into_iter()
             .collect(),
+        counts: Counts::default(),
+        caption: Vec::new(),
     };
     let frames = (0..windows).map(frame).collect();
     (

@@ -22,7 +22,7 @@ use self::measured::MeasuredGraph;
 use self::page::{Fit, Page};
 use self::timeline::Timeline;
 use self::title::Title;
-pub use self::union::{Part, Union, sign};
+pub use self::union::{Part, Union, rate_label, sign};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
@@ -233,7 +233,7 @@ impl<'a> Picture<'a> {
             self.len()
         );
         if !frame.caption.is_empty() {
-            scene.title = format!("{}: {}", scene.title, frame.caption.join("; "));
+            scene.title = format!("{}: {}", scene.title, frame.words(usize::MAX));
         }
         scene
     }
@@ -274,7 +274,7 @@ impl<'a> Picture<'a> {
         groups.push(self.title.chips(frame));
         groups.push(self.title.clock(frame));
         groups.push(self.title.caption(frame, phase));
-        groups.extend(self.timeline.head(k));
+        groups.extend(self.timeline.head(k, frame));
     }
 
     fn graph(&self, frame: &Frame, groups: &mut Vec<Group>) {

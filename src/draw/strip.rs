@@ -12,7 +12,7 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::layout::{self, Engine, Layout};
 use crate::mission::Mission;
-use crate::view::View;
+use crate::view::{Frame, View};
 pub use choice::Choice;
 
 /// The smallest text that can be read on paper, in points.
@@ -228,7 +228,7 @@ impl<'a> Source<'a> {
                 format!("{}–{}", time(frame.span.start), time(frame.span.end)),
                 Weight::SemiBold,
             ),
-            (self.caption(&frame.caption, page), Weight::Regular),
+            (self.caption(frame, page), Weight::Regular),
         ];
         for (row, (words, weight)) in (1_u8..).zip(lines) {
             let most = page.panel.w;
@@ -258,21 +258,14 @@ impl<'a> Source<'a> {
     }
 
     /// As many of the changes, the most important first, as fit under a panel; the first in any case.
-    fn caption(&self, changes: &[String], page: &Page) -> String {
-        let mut words = String::new();
-        for change in changes {
-            let longer = if words.is_empty() {
-                change.clone()
-            } else {
-                format!("{words}; {change}")
-            };
-            let width = self.fonts.width(&longer, page.caption, Weight::Regular);
-            if !words.is_empty() && width > page.panel.w {
-                break;
-            }
-            words = longer;
-        }
-        words
+    fn caption(&self, frame: &Frame, page: &Page) -> String {
+        let texts = (1..=frame.caption.len())
+            .rev()
+            .map(|keep| frame.words(keep));
+        let fits =
+            |text: &String| self.fonts.width(text, page.caption, Weight::Regular) <= page.panel.w;
+        let mut fitting = texts.filter(fits);
+        fitting.next().unwrap_or_else(|| frame.words(1))
     }
 
     /// The shared legend from `y` on; returns its height.
@@ -383,7 +376,7 @@ mod tests {
     use crate::evidence::Degree;
     use crate::graph::{Element, Elements, State};
     use crate::layout;
-    use crate::view::{Counts, Frame, Item, ItemKind, Mark, Shown};
+    use crate::view::{Counts, Headline, Item, ItemKind, Mark, Phrase, Shown};
 
     /// Four minutes in which a node is there and another comes and goes.
     fn two_nodes() -> (Mission, View) {
@@ -413,14 +406,8 @@ mod tests {
             cluster: None,
         };
         let shown = |id, mark| Shown {
-            id,
-            state: State::Active,
-            degree: Degree::Measured,
             mark,
-            hz: None,
-            from_hz: None,
-            count: None,
-            lifecycle: None,
+            ..Shown::plain(id, State::Active, Degree::Measured)
         };
         let frame = |(index, mark): (usize, Option<Mark>)| Frame {
             index,
@@ -434,9 +421,13 @@ mod tests {
                 .chain(mark.map(|m| shown(1, Some(m))))
                 .collect(),
             arrows: Vec::new(),
-            tally: Counts::default(),
+            headlines: mark.map(|_| Headline::started()).into_iter().collect(),
+            counts: Counts::default(),
             caption: mark
-                .map(|m| format!("/planner {}", m.class()))
+                .map(|m| Phrase {
+                    text: format!("/planner {}", m.class()),
+                    headlines: 1,
+                })
                 .into_iter()
                 .collect(),
         };

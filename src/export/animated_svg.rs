@@ -12,6 +12,7 @@ use crate::base::words::visible;
 use crate::draw::paint::classes::bars;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
 use crate::draw::paint::xml::escape;
+use crate::draw::picture::rate_label;
 use crate::export::sequence::{Sequence, Whole};
 use crate::export::target::Target;
 use crate::view::View;
@@ -22,6 +23,8 @@ const MANY: usize = 300;
 /// With more changed windows than this, what changed is not written in words.
 const MOST_CAPTIONS: usize = 24;
 /// The longest caption, in characters.
+/// So many phrases are written out at most; the rest is counted.
+const MOST_PHRASES: usize = 4;
 const LONGEST_CAPTION: usize = 110;
 /// Around the graph.
 const MARGIN: f64 = 12.0;
@@ -57,7 +60,7 @@ fn remark(view: &View) -> Option<String> {
 }
 
 fn animation(view: &View, whole: &Whole<'_>, frame_ms: u32) -> String {
-    let runs = Runs::of(view, words::rate);
+    let runs = Runs::of(view, rate_label);
     let play = Play {
         view,
         runs: &runs,
@@ -207,7 +210,7 @@ impl Play<'_> {
             .frames
             .iter()
             .zip(0_u32..)
-            .filter(|(f, _)| !f.caption.is_empty());
+            .filter(|(f, _)| !f.headlines.is_empty());
         if told.clone().count() > MOST_CAPTIONS {
             return;
         }
@@ -218,7 +221,7 @@ impl Play<'_> {
             if window == 0 {
                 steps.remove(0);
             }
-            let words: String = visible(&frame.caption.join("; "))
+            let words: String = visible(&frame.words(MOST_PHRASES))
                 .chars()
                 .take(LONGEST_CAPTION)
                 .collect();

@@ -11,7 +11,7 @@ use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
 use crate::draw::paint::xml::escape;
-use crate::draw::picture::Union;
+use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
 use crate::draw::text;
 use crate::mission::Mission;
@@ -42,7 +42,7 @@ pub struct Page<'a> {
 impl Page<'_> {
     /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
     pub fn write(&self) -> String {
-        let runs = Runs::of(self.view, words::rate);
+        let runs = Runs::of(self.view, rate_label);
         let still = self.view.busiest();
         let fonts = fonts();
         let look = self.look(&runs);

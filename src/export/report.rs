@@ -12,13 +12,15 @@ use crate::draw::style::{BUILTIN, Style};
 use crate::export::mermaid;
 use crate::export::sequence::Sequence;
 use crate::mission::Mission;
-use crate::view::{Counts, Frame, View};
+use crate::view::{Counts, View};
 use escape::{address, plain};
 
 /// The most bytes of each part; together they stay below 256 KiB, a quarter of what a job summary may hold.
 const MOST_CHANGES: usize = 96 << 10;
 const MOST_TABLE: usize = 40 << 10;
 const MOST_NOTICES: usize = 16 << 10;
+/// So many phrases are written out for one window; the rest is counted.
+const MOST_PHRASES: usize = 12;
 /// A chart of more characters than this is left out: GitHub's Mermaid stops at 50,000.
 const MOST_CHART: usize = 45_000;
 
@@ -71,41 +73,36 @@ fn headline(sequence: &Sequence<'_>, view: &View) -> String {
         words::count(view.frames.len(), "window"),
         words::period(first.span.nanos())
     );
-    let changed = view.frames.iter().filter(|f| !f.caption.is_empty()).count();
+    let changed = (0..view.frames.len())
+        .filter(|k| view.is_changed(*k))
+        .count();
     if changed == 0 {
         return out + "nothing changed.";
     }
-    let told = told(&total(&view.frames));
+    let told = told(
+        &view
+            .frames
+            .iter()
+            .fold(Counts::default(), |sum, f| sum + f.counts),
+    );
     let _ = write!(out, "changes in {changed}: {}.", told.join(", "));
     out
 }
 
-fn total(frames: &[Frame]) -> Counts {
-    frames.iter().fold(Counts::default(), |sum, frame| {
-        let one = &frame.tally;
-        Counts {
-            nodes_added: sum.nodes_added + one.nodes_added,
-            nodes_removed: sum.nodes_removed + one.nodes_removed,
-            topics_added: sum.topics_added + one.topics_added,
-            topics_removed: sum.topics_removed + one.topics_removed,
-            edges_added: sum.edges_added + one.edges_added,
-            edges_removed: sum.edges_removed + one.edges_removed,
-            rates: sum.rates + one.rates,
-            others: sum.others + one.others,
-        }
-    })
-}
-
-fn told(tally: &Counts) -> Vec<String> {
+/// What the headlines of all windows count, in words.
+fn told(counts: &Counts) -> Vec<String> {
     let all = [
-        (tally.nodes_added, "node", " appeared"),
-        (tally.nodes_removed, "node", " vanished"),
-        (tally.topics_added, "topic", " appeared"),
-        (tally.topics_removed, "topic", " vanished"),
-        (tally.edges_added, "connection", " made"),
-        (tally.edges_removed, "connection", " ended"),
-        (tally.rates, "rate", " changed"),
-        (tally.others, "other change", ""),
+        (counts.nodes_added, "node", " started"),
+        (counts.nodes_removed, "node", " stopped"),
+        (counts.restarted, "restart", ""),
+        (counts.handed_over, "hand-over", ""),
+        (counts.silent, "silence", ""),
+        (counts.topics_added, "topic", " appeared"),
+        (counts.topics_removed, "topic", " vanished"),
+        (counts.edges_added, "connection", " made"),
+        (counts.edges_removed, "connection", " ended"),
+        (counts.values, "state", " changed"),
+        (counts.rates, "rate", " changed"),
     ];
     let present = all.iter().filter(|(n, _, _)| *n > 0);
     present
@@ -115,10 +112,10 @@ fn told(tally: &Counts) -> Vec<String> {
 
 fn changes(view: &View) -> String {
     let start = view.frames.first().map(|f| f.span.start);
-    let frames = view.frames.iter().filter(|f| !f.caption.is_empty());
+    let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
     let rows = frames.map(|frame| {
         let at = start.map_or(0, |s| frame.span.start.since(s)) / 1_000_000 * 1_000_000;
-        let words = frame.caption.join("; ");
+        let words = frame.words(MOST_PHRASES);
         format!(
             "| {} | {} | {} |\n",
             words::offset(at),

@@ -2,11 +2,14 @@
 //!
 //! Windows only say when we look. Whatever tells a change (chips, captions, marks, tables, pages, the log) reads this.
 
+mod from_changes;
+
 use std::sync::Arc;
 
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
-use crate::graph::{Element, NodeId};
+use crate::graph::{Element, Elements, NodeId};
+use crate::mission::Window;
 
 /// An entry's place in [`Ledger::entries`].
 pub type EntryId = u32;
@@ -166,6 +169,11 @@ pub struct Phase {
 }
 
 impl Ledger {
+    /// What the changes from window to window say, where nothing finer is known.
+    pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Self {
+        from_changes::from_changes(elements, windows)
+    }
+
     /// Entries whose time lies in `span`, with their places, in order.
     pub fn inside(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
         let first = self.entries.partition_point(|e| e.time < span.start);

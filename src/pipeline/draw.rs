@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::{Stage, Watch};
 use crate::base::geometry::{Rect, Size};
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::words;
 use crate::draw::picture::{self, Measured, PageOptions};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
@@ -89,9 +90,12 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
         view,
         mut notices,
         layout,
-        ..
+        text,
     } = best;
-    notices.extend(told(&options.collapse[asked..], &drawing.page, &page));
+    if drawing.is_fitted {
+        let collapsed = &options.collapse[asked..];
+        notices.extend(told(collapsed, &drawing.page, &page, text).iter());
+    }
     notices.extend(picture::unshown(&view, &drawing.fonts));
     let remarks = layout.remarks.iter();
     notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
@@ -162,7 +166,7 @@ fn collapse(
     best: &mut Attempt,
 ) {
     while !best.is_readable() {
-        let candidates = outline(mission, options).collapsible(options);
+        let candidates = outline(mission, options).collapsible(mission, options);
         let fresh = candidates
             .into_iter()
             .map(|c| c.name)
@@ -208,26 +212,43 @@ fn open_again(
     }
 }
 
-/// What `--fit auto` did.
-fn told(collapsed: &[Arc<str>], asked: &PageOptions, got: &PageOptions) -> Vec<Notice> {
-    let mut notices = Vec::new();
+/// What `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
+fn told(collapsed: &[Arc<str>], asked: &PageOptions, got: &PageOptions, text: f64) -> Notices {
+    let mut notices = Notices::new();
+    let is_readable = text >= READABLE;
     if asked.size != got.size {
         let text = format!(
-            "the page is {}x{} so that the text can be read; `--size` takes another",
-            got.size.w, got.size.h
+            "the page is {}x{}{}; `--size` takes another",
+            got.size.w,
+            got.size.h,
+            so_that(is_readable)
         );
-        notices.push(Notice::new(NoticeKind::Chosen, text));
+        notices.add(Notice::new(NoticeKind::Chosen, text));
     }
-    if !collapsed.is_empty() {
-        let names: Vec<&str> = collapsed.iter().map(AsRef::as_ref).collect();
+    if let Some(first) = collapsed.first() {
         let text = format!(
-            "drawn as one box each so that the text can be read: {}; `--expand {}` opens one, `--fit none` all",
-            names.join(", "),
-            names[0]
+            "drawn as one box each{}: {}; `--expand {first}` opens one, `--fit none` all",
+            so_that(is_readable),
+            words::some_of(collapsed, 3)
         );
-        notices.push(Notice::new(NoticeKind::Hidden, text));
+        notices.add(Notice::new(NoticeKind::Hidden, text));
+    }
+    if !is_readable {
+        let text = format!(
+            "the smallest text is {} pixels high, too small to be read; `--ns-filter`, `--hide dead,leaf`, `--mode nodes` or a larger `--size` help",
+            words::number(text)
+        );
+        notices.add(Notice::new(NoticeKind::Note, text));
     }
     notices
+}
+
+fn so_that(is_readable: bool) -> &'static str {
+    if is_readable {
+        " so that the text can be read"
+    } else {
+        ""
+    }
 }
 
 /// Where an earlier drawing had each item; `None` for those that are new.

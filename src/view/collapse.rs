@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use super::{ItemKind, View, ViewOptions};
 use crate::base::name::namespace;
+use crate::graph::Element;
+use crate::mission::Mission;
 
 /// The namespaces to collapse and those to keep open.
 pub(crate) struct Collapse<'a> {
@@ -65,13 +67,38 @@ pub struct Candidate {
     pub name: Arc<str>,
     /// How many boxes it holds now.
     pub items: usize,
+    /// How many headlines tell of what is in it.
+    pub headlines: usize,
+}
+
+/// How many headlines tell of each name: of a node, of a topic, of an edge by its topic.
+pub(crate) fn news(mission: &Mission) -> BTreeMap<&str, usize> {
+    let (elements, mut news) = (&mission.elements, BTreeMap::new());
+    let topic = |id: u32| elements.topics.get(id as usize).map(|t| t.name.as_str());
+    for entry in mission.ledger.entries.iter().filter(|e| e.is_headline()) {
+        let name = match entry.what {
+            Element::Node(id) => elements.nodes.get(id as usize).map(|n| n.name.as_str()),
+            Element::Topic(id) => topic(id),
+            Element::Publish(id) => elements
+                .publishes
+                .get(id as usize)
+                .and_then(|e| topic(e.topic)),
+            Element::Subscribe(id) => elements
+                .subscribes
+                .get(id as usize)
+                .and_then(|e| topic(e.topic)),
+        };
+        *news.entry(name.unwrap_or_default()).or_default() += 1;
+    }
+    news
 }
 
 impl View {
-    /// The namespaces that could be collapsed, the one to collapse first at the front: innermost ones before those
-    /// around them, the largest first, then by name. Those that hold fewer than two boxes, or that `options` keeps
-    /// open, are left out.
-    pub fn collapsible(&self, options: &ViewOptions) -> Vec<Candidate> {
+    /// The namespaces that could be collapsed, the one to collapse first at the front: those in which least changes for
+    /// each box that they hold, then innermost ones before those around them, the largest first, then by name. Those
+    /// that hold fewer than two boxes, or that `options` keeps open, are left out.
+    pub fn collapsible(&self, mission: &Mission, options: &ViewOptions) -> Vec<Candidate> {
+        let news = news(mission);
         let open = Collapse::new(options).expand;
         let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
         for item in &self.items {
@@ -94,13 +121,24 @@ impl View {
         let mut all: Vec<(bool, Candidate)> = sizes
             .iter()
             .map(|(space, size)| {
-                let name = Arc::from(*space);
-                (!inner(space), Candidate { name, items: *size })
+                let below = format!("{space}/");
+                let inside = news.range(below.as_str()..);
+                let inside = inside.take_while(|(name, _)| name.starts_with(&below));
+                let own = news.get(space).copied().unwrap_or_default();
+                let candidate = Candidate {
+                    name: Arc::from(*space),
+                    items: *size,
+                    headlines: own + inside.map(|(_, n)| n).sum::<usize>(),
+                };
+                (!inner(space), candidate)
             })
             .collect();
         all.sort_by(|a, b| {
             let key = |c: &(bool, Candidate)| (c.0, usize::MAX - c.1.items);
-            key(a).cmp(&key(b)).then_with(|| a.1.name.cmp(&b.1.name))
+            // Headlines per box, without dividing.
+            let (here, there) = (a.1.headlines * b.1.items, b.1.headlines * a.1.items);
+            let by_key = here.cmp(&there).then(key(a).cmp(&key(b)));
+            by_key.then_with(|| a.1.name.cmp(&b.1.name))
         });
         all.into_iter().map(|(_, candidate)| candidate).collect()
     }
@@ -144,7 +182,7 @@ mod tests {
     fn innermost_namespaces_are_collapsed_first_and_the_largest_of_them() {
         let mission = mission(&["/a/b/x>/a/b/t /a/y /a/c/x>/a/c/t /a/c/u>/t /d/x /e>/e/t"]);
         let candidates = |options: &ViewOptions| -> Vec<String> {
-            let all = outline(&mission, options).collapsible(options);
+            let all = outline(&mission, options).collapsible(&mission, options);
             all.iter()
                 .map(|c| format!("{} {}", c.name, c.items))
                 .collect()
@@ -154,5 +192,14 @@ mod tests {
             ["/a/c 3", "/a/b 2", "/e 2", "/a 6"]
         );
         assert_eq!(candidates(&options(&["/a/c"], &["/e"])), ["/a/b 2", "/a 4"]);
+    }
+
+    #[test]
+    fn what_changes_least_is_collapsed_first() {
+        let mission = mission(&["/a/x>/a/t /b/y>/b/u /b/z", "/a/x>/a/t /b/z"]);
+        let options = options(&[], &[]);
+        let all = outline(&mission, &options).collapsible(&mission, &options);
+        let names: Vec<&str> = all.iter().map(|c| &*c.name).collect();
+        assert_eq!(names, ["/a", "/b"]);
     }
 }

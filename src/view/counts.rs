@@ -1,42 +1,73 @@
-//! How many changes of each kind a window shows.
+//! How many headlines of each kind a window tells.
 
-use super::items::Viewed;
-use super::{Counts, Mark, Shown};
+use super::{Counts, Headline};
+use crate::graph::Element;
+use crate::mission::ledger::Kind;
 
-/// Counts the marks of one window's items and arrows. Edges count where both their ends stayed: one that comes or
-/// goes with its node or topic is told by that.
-pub(crate) fn tally(viewed: &Viewed, items: &[Shown], arrows: &[Shown]) -> Counts {
-    let mut tally = Counts::default();
-    let mut stayed = vec![false; viewed.items.len()];
-    for shown in items {
-        let Some(item) = viewed.items.get(shown.id as usize) else {
-            continue;
-        };
-        let is_node = item.kind.word() == "node";
-        match shown.mark {
-            Some(Mark::Added) if is_node => tally.nodes_added += 1,
-            Some(Mark::Removed) if is_node => tally.nodes_removed += 1,
-            Some(Mark::Added) => tally.topics_added += 1,
-            Some(Mark::Removed) => tally.topics_removed += 1,
-            Some(Mark::Faster | Mark::Slower) => tally.rates += 1,
-            Some(_) => tally.others += 1,
-            None => {}
+impl Counts {
+    /// Counts headlines.
+    pub(crate) fn of<'a>(headlines: impl IntoIterator<Item = &'a Headline>) -> Self {
+        let mut counts = Self::default();
+        for headline in headlines {
+            *counts.slot(headline.kind, headline.what) += 1;
         }
-        stayed[shown.id as usize] = !matches!(shown.mark, Some(Mark::Added | Mark::Removed));
+        counts
     }
-    for shown in arrows {
-        let Some(arrow) = viewed.arrows.get(shown.id as usize) else {
-            continue;
-        };
-        let at = |id: u32| stayed.get(id as usize) == Some(&true);
-        let stayed = at(arrow.from) && at(arrow.to);
-        match shown.mark {
-            Some(Mark::Added) if stayed => tally.edges_added += 1,
-            Some(Mark::Removed) if stayed => tally.edges_removed += 1,
-            // Between nodes there is no topic to show the change.
-            Some(Mark::Faster | Mark::Slower) if !viewed.pairs.is_empty() => tally.rates += 1,
-            _ => {}
+
+    fn slot(&mut self, kind: Kind, what: Element) -> &mut usize {
+        let is_topic = matches!(what, Element::Topic(_));
+        match kind {
+            Kind::Started => &mut self.nodes_added,
+            Kind::Stopped => &mut self.nodes_removed,
+            Kind::Restarted => &mut self.restarted,
+            Kind::Silent => &mut self.silent,
+            Kind::Appeared if is_topic => &mut self.topics_added,
+            Kind::Appeared => &mut self.edges_added,
+            Kind::Vanished if is_topic => &mut self.topics_removed,
+            Kind::Vanished => &mut self.edges_removed,
+            Kind::HandedOver => &mut self.handed_over,
+            Kind::Rate => &mut self.rates,
+            Kind::Lifecycle | Kind::Type | Kind::Qos => &mut self.values,
         }
     }
-    tally
+
+    /// All of them together.
+    pub fn total(&self) -> usize {
+        self.came() + self.went() + self.changed()
+    }
+
+    /// What began.
+    pub fn came(&self) -> usize {
+        self.nodes_added + self.topics_added + self.edges_added
+    }
+
+    /// What ended.
+    pub fn went(&self) -> usize {
+        self.nodes_removed + self.topics_removed + self.edges_removed
+    }
+
+    /// What changed without coming or going.
+    pub fn changed(&self) -> usize {
+        self.restarted + self.silent + self.handed_over + self.rates + self.values
+    }
+}
+
+impl std::ops::Add for Counts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            nodes_added: self.nodes_added + other.nodes_added,
+            nodes_removed: self.nodes_removed + other.nodes_removed,
+            topics_added: self.topics_added + other.topics_added,
+            topics_removed: self.topics_removed + other.topics_removed,
+            edges_added: self.edges_added + other.edges_added,
+            edges_removed: self.edges_removed + other.edges_removed,
+            restarted: self.restarted + other.restarted,
+            silent: self.silent + other.silent,
+            handed_over: self.handed_over + other.handed_over,
+            rates: self.rates + other.rates,
+            values: self.values + other.values,
+        }
+    }
 }

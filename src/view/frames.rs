@@ -1,93 +1,140 @@
-//! The windows one after the other, each with what is new in it since the one before.
-
-use std::collections::BTreeMap;
+//! The windows one after the other, each with what the ledger tells in it.
 
 use super::caption::Speaker;
-use super::counts::tally;
 use super::items::Viewed;
-use super::marks::{MarkedRate, News, alone};
-use super::state::{States, present};
-use super::{Frame, Mark, Shown, ViewOptions};
-use crate::base::words;
-use crate::graph::diff::RATE_CHANGE;
+use super::lives::Lives;
+use super::marks::{News, Told};
+use super::settle::settle;
+use super::state::{Presence, States, present};
+use super::{Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
 use crate::mission::Mission;
 
 /// The windows one after the other.
 pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Vec<Frame> {
-    let speaker = Speaker::new(&mission.elements, viewed);
-    let mut before: Option<(States, States)> = None;
+    let speaker = Speaker::new(mission, viewed);
+    let lives = Lives::new(mission);
     let mut frames = Vec::with_capacity(mission.windows.len());
     for window in &mission.windows {
-        let now = present(&window.graph, options, viewed);
-        let alone = alone(&window.graph, &mission.elements);
-        let news = News::new(&window.changes, viewed, &alone);
-        let (items, arrows) = match &before {
-            None => (
-                now.0.iter().flatten().cloned().collect(),
-                now.1.iter().flatten().cloned().collect(),
-            ),
-            Some((items, arrows)) => (
-                marked(items, &now.0, &news.items),
-                marked(arrows, &now.1, &news.arrows),
-            ),
+        let span = window.span;
+        let alive = lives.during(span);
+        let paused = lives.paused(span, &alive);
+        let now = present(&window.graph, options, viewed, (&alive, &paused));
+        let turn = Turn {
+            before: Presence::of(viewed, &lives.before(span.start)),
+            after: Presence::of(viewed, &lives.before(span.end)),
+            news: News::new(&mission.ledger, span, viewed),
         };
-        before = Some(now);
-        let mut frame = Frame {
+        let items = turn.items(viewed, now.0);
+        let arrows = turn.arrows(viewed, now.1, &items);
+        frames.push(Frame {
             index: window.index,
-            span: window.span,
+            span,
             partial: window.partial,
             messages: window.messages,
-            tally: tally(viewed, &items, &arrows),
+            counts: Counts::of(&turn.news.headlines),
+            caption: speaker.caption(&turn.news.headlines),
+            headlines: turn.news.headlines,
             items,
             arrows,
-            caption: Vec::new(),
-        };
-        frame.caption = speaker.caption(&frame, &window.changes);
-        frames.push(frame);
+        });
     }
+    settle(&mut frames, viewed.items.len(), |frame| &mut frame.items);
+    settle(&mut frames, viewed.arrows.len(), |frame| &mut frame.arrows);
     frames
 }
 
-/// The window's items or arrows with their marks, and the ghosts of what was there in the window before.
-fn marked(before: &States, now: &States, news: &BTreeMap<u32, MarkedRate>) -> Vec<Shown> {
-    let one = |(before, now): (&Option<Shown>, &Option<Shown>)| match (before, now) {
-        (None, None) => None,
-        (None, Some(now)) => Some(Shown {
-            mark: Some(Mark::Added),
-            ..now.clone()
-        }),
-        (Some(before), None) => Some(Shown {
-            mark: Some(Mark::Removed),
-            hz: Some(0.0),
-            count: Some(0),
-            ..before.clone()
-        }),
-        (Some(before), Some(now)) => {
-            let told = match news.get(&now.id) {
-                Some((Mark::Faster | Mark::Slower, None)) => summed(before.hz, now.hz),
-                news => news.copied(),
-            };
-            Some(Shown {
-                mark: told.map(|(mark, _)| mark),
-                from_hz: told.and_then(|(_, from_hz)| from_hz),
-                ..now.clone()
-            })
-        }
-    };
-    before.iter().zip(now).filter_map(one).collect()
+/// What is there before and after a window, and what is told in between.
+struct Turn {
+    before: Presence,
+    after: Presence,
+    news: News,
 }
 
-/// Whether the rate of several together changed, when the rate of one of them did.
-fn summed(from: Option<f64>, to: Option<f64>) -> Option<MarkedRate> {
-    let (from, to) = (from?, to?);
-    let differs =
-        (to - from).abs() > RATE_CHANGE * from && words::number(from) != words::number(to);
-    let mark = if to > from {
-        Mark::Faster
-    } else {
-        Mark::Slower
+impl Turn {
+    fn items(&self, viewed: &Viewed, now: States) -> Vec<Shown> {
+        let mut items = Vec::new();
+        for shown in now.into_iter().flatten() {
+            let at = shown.id as usize;
+            let there = (self.before.items[at], self.after.items[at]);
+            let told = self.news.items.get(&shown.id);
+            if let Some(mut shown) = marked(shown, there, told) {
+                let is_folded = viewed.items[at].kind == ItemKind::Namespace;
+                shown.inside = is_folded.then(|| self.inside(&shown)).flatten();
+                items.push(shown);
+            }
+        }
+        items
+    }
+
+    /// An arrow comes and goes with its ends, if nothing is told of itself.
+    fn arrows(&self, viewed: &Viewed, now: States, items: &[Shown]) -> Vec<Shown> {
+        let end = |id: u32| {
+            let at = items.binary_search_by_key(&id, |s| s.id).ok()?;
+            items.get(at)
+        };
+        let mut arrows = Vec::new();
+        for shown in now.into_iter().flatten() {
+            let at = shown.id as usize;
+            let there = (self.before.arrows[at], self.after.arrows[at]);
+            let told = self.news.arrows.get(&shown.id).cloned();
+            let arrow = &viewed.arrows[at];
+            let (Some(from), Some(to)) = (end(arrow.from), end(arrow.to)) else {
+                continue;
+            };
+            let told = told.or_else(|| with_ends(there, [from, to]));
+            arrows.extend(marked(shown, there, told.as_ref()));
+        }
+        arrows
+    }
+
+    /// What the headlines that are told on a folded namespace count.
+    fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
+        let told = self.news.headlines.iter();
+        let counts = Counts::of(told.filter(|h| shown.entries.binary_search(&h.entry).is_ok()));
+        (counts.total() > 0).then(|| Box::new(counts))
+    }
+}
+
+/// What the ends of an arrow tell of it, which was there before, is there after, or both.
+fn with_ends(there: (bool, bool), ends: [&Shown; 2]) -> Option<Told> {
+    let mark = match there {
+        (false, true) => Mark::Added,
+        (_, false) => Mark::Removed,
+        (true, true) => return None,
     };
-    differs.then_some((mark, Some(from)))
+    let end = ends.into_iter().find(|end| end.mark == Some(mark))?;
+    Some(Told {
+        came: mark == Mark::Added,
+        went: mark == Mark::Removed,
+        entries: end.entries.clone(),
+        ..Told::default()
+    })
+}
+
+/// What is shown of something that was there before, is there after, or both; `None` for what went without a word.
+fn marked(shown: Shown, there: (bool, bool), told: Option<&Told>) -> Option<Shown> {
+    let Some(told) = told else {
+        return there.1.then_some(shown);
+    };
+    let mark = match there {
+        (false, true) if told.came => Some(Mark::Added),
+        (_, false) if told.went => Some(Mark::Removed),
+        // It ended and began within one window.
+        (true, true) if told.came && told.went => told.mark.or(Some(Mark::Restarted)),
+        // One of several that are drawn as one.
+        (true, true) if told.came || told.went => told.mark.or(Some(Mark::Inside)),
+        _ => told.mark,
+    };
+    let is_gone = mark == Some(Mark::Removed);
+    Some(Shown {
+        mark,
+        hz: if is_gone { Some(0.0) } else { shown.hz },
+        rates: told
+            .rates
+            .filter(|_| matches!(mark, Some(Mark::Faster | Mark::Slower))),
+        entries: told.entries.clone(),
+        ..shown
+    })
 }
 
 #[cfg(test)]
@@ -150,9 +197,9 @@ mod tests {
         assert_eq!(seen(&windows, &ViewOptions::default()), want);
         let (view, _) = view(&mission(&windows), &ViewOptions::default());
         let topic = &view.frames[2].items[2];
-        assert_eq!((topic.from_hz, topic.hz), (Some(20.0), Some(5.0)));
+        assert_eq!((topic.rates, topic.hz), (Some((20.0, 5.0)), Some(5.0)));
         assert_eq!(
-            (view.frames[2].tally.rates, view.frames[0].tally),
+            (view.frames[2].counts.rates, view.frames[0].counts),
             (1, crate::view::Counts::default())
         );
     }
@@ -177,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rate_of_a_group_is_that_of_its_sum() {
+    fn a_group_tells_the_rate_of_its_members() {
         let go = |feedback: u32| {
             let rest = ["goal", "cancel", "result"].map(|t| format!("/a>/go/{t}@0"));
             format!(
@@ -188,10 +235,10 @@ mod tests {
         let windows = [go(10), go(14), go(40)];
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let got = seen(&windows, &ViewOptions::default());
-        assert_eq!(got[1], "/a /go/action_topics /a>/go/action_topics");
+        assert_eq!(got[1], "/a ^/go/action_topics ^/a>/go/action_topics");
         assert_eq!(got[2], "/a ^/go/action_topics ^/a>/go/action_topics");
         let (view, _) = view(&mission(&windows), &ViewOptions::default());
-        assert_eq!(view.frames[2].caption, ["go action 24 → 50 Hz"]);
+        assert_eq!(view.frames[2].counts.rates, 1);
     }
 
     #[test]
@@ -218,7 +265,8 @@ mod tests {
         };
         let windows = ["/a>/t~ /b</t~ /c>/t", "/a>/t~ /b</t~"];
         assert_eq!(seen(&windows, &options)[0], "/a /b /c /t /c>/t /t>/b");
-        assert_eq!(seen(&windows, &options)[1], "/a /b -/c -/t -/c>/t -/t>/b");
+        // What falls silent goes without a sign: nothing in the ledger says that it ended.
+        assert_eq!(seen(&windows, &options)[1], "/a /b -/c");
     }
 
     #[test]

@@ -15,6 +15,8 @@ use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
 pub(crate) enum Place {
     /// Nowhere.
     Hidden,
+    /// It is this item, or part of it.
+    Item(u32),
     /// Into this arrow.
     Arrow(u32),
     /// Inside this item.
@@ -41,7 +43,7 @@ pub(crate) struct Viewed {
     pub(crate) published: Vec<(NodeId, TopicId)>,
     /// Node and topic of each subscription.
     pub(crate) subscribed: Vec<(NodeId, TopicId)>,
-    /// Per publication, and per topic with publications, the arrows that carry it from its node.
+    /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
     pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
     /// Arrows from node to node that were too many.
     pub(crate) dropped: usize,
@@ -236,16 +238,38 @@ impl Viewed {
     fn set_carriers(&mut self, elements: &Elements) {
         for (arrow, id) in self.arrows.iter().zip(0..) {
             for member in &arrow.members {
-                let Element::Publish(publish) = member else {
-                    continue;
+                self.carriers.entry(*member).or_default().push(id);
+                let edge = match member {
+                    Element::Publish(publish) => elements.publishes.get(*publish as usize),
+                    _ => None,
                 };
-                if let Some(edge) = elements.publishes.get(*publish as usize) {
+                if let Some(edge) = edge {
                     let topic = self.carriers.entry(Element::Topic(edge.topic)).or_default();
                     topic.push(id);
-                    self.carriers.entry(*member).or_default().push(id);
                 }
             }
         }
+    }
+
+    /// Whether the picture shows this or a box that it is part of. What a filter leaves out is not told either.
+    pub(crate) fn sees(&self, what: Element) -> bool {
+        let is = |reasons: &[Option<_>], id: u32| reasons.get(id as usize) == Some(&None);
+        let both = |edge: Option<&(NodeId, TopicId)>| {
+            edge.is_some_and(|(node, topic)| {
+                is(&self.selection.nodes, *node) && is(&self.selection.topics, *topic)
+            })
+        };
+        match what {
+            Element::Node(id) => is(&self.selection.nodes, id),
+            Element::Topic(id) => is(&self.selection.topics, id),
+            Element::Publish(id) => both(self.published.get(id as usize)),
+            Element::Subscribe(id) => both(self.subscribed.get(id as usize)),
+        }
+    }
+
+    /// Whether a single arrow carries a topic from its publishers.
+    pub(crate) fn has_single_sender(&self, topic: Element) -> bool {
+        self.carriers.get(&topic).is_some_and(|all| all.len() == 1)
     }
 
     fn is_namespace(&self, item: u32) -> bool {

@@ -1,133 +1,123 @@
-//! What the changes of one window mean for the items and arrows that were there before and still are.
+//! What the entries of the ledger in one window mean for the items and arrows of the picture.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::items::{Place, Viewed};
-use super::{ItemKind, Mark};
-use crate::base::words;
-use crate::graph::diff::Change;
-use crate::graph::{Element, Elements, Graph, TopicId};
+use super::{Headline, ItemKind, Mark};
+use crate::base::time::Span;
+use crate::graph::Element;
+use crate::mission::Ledger;
+use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
 
-/// A mark, and the rate before where it tells of a rate.
-pub(crate) type MarkedRate = (Mark, Option<f64>);
+/// What is told of an item or arrow in a window.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Told {
+    /// Whether something of it began, or ended.
+    pub(crate) came: bool,
+    pub(crate) went: bool,
+    /// The mark that it gets if it was there before and still is.
+    pub(crate) mark: Option<Mark>,
+    /// Messages per second before and after.
+    pub(crate) rates: Option<(f64, f64)>,
+    /// The headlines that say so, sorted.
+    pub(crate) entries: Vec<EntryId>,
+}
 
-/// The marks of items and arrows by id.
+/// What is told in one window, by id.
 pub(crate) struct News {
-    pub(crate) items: BTreeMap<u32, MarkedRate>,
-    pub(crate) arrows: BTreeMap<u32, MarkedRate>,
+    pub(crate) headlines: Vec<Headline>,
+    pub(crate) items: BTreeMap<u32, Told>,
+    pub(crate) arrows: BTreeMap<u32, Told>,
 }
 
 impl News {
-    /// `alone` holds the topics with one publisher, whose own rate the diff does not tell apart from the topic's.
-    pub(crate) fn new(changes: &[Change], viewed: &Viewed, alone: &BTreeSet<TopicId>) -> Self {
+    pub(crate) fn new(ledger: &Ledger, span: Span, viewed: &Viewed) -> Self {
         let mut news = Self {
+            headlines: Vec::new(),
             items: BTreeMap::new(),
             arrows: BTreeMap::new(),
         };
-        for change in changes {
-            match change {
-                Change::Added { what, .. } => news.add(viewed, *what, Mark::Added, None),
-                Change::Removed { what, .. } => news.add(viewed, *what, Mark::Removed, None),
-                Change::Rate {
-                    what,
-                    from_hz,
-                    to_hz,
-                } if words::number(*from_hz) != words::number(*to_hz) => {
-                    let faster = to_hz > from_hz;
-                    let mark = if faster { Mark::Faster } else { Mark::Slower };
-                    news.add(viewed, *what, mark, Some(*from_hz));
-                    let carried = match what {
-                        Element::Topic(topic) => alone.contains(topic),
-                        _ => !viewed.pairs.is_empty(),
-                    };
-                    if carried {
-                        news.add_carriers(viewed, *what, mark, *from_hz);
-                    }
-                }
-                // What reads the same is no change to a reader.
-                Change::Rate { .. } => {}
-                Change::HandedOver { topic, .. } => {
-                    news.add(viewed, Element::Topic(*topic), Mark::HandedOver, None);
-                }
-                Change::Restarted { node, .. } => {
-                    news.add(viewed, Element::Node(*node), Mark::Restarted, None);
-                }
-                Change::Value { what, .. } => news.add(viewed, *what, Mark::Changed, None),
+        for (id, entry) in ledger.inside(span) {
+            let whole = entry.part_of.unwrap_or(id);
+            let Some(headline) = ledger.entries.get(whole as usize) else {
+                continue;
+            };
+            if headline.quiet || !viewed.sees(headline.what) {
+                continue;
+            }
+            if entry.is_headline() {
+                news.headlines.push(Headline {
+                    entry: id,
+                    kind: entry.kind,
+                    what: entry.what,
+                    time: entry.time,
+                });
+            }
+            // One that came back says so by itself.
+            if entry.is_headline() || headline.kind != Kind::Restarted {
+                news.tell(viewed, entry, whole);
             }
         }
         news
     }
 
-    fn add(&mut self, viewed: &Viewed, what: Element, mark: Mark, from_hz: Option<f64>) {
-        let place = |places: &[Place], id: u32| places.get(id as usize).copied();
-        match what {
-            Element::Node(id) => self.add_item(viewed, viewed.node.get(id as usize), mark, from_hz),
-            Element::Topic(id) => {
-                self.add_item(viewed, viewed.topic.get(id as usize), mark, from_hz);
+    fn tell(&mut self, viewed: &Viewed, entry: &Entry, headline: EntryId) {
+        let sign = Sign::of(entry, headline);
+        self.add(viewed, entry.what, &sign);
+        match (&entry.detail, entry.what) {
+            (Detail::Senders { from, to }, Element::Topic(topic)) => {
+                for node in from.iter().chain(to) {
+                    if let Ok(edge) = viewed.published.binary_search(&(*node, topic)) {
+                        let edge = u32::try_from(edge).unwrap_or(u32::MAX);
+                        self.add_carriers(viewed, Element::Publish(edge), &sign);
+                    }
+                }
             }
-            Element::Publish(id) => {
-                self.add_edge(viewed, place(&viewed.publish, id), mark, from_hz);
+            (Detail::Rates { .. }, Element::Publish(edge)) => {
+                self.add_carriers(viewed, entry.what, &sign);
+                let topic = viewed.published.get(edge as usize);
+                let topic = topic.map(|(_, topic)| Element::Topic(*topic));
+                if let Some(topic) = topic.filter(|t| viewed.has_single_sender(*t)) {
+                    self.add(viewed, topic, &sign);
+                }
             }
-            Element::Subscribe(id) => {
-                self.add_edge(viewed, place(&viewed.subscribe, id), mark, from_hz);
+            (Detail::Rates { .. }, Element::Topic(_))
+                if viewed.has_single_sender(entry.what) || !viewed.pairs.is_empty() =>
+            {
+                self.add_carriers(viewed, entry.what, &sign);
             }
+            _ => {}
         }
     }
 
-    fn add_item(
-        &mut self,
-        viewed: &Viewed,
-        item: Option<&Option<u32>>,
-        mark: Mark,
-        from_hz: Option<f64>,
-    ) {
-        if let Some(Some(id)) = item {
-            let reach = Reach::of_item(viewed, *id);
-            keep(&mut self.items, *id, reach, mark, from_hz);
+    fn add(&mut self, viewed: &Viewed, what: Element, sign: &Sign) {
+        let item = |items: &[Option<u32>], id: u32| items.get(id as usize).copied().flatten();
+        let place = match what {
+            Element::Node(id) => item(&viewed.node, id).map(Place::Item),
+            Element::Topic(id) => item(&viewed.topic, id).map(Place::Item),
+            Element::Publish(id) => viewed.publish.get(id as usize).copied(),
+            Element::Subscribe(id) => viewed.subscribe.get(id as usize).copied(),
+        };
+        if !viewed.pairs.is_empty() && matches!(what, Element::Publish(_) | Element::Subscribe(_)) {
+            self.add_carriers(viewed, what, sign);
         }
-    }
-
-    fn add_edge(
-        &mut self,
-        viewed: &Viewed,
-        place: Option<Place>,
-        mark: Mark,
-        from_hz: Option<f64>,
-    ) {
         match place {
-            Some(Place::Inside(item)) => keep(&mut self.items, item, Reach::Inside, mark, None),
-            Some(Place::Arrow(id)) => {
-                let reach = Reach::of_arrow(viewed, id);
-                keep(&mut self.arrows, id, reach, mark, from_hz);
-            }
+            Some(Place::Item(id)) => sign.keep(&mut self.items, id, Reach::of_item(viewed, id)),
+            Some(Place::Inside(id)) => sign.keep(&mut self.items, id, Reach::Inside),
+            Some(Place::Arrow(id)) => sign.keep(&mut self.arrows, id, Reach::of_arrow(viewed, id)),
             Some(Place::Hidden) | None => {}
         }
     }
 
-    /// A change of rate shows on the arrows from the publisher too.
-    fn add_carriers(&mut self, viewed: &Viewed, what: Element, mark: Mark, from_hz: f64) {
+    /// Marks the arrows that carry a topic or publication.
+    fn add_carriers(&mut self, viewed: &Viewed, what: Element, sign: &Sign) {
         for id in viewed.carriers.get(&what).into_iter().flatten() {
-            let reach = Reach::of_arrow(viewed, *id);
-            keep(&mut self.arrows, *id, reach, mark, Some(from_hz));
+            sign.keep(&mut self.arrows, *id, Reach::of_arrow(viewed, *id));
         }
     }
 }
 
-/// The topics that have exactly one publisher in a window.
-pub(crate) fn alone(graph: &Graph, elements: &Elements) -> BTreeSet<TopicId> {
-    let (mut once, mut more) = (BTreeSet::new(), BTreeSet::new());
-    for state in &graph.publishes {
-        if let Some(edge) = elements.publishes.get(state.id as usize)
-            && !once.insert(edge.topic)
-        {
-            more.insert(edge.topic);
-        }
-    }
-    once.retain(|topic| !more.contains(topic));
-    once
-}
-
-/// How what a change happened to relates to its box or arrow.
+/// How what an entry is about relates to its box or arrow.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reach {
     /// It is all there is in it.
@@ -157,30 +147,60 @@ impl Reach {
     }
 }
 
-/// Notes a change; of several on the same thing the more telling one stays. A single thing that came or went is told
-/// by its presence; whether the summed rate of several changed is decided where it is known.
-fn keep(
-    all: &mut BTreeMap<u32, MarkedRate>,
-    id: u32,
-    reach: Reach,
-    mark: Mark,
-    from_hz: Option<f64>,
-) {
-    let new = match (reach, mark) {
-        (Reach::Whole, Mark::Added | Mark::Removed) => return,
-        (Reach::Whole, _) => (mark, from_hz),
-        (Reach::Part, Mark::Faster | Mark::Slower) => (mark, None),
-        _ => (Mark::Inside, None),
-    };
-    let old = all.entry(id).or_insert(new);
-    if weight(new.0) > weight(old.0) {
-        *old = new;
+/// What one entry says of whatever it is told on.
+struct Sign {
+    kind: Kind,
+    rates: Option<(f64, f64)>,
+    headline: EntryId,
+}
+
+impl Sign {
+    fn of(entry: &Entry, headline: EntryId) -> Self {
+        Self {
+            kind: entry.kind,
+            rates: match entry.detail {
+                Detail::Rates { from_hz, to_hz } => Some((from_hz, to_hz)),
+                _ => None,
+            },
+            headline,
+        }
+    }
+
+    /// The mark on something that was there before and still is.
+    fn mark(&self, reach: Reach) -> Option<Mark> {
+        let is_faster = self.rates.is_some_and(|(from, to)| to > from);
+        match (self.kind, reach) {
+            (Kind::Rate, Reach::Whole | Reach::Part) if is_faster => Some(Mark::Faster),
+            (Kind::Rate, Reach::Whole | Reach::Part) => Some(Mark::Slower),
+            (_, Reach::Part | Reach::Inside) => Some(Mark::Inside),
+            (Kind::Restarted, _) => Some(Mark::Restarted),
+            (Kind::Silent, _) => Some(Mark::Paused),
+            (Kind::HandedOver, _) => Some(Mark::HandedOver),
+            (Kind::Lifecycle | Kind::Type | Kind::Qos, _) => Some(Mark::Changed),
+            _ => None,
+        }
+    }
+
+    /// Notes it; of several marks on the same thing the more telling one stays.
+    fn keep(&self, all: &mut BTreeMap<u32, Told>, id: u32, reach: Reach) {
+        let told = all.entry(id).or_default();
+        told.came |= matches!(self.kind, Kind::Started | Kind::Appeared);
+        told.went |= matches!(self.kind, Kind::Stopped | Kind::Vanished);
+        if let Err(place) = told.entries.binary_search(&self.headline) {
+            told.entries.insert(place, self.headline);
+        }
+        let mark = self.mark(reach);
+        if mark.map(weight) > told.mark.map(weight) {
+            told.mark = mark;
+            told.rates = self.rates.filter(|_| reach == Reach::Whole);
+        }
     }
 }
 
 fn weight(mark: Mark) -> u8 {
     match mark {
-        Mark::HandedOver | Mark::Restarted => 3,
+        Mark::HandedOver | Mark::Restarted => 4,
+        Mark::Paused => 3,
         Mark::Changed => 2,
         Mark::Inside => 1,
         Mark::Faster | Mark::Slower | Mark::Added | Mark::Removed => 0,

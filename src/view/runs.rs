@@ -49,8 +49,8 @@ pub fn at(list: &[Run], window: u32) -> u32 {
 }
 
 impl Runs {
-    /// The runs of a view. `label` writes a rate in hertz.
-    pub fn of(view: &View, label: impl Fn(f64) -> String) -> Self {
+    /// The runs of a view. `label` writes the rate of an element in a window, empty for none.
+    pub fn of(view: &View, label: impl Fn(&Shown) -> String) -> Self {
         let mut classes = Table::starting_with(None);
         let mut labels = Table::starting_with(String::new());
         let mut runs = |count, shown: fn(&Frame) -> &[Shown], are_arrows| {
@@ -135,7 +135,11 @@ impl Class {
             state: shown.state,
             degree: shown.degree,
             mark: shown.mark,
-            step: if is_arrow { width_step(shown.hz) } else { 0 },
+            step: if is_arrow {
+                width_step(shown.steady_hz)
+            } else {
+                0
+            },
         }
     }
 
@@ -164,6 +168,7 @@ pub fn word(mark: Mark) -> &'static str {
         Mark::Slower => "slower",
         Mark::HandedOver => "handed-over",
         Mark::Restarted => "restarted",
+        Mark::Paused => "paused",
         Mark::Changed => "other",
         Mark::Inside => "inside",
     }
@@ -244,10 +249,10 @@ struct RunRecorder<'a, F> {
     are_arrows: bool,
     runs: Vec<ElementRuns>,
     /// The rate last written; rates are mostly the same, and writing one takes time.
-    last_hz: Vec<Option<u64>>,
+    last_hz: Vec<Option<(u64, Option<u64>)>>,
 }
 
-impl<F: Fn(f64) -> String> RunRecorder<'_, F> {
+impl<F: Fn(&Shown) -> String> RunRecorder<'_, F> {
     fn take(&mut self, shown: &[Shown], window: u32) {
         let mut there = vec![false; self.runs.len()];
         for one in shown {
@@ -261,10 +266,10 @@ impl<F: Fn(f64) -> String> RunRecorder<'_, F> {
             if one.mark == Some(Mark::Removed) {
                 continue;
             }
-            let hz = one.hz.map(f64::to_bits);
+            let hz = one.hz.map(|hz| (hz.to_bits(), one.count));
             if hz != self.last_hz[id] {
                 self.last_hz[id] = hz;
-                let text = one.hz.map_or(String::new(), &self.label);
+                let text = (self.label)(one);
                 push(&mut life.rates, window, self.labels.place(text));
             }
             let lifecycle = one.lifecycle.as_deref().unwrap_or_default();
@@ -330,17 +335,14 @@ mod tests {
             arrows: there
                 .iter()
                 .map(|(mark, hz)| Shown {
-                    id: 0,
-                    state: State::Active,
-                    degree: Degree::Measured,
                     mark: *mark,
                     hz: Some(*hz),
-                    from_hz: None,
-                    count: None,
-                    lifecycle: None,
+                    steady_hz: Some(*hz),
+                    ..Shown::plain(0, State::Active, Degree::Measured)
                 })
                 .collect(),
-            tally: crate::view::Counts::default(),
+            headlines: Vec::new(),
+            counts: crate::view::Counts::default(),
             caption: Vec::new(),
         };
         let view = View {
@@ -353,7 +355,7 @@ mod tests {
             frames: story.iter().enumerate().map(frame).collect(),
             ..View::default()
         };
-        Runs::of(&view, |hz| format!("{hz:.0}"))
+        Runs::of(&view, |shown| format!("{:.0}", shown.hz.unwrap_or(0.0)))
     }
 
     fn told(runs: &Runs, windows: u32) -> Vec<(&str, &str)> {

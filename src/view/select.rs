@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::names::{is_debug, is_params, is_quiet, is_tf};
 use super::options::{Mode, ViewOptions};
-use crate::graph::Elements;
+use crate::graph::{Elements, Topic};
 use crate::mission::activity::records;
 
 /// Why something is left out.
@@ -37,6 +37,8 @@ struct Ends {
     subscribers: usize,
     /// How many of both pass the filter of namespaces.
     kept: usize,
+    /// Whether a hidden recorder or player is another end of it.
+    is_recorded: bool,
 }
 
 /// The steps up to the grouping of topics: filters, leaf and dead, tf and parameters, topics without a node left.
@@ -55,7 +57,10 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     let ends = ends(elements, &nodes, &recorders);
     let names: BTreeSet<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
     let topics = elements.topics.iter().zip(&ends);
-    let topics = topics.map(|(t, ends)| topic_reason(t.name.as_str(), *ends, &names, options));
+    let topics = topics.map(|(t, ends)| {
+        let reason = topic_reason(t.name.as_str(), *ends, &names, options);
+        reason.or_else(|| is_only_recorded(t, *ends).then_some(Reason::Recorder))
+    });
     let topics = topics.collect();
     let mut selection = Selection { nodes, topics };
     for (reason, is_recorder) in selection.nodes.iter_mut().zip(recorders) {
@@ -72,15 +77,24 @@ fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Ve
     let subscribes = elements.subscribes.iter().map(|e| (e, false));
     for (edge, publishes) in publishes.chain(subscribes) {
         let node = edge.node as usize;
-        let (Some(ends), Some(false)) = (all.get_mut(edge.topic as usize), recorders.get(node))
-        else {
+        let Some(ends) = all.get_mut(edge.topic as usize) else {
             continue;
         };
+        if recorders.get(node) != Some(&false) {
+            ends.is_recorded = true;
+            continue;
+        }
         ends.publishers += usize::from(publishes);
         ends.subscribers += usize::from(!publishes);
         ends.kept += usize::from(nodes.get(node) == Some(&None));
     }
     all
+}
+
+/// Whether nothing is known of a topic but that a hidden recorder waits for it: no other end, no message.
+fn is_only_recorded(topic: &Topic, ends: Ends) -> bool {
+    let connected = topic.evidence.words().any(|word| word == "connection");
+    ends.is_recorded && ends.publishers + ends.subscribers == 0 && !connected
 }
 
 fn topic_reason(
@@ -206,6 +220,17 @@ mod tests {
         };
         let view = outline(&mission(&[graph]), &nodes);
         assert_eq!((view.items.len(), view.arrows.len()), (2, 2));
+    }
+
+    #[test]
+    fn a_topic_that_only_the_hidden_recorder_waits_for_is_hidden_with_it() {
+        let graph = "/a>/t /record_1</t /record_1</never";
+        assert_eq!(left(graph, &ViewOptions::default()), "/a /t");
+        let recorder = ViewOptions {
+            show_recorder: true,
+            ..ViewOptions::default()
+        };
+        assert_eq!(left(graph, &recorder), "/a /record_1 /never /t");
     }
 
     #[test]

@@ -26,6 +26,7 @@ pub fn union(view: &View) -> Option<Frame> {
             shown.hz = shown
                 .hz
                 .map(|sum| if whole > 0.0 { sum / whole } else { 0.0 });
+            shown.steady_hz = shown.hz;
         }
         all
     };
@@ -39,7 +40,8 @@ pub fn union(view: &View) -> Option<Frame> {
         messages: view.frames.iter().map(|f| f.messages).sum(),
         items: average(items),
         arrows: average(arrows),
-        tally: Counts::default(),
+        headlines: Vec::new(),
+        counts: Counts::default(),
         caption: Vec::new(),
     })
 }
@@ -53,7 +55,9 @@ fn gather(all: &mut [Option<Shown>], shown: &Shown, length: f64) {
         *slot = Some(Shown {
             mark: None,
             hz: shown.hz.map(|hz| hz * length),
-            from_hz: None,
+            rates: None,
+            entries: Vec::new(),
+            inside: None,
             lifecycle: None,
             ..shown.clone()
         });

@@ -1,6 +1,6 @@
 //! Publications and subscriptions: their routes, rates and signs of change.
 
-use super::boxes::class;
+use super::boxes::{class, told};
 use super::measured::arrow_label;
 use super::options::{self, ArrowLook};
 use super::page::Fit;
@@ -91,12 +91,14 @@ impl Arrows<'_> {
         let mut group = Group {
             id: track.id.clone(),
             class: class(&format!("edge {kind}"), shown),
-            data: vec![("from", from.clone()), ("to", to.clone())],
+            data: told(vec![("from", from.clone()), ("to", to.clone())], shown),
             title: format!("{from} → {to}\n{kind}: {}", chips::facts(shown)),
             ..Group::default()
         };
         self.line(&mut group, track, &look);
-        if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0]) {
+        if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0])
+            && track.label.is_some()
+        {
             self.label(&mut group, &text, is_pill, track, shown, &look);
         }
         if let Some(mark) = shown.mark.filter(|mark| is_badged(*mark, ends)) {

@@ -21,7 +21,7 @@ pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point,
     sign(group, style.badge.sign, mark, centre, radius * 0.56);
 }
 
-/// The sign of a mark inside a circle of radius `r`: plus, minus, triangles, two arrows, a turn, a diamond, a dot.
+/// The sign of a mark inside a circle of radius `r`: plus, minus, triangles, two arrows, a turn, a pause, a diamond, a dot.
 fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
     let at = |x: f64, y: f64| Point::new(centre.x + x * r, centre.y + y * r);
     let stroke = |form| Shape::line(form, Stroke::solid(color, r * 0.5));
@@ -80,6 +80,14 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
                 polygon(&[at(0.0, -1.6), at(0.95, -0.9), at(0.0, -0.2)]),
                 color,
             ));
+        }
+        Mark::Paused => {
+            group.shape(stroke(lines(&[
+                (-0.45, -0.9),
+                (-0.45, 0.9),
+                (0.45, -0.9),
+                (0.45, 0.9),
+            ])));
         }
         Mark::Changed => {
             group.shape(Shape::filled(

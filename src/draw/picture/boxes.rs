@@ -82,7 +82,7 @@ impl Boxes<'_> {
         let mut group = Group {
             id: card.id.clone(),
             class: class(item.kind.word(), shown),
-            data: vec![("name", item.name.to_string())],
+            data: told(vec![("name", item.name.to_string())], shown),
             title: title(item, shown),
             ..Group::default()
         };
@@ -93,10 +93,8 @@ impl Boxes<'_> {
         {
             self.latch(&mut group, inner, body);
         }
-        let second = match card.label.fixed.as_str() {
-            "" => second_line(shown, card.tells).unwrap_or_default(),
-            fixed => fixed.to_owned(),
-        };
+        let second = second_line(shown, card.tells);
+        let second = second.unwrap_or_else(|| card.label.fixed.clone());
         self.lines(&mut group, &card.label, &second, inner, body, &look);
         if let Some(text) = pendant(shown, card.tells) {
             let (below, size) = self.below(place);
@@ -238,6 +236,18 @@ pub(crate) fn corner(kind: ItemKind, place: Rect, scale: f64) -> Point {
         }
         _ => Point::new(place.right() - 2.0 * scale, place.y + scale),
     }
+}
+
+/// The attributes of an element, and the places in the ledger of what is told of it in this window.
+pub(crate) fn told(
+    mut data: Vec<(&'static str, String)>,
+    shown: &Shown,
+) -> Vec<(&'static str, String)> {
+    if !shown.entries.is_empty() {
+        let places: Vec<String> = shown.entries.iter().map(ToString::to_string).collect();
+        data.push(("entries", places.join(" ")));
+    }
+    data
 }
 
 /// `node added active measured`: what it is, what happened to it, how alive, how well known.

@@ -1,13 +1,27 @@
 //! The words on the picture: chips, and what an element is.
 
-use crate::base::words::{count, rate, rate_change};
+use crate::base::words::{count, rate, rate_change, rate_of};
 use crate::view::{Counts, Shown};
 
-/// `+1 node +2 topics`; empty if there are none. Edges are named only where they are all there is.
-pub(crate) fn chip(sign: char, nodes: usize, topics: usize, edges: usize) -> String {
+/// The words on the chips for what came, went and changed, each with the number of headlines it counts; empty for none.
+pub(crate) fn chips(counts: &Counts) -> [(String, usize); 3] {
+    let came = [counts.nodes_added, counts.topics_added, counts.edges_added];
+    let went = [
+        counts.nodes_removed,
+        counts.topics_removed,
+        counts.edges_removed,
+    ];
+    [
+        (chip('+', came), counts.came()),
+        (chip('−', went), counts.went()),
+        (changed(counts), counts.changed()),
+    ]
+}
+
+/// `+1 node +2 topics`: nodes, topics and edges.
+fn chip(sign: char, numbers: [usize; 3]) -> String {
     let mut parts = Vec::new();
-    let edges = if nodes + topics == 0 { edges } else { 0 };
-    for (n, word) in [(nodes, "node"), (topics, "topic"), (edges, "edge")] {
+    for (n, word) in numbers.into_iter().zip(["node", "topic", "edge"]) {
         if n > 0 {
             parts.push(format!("{sign}{}", count(n, word)));
         }
@@ -15,14 +29,47 @@ pub(crate) fn chip(sign: char, nodes: usize, topics: usize, edges: usize) -> Str
     parts.join(" ")
 }
 
-/// `1 rate · 1 other`: what changed without coming or going; empty if nothing did.
-pub(crate) fn changed_chip(tally: &Counts) -> String {
-    match (tally.rates, tally.others) {
+/// `1 handed over, 2 restarted`: what changed without coming or going.
+fn changed(counts: &Counts) -> String {
+    let parts = [
+        (
+            counts.handed_over,
+            format!("{} handed over", counts.handed_over),
+        ),
+        (counts.restarted, format!("{} restarted", counts.restarted)),
+        (counts.silent, format!("{} fell silent", counts.silent)),
+        (counts.values, count(counts.values, "state")),
+        (counts.rates, count(counts.rates, "rate")),
+    ];
+    let told = parts.into_iter().filter(|(n, _)| *n > 0);
+    told.map(|(_, words)| words).collect::<Vec<_>>().join(", ")
+}
+
+/// What happened inside a folded namespace: `+1 −4 nodes, 1 restarted`.
+pub(crate) fn inside(counts: &Counts) -> String {
+    let pair = |came: usize, went: usize, word: &str| match (came, went) {
         (0, 0) => String::new(),
-        (n, 0) => format!("{} changed", count(n, "rate")),
-        (0, n) => count(n, "other change"),
-        (a, b) => format!("{}, {b} other", count(a, "rate")),
-    }
+        (n, 0) => format!("+{}", count(n, word)),
+        (0, n) => format!("−{}", count(n, word)),
+        (a, b) => format!("+{a} −{}", count(b, word)),
+    };
+    let parts = [
+        pair(counts.nodes_added, counts.nodes_removed, "node"),
+        pair(counts.topics_added, counts.topics_removed, "topic"),
+        pair(counts.edges_added, counts.edges_removed, "edge"),
+        changed(counts),
+    ];
+    let told = parts.into_iter().filter(|words| !words.is_empty());
+    told.collect::<Vec<_>>().join(", ")
+}
+
+/// The rate in a window with no more digits than its messages allow; `None` for none.
+pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
+    let hz = shown.hz.filter(|hz| *hz > 0.0)?;
+    Some(match shown.count {
+        Some(count) if count > 0 => rate_of(count, count as f64 / hz),
+        _ => rate(hz),
+    })
 }
 
 /// What is known of an element in this window: `active, measured, 50 Hz`.
@@ -34,10 +81,9 @@ pub(crate) fn facts(shown: &Shown) -> String {
     if let Some(mark) = shown.mark {
         parts.insert(0, mark.class().to_owned());
     }
-    match (shown.from_hz, shown.hz) {
-        (Some(from), Some(to)) => parts.push(rate_change(from, to)),
-        (None, Some(hz)) if hz > 0.0 => parts.push(rate(hz)),
-        _ => {}
+    match shown.rates {
+        Some((from, to)) => parts.push(rate_change(from, to)),
+        None => parts.extend(rate_in(shown)),
     }
     if let Some(n) = shown.count.filter(|n| *n > 0) {
         parts.push(count(usize::try_from(n).unwrap_or(usize::MAX), "message"));
@@ -54,14 +100,24 @@ mod tests {
 
     #[test]
     fn chips_count() {
-        assert_eq!(chip('+', 1, 2, 5), "+1 node +2 topics");
-        assert_eq!(chip('−', 0, 0, 1), "−1 edge");
-        assert_eq!(chip('+', 0, 0, 0), "");
-        let tally = Counts {
-            rates: 1,
-            others: 2,
+        assert_eq!(chip('+', [1, 2, 0]), "+1 node +2 topics");
+        assert_eq!(chip('−', [0, 0, 1]), "−1 edge");
+        assert_eq!(chip('+', [0, 0, 0]), "");
+        let counts = Counts {
+            nodes_added: 1,
+            nodes_removed: 4,
+            handed_over: 1,
+            restarted: 2,
             ..Counts::default()
         };
-        assert_eq!(changed_chip(&tally), "1 rate, 2 other");
+        assert_eq!(
+            chips(&counts),
+            [
+                ("+1 node".to_owned(), 1),
+                ("−4 nodes".to_owned(), 4),
+                ("1 handed over, 2 restarted".to_owned(), 3)
+            ]
+        );
+        assert_eq!(inside(&counts), "+1 −4 nodes, 1 handed over, 2 restarted");
     }
 }

@@ -69,6 +69,11 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
             "restarted",
         ),
         (
+            mark(&[Mark::Paused]),
+            Sign::Change(Mark::Paused),
+            "fell silent",
+        ),
+        (
             mark(&[Mark::Changed]),
             Sign::Change(Mark::Changed),
             "changed",
@@ -232,14 +237,8 @@ fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
 /// An element that stands for all of its kind.
 fn shown(state: State, degree: Degree, mark: Option<Mark>) -> Shown {
     Shown {
-        id: 0,
-        state,
-        degree,
         mark,
-        hz: None,
-        from_hz: None,
-        count: None,
-        lifecycle: None,
+        ..Shown::plain(0, state, degree)
     }
 }
 

@@ -1,12 +1,11 @@
 //! What to lay out: every label at its widest, every namespace that gets a box.
 
-use std::collections::BTreeSet;
-
+use super::chips;
 use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::graph::{Element, State};
+use crate::graph::Element;
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
 
@@ -186,6 +185,7 @@ impl Measurer<'_> {
     /// The room for the widest label that each arrow shows in some window.
     fn rooms(&self) -> Vec<Option<Size>> {
         let style = &self.style.edge;
+        let told = told_by_arrows(self.view);
         let mut widest = vec![None; self.view.arrows.len()];
         for frame in &self.view.frames {
             for shown in &frame.arrows {
@@ -193,6 +193,9 @@ impl Measurer<'_> {
                 let Some(arrow) = self.view.arrows.get(at) else {
                     continue;
                 };
+                if !told[at] {
+                    continue;
+                }
                 let topic = find(&frame.items, arrow.from as usize);
                 let Some((text, is_pill)) = arrow_label(arrow, shown, topic) else {
                     continue;
@@ -220,59 +223,37 @@ fn widen(most: &mut Option<f64>, width: f64) {
 /// Which rates a box tells itself, because no arrow does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tells {
-    /// None: the arrows of its publishers tell them.
+    /// None: it is no topic.
     Nothing,
-    /// Those that changed: in some window its publisher's arrow cannot tell, being gone or new.
+    /// Those of the whole topic that changed: several publish it, whose arrows tell the rest.
     Changes,
-    /// All: nobody is ever known to publish it.
+    /// All: at most one is ever known to publish it.
     Rates,
 }
 
-/// What each item tells of its rate.
+/// What each item tells of its rate: a topic all, unless several publishers share it; then only what changed of it.
 pub(crate) fn tells(view: &View) -> Vec<Tells> {
-    let first = |item: &Item| match item.kind {
-        ItemKind::Topic | ItemKind::Group => Tells::Rates,
-        ItemKind::Node | ItemKind::Namespace => Tells::Nothing,
-    };
-    let mut tells: Vec<Tells> = view.items.iter().map(first).collect();
+    let mut senders = vec![0_usize; view.items.len()];
     for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
-        if let Some(tell) = tells.get_mut(arrow.to as usize) {
-            *tell = Tells::Nothing;
+        if let Some(senders) = senders.get_mut(arrow.to as usize) {
+            *senders += 1;
         }
     }
-    for frame in &view.frames {
-        let publishers = frame
-            .arrows
-            .iter()
-            .filter_map(|s| Some((view.arrows.get(s.id as usize)?, s)));
-        let told = publishers.filter(|(arrow, shown)| {
-            arrow.kind == ArrowKind::Publish && changed_rate(shown).is_some()
-        });
-        let told: BTreeSet<u32> = told.map(|(arrow, _)| arrow.to).collect();
-        for shown in frame
-            .items
-            .iter()
-            .filter(|s| changed_rate(s).is_some() && !told.contains(&s.id))
-        {
-            let topic = view
-                .items
-                .get(shown.id as usize)
-                .is_some_and(|item| first(item) == Tells::Rates);
-            match tells.get_mut(shown.id as usize) {
-                Some(tell) if topic && *tell == Tells::Nothing => *tell = Tells::Changes,
-                _ => {}
-            }
-        }
-    }
-    tells
+    let tells = |(item, senders): (&Item, usize)| match item.kind {
+        ItemKind::Node | ItemKind::Namespace => Tells::Nothing,
+        ItemKind::Topic | ItemKind::Group if senders > 1 => Tells::Changes,
+        ItemKind::Topic | ItemKind::Group => Tells::Rates,
+    };
+    view.items.iter().zip(senders).map(tells).collect()
 }
 
-/// The rates before and now of what is marked as faster or slower.
-fn changed_rate(shown: &Shown) -> Option<(f64, f64)> {
-    match shown.mark {
-        Some(Mark::Faster | Mark::Slower) => Some((shown.from_hz?, shown.hz?)),
-        _ => None,
-    }
+/// Whether each arrow tells its rate: a publication whose topic does not, a subscription that hears another rate.
+fn told_by_arrows(view: &View) -> Vec<bool> {
+    let tells = tells(view);
+    let told = |arrow: &Arrow| {
+        arrow.kind != ArrowKind::Publish || tells.get(arrow.to as usize) != Some(&Tells::Rates)
+    };
+    view.arrows.iter().map(told).collect()
 }
 
 /// What an arrow says in a window, and whether on a pill because it changed.
@@ -288,44 +269,46 @@ pub(crate) fn arrow_label(
         ArrowKind::Direct(topic) => format!("{topic} "),
         _ => String::new(),
     };
-    if let Some((before, now)) = changed_rate(shown) {
+    if let Some((before, now)) = shown.rates {
         return Some((topic + &words::rate_change(before, now), true));
     }
-    let rate = shown
-        .hz
-        .filter(|hz| *hz > 0.0 && shown.state == State::Active);
-    let told = match arrow.kind {
-        ArrowKind::Publish => rate,
+    let rate = chips::rate_in(shown);
+    match arrow.kind {
+        ArrowKind::Publish => rate.map(|rate| (rate, false)),
         ArrowKind::Subscribe => {
             let of_topic = from.and_then(|s| s.hz).unwrap_or(0.0);
-            rate.filter(|hz| (hz - of_topic).abs() > OWN_RATE * of_topic.max(*hz))
+            let hz = shown.hz.unwrap_or(0.0);
+            let differs = (hz - of_topic).abs() > OWN_RATE * of_topic.max(hz);
+            rate.filter(|_| differs).map(|rate| (rate, false))
         }
         ArrowKind::Direct(_) => {
-            let rate = rate.map(words::rate).unwrap_or_default();
-            return Some(((topic + &rate).trim_end().to_owned(), false));
+            let rate = rate.unwrap_or_default();
+            Some(((topic + &rate).trim_end().to_owned(), false))
         }
-    };
-    told.map(|hz| (words::rate(hz), false))
+    }
 }
 
 /// The smaller line of a box in a window.
 pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
+    if let Some(inside) = &shown.inside {
+        return Some(chips::inside(inside));
+    }
     if shown.mark == Some(Mark::Removed) {
         return None;
     }
     if let Some(state) = &shown.lifecycle {
         return Some(state.to_string());
     }
-    match (tells, changed_rate(shown), shown.hz) {
-        (Tells::Nothing | Tells::Changes, _, _) => None,
-        (Tells::Rates, Some((before, now)), _) => Some(words::rate_change(before, now)),
-        (Tells::Rates, None, rate) => rate.filter(|hz| *hz > 0.0).map(words::rate),
+    match (tells, shown.rates) {
+        (Tells::Nothing | Tells::Changes, _) => None,
+        (Tells::Rates, Some((before, now))) => Some(words::rate_change(before, now)),
+        (Tells::Rates, None) => chips::rate_in(shown),
     }
 }
 
 /// What hangs on a box for one window: the rate that changed, where neither an arrow nor its smaller line tells it.
 pub(crate) fn pendant(shown: &Shown, tells: Tells) -> Option<String> {
-    let (before, now) = changed_rate(shown).filter(|_| tells == Tells::Changes)?;
+    let (before, now) = shown.rates.filter(|_| tells == Tells::Changes)?;
     Some(words::rate_change(before, now))
 }
 

@@ -87,7 +87,7 @@ pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
         let width = match mark {
             Mark::Removed => change.width * 0.8,
             // As wide as its rate asks for, but never mistaken for one that did not change.
-            _ => (change.width * 0.65).max(width_of(style, shown.hz)),
+            _ => (change.width * 0.65).max(width_of(style, shown.steady_hz)),
         };
         return ArrowLook {
             stroke: line(change.color, width, &change.dash),
@@ -109,10 +109,10 @@ pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
             glow: Color::NONE,
         };
     }
-    let known = shown.hz.is_some() || *kind == ArrowKind::Publish;
+    let known = shown.steady_hz.is_some() || *kind == ArrowKind::Publish;
     let width = match shown.degree {
         Degree::Stated if !known => style.stated.width,
-        _ => width_of(style, shown.hz),
+        _ => width_of(style, shown.steady_hz),
     };
     let dash: &[f64] = if shown.degree == Degree::Inferred {
         &style.inferred.dash
@@ -148,14 +148,9 @@ mod tests {
 
     fn shown(state: State, degree: Degree, mark: Option<Mark>, hz: f64) -> Shown {
         Shown {
-            id: 0,
-            state,
-            degree,
             mark,
-            hz: Some(hz),
-            from_hz: None,
-            count: None,
-            lifecycle: None,
+            steady_hz: Some(hz),
+            ..Shown::plain(0, state, degree)
         }
     }
 

@@ -1,17 +1,22 @@
 //! The strip at the bottom: how busy each window is, where changes are, and where we are.
 
 use super::page::Page;
+use super::title::whole;
 use crate::base::geometry::{Point, Rect};
+use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line, polygon};
-use crate::draw::style::{Color, Style};
+use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{Counts, Frame, View};
+use crate::mission::ledger::Kind;
+use crate::view::{Frame, View};
 
 /// A bar stands for one window, or for several where there are more windows than room.
 struct Bar {
-    messages: u64,
-    marks: [bool; 3],
+    /// From the start of its first window to the start of the next bar's, or to the end.
+    span: Span,
+    /// Messages per second.
+    rate: f64,
 }
 
 /// The strip's fixed places.
@@ -24,8 +29,9 @@ pub(crate) struct Timeline<'a> {
     per_bar: usize,
     /// Where bars stand.
     plot: Rect,
-    windows: usize,
-    busiest: u64,
+    /// What the axis covers.
+    span: Span,
+    busiest: f64,
 }
 
 /// The narrowest bar in pixels.
@@ -46,8 +52,17 @@ impl<'a> Timeline<'a> {
         )]
         let most = (plot.w / NARROWEST).max(1.0) as usize;
         let per_bar = view.frames.len().div_ceil(most).max(1);
-        let bars: Vec<Bar> = view.frames.chunks(per_bar).map(Bar::of).collect();
-        let busiest = bars.iter().map(|b| b.messages).max().unwrap_or(0).max(1);
+        let span = Span {
+            start: view.frames.first().map_or(Stamp(0), |f| f.span.start),
+            end: view.frames.last().map_or(Stamp(1), |f| f.span.end),
+        };
+        let starts = view.frames.iter().step_by(per_bar).map(|f| f.span.start);
+        let ends = starts.skip(1).chain([span.end]);
+        let bars = view.frames.chunks(per_bar).zip(ends);
+        let bars: Vec<Bar> = bars
+            .filter_map(|(frames, end)| Bar::of(frames, end))
+            .collect();
+        let busiest = bars.iter().map(|b| b.rate).fold(0.0, f64::max);
         Self {
             style,
             page: page.clone(),
@@ -55,7 +70,7 @@ impl<'a> Timeline<'a> {
             bars,
             per_bar,
             plot,
-            windows: view.frames.len(),
+            span,
             busiest,
         }
     }
@@ -72,54 +87,49 @@ impl<'a> Timeline<'a> {
         let y = self.plot.bottom();
         let axis = line(Point::new(self.plot.x, y), Point::new(self.plot.right(), y));
         bars.shape(Shape::line(axis, Stroke::solid(style.axis, self.page.unit)));
-        vec![bars, self.axis(view), self.marks()]
+        let mut groups = vec![bars, self.axis()];
+        groups.extend(self.marks(view));
+        groups
     }
 
-    /// What moves: the bars up to `frame` and the head.
-    pub(crate) fn head(&self, frame: usize) -> Vec<Group> {
+    /// What moves: the bars up to the window at place `k`, and the head over exactly its time.
+    pub(crate) fn head(&self, k: usize, frame: &Frame) -> Vec<Group> {
         let style = &self.style.timeline;
-        let at = frame / self.per_bar;
+        let at = k / self.per_bar;
         let mut past = Group::named("past");
         past.shape(Shape::filled(self.bars(0, at), style.past));
         past.shape(Shape::filled(self.bars(at, at + 1), style.now));
         let mut head = Group::named("playhead");
         let unit = self.page.unit;
-        let (x, width) = self.slot(at);
-        let wide = width.max(5.0 * unit);
+        let (left, right) = (self.x(frame.span.start), self.x(frame.span.end));
         let top = self.page.timeline.y + 2.0 * unit;
-        let place = Rect::new(
-            x + (width - wide) / 2.0,
-            top,
-            wide,
-            self.plot.bottom() - top,
-        );
+        let place = Rect::new(left, top, right - left, self.plot.bottom() - top);
         head.shape(Shape::line(
-            Form::Rect(place.grown(0.75 * unit), 2.0 * unit),
+            Form::Rect(place, (2.0 * unit).min(place.w / 2.0)),
             Stroke::solid(style.head, 1.5 * unit),
         ));
         vec![past, head]
     }
 
-    /// The left edge and the width of the room of a bar.
-    fn slot(&self, at: usize) -> (f64, f64) {
-        let width = self.plot.w * self.per_bar as f64 / self.windows.max(1) as f64;
-        let x = self.plot.x + at as f64 * width;
-        (x, width.min(self.plot.right() - x).max(0.0))
+    /// Where a moment lies on the axis.
+    fn x(&self, at: Stamp) -> f64 {
+        let part = at.since(self.span.start) as f64 / self.span.nanos().max(1) as f64;
+        self.plot.x + self.plot.w * part.clamp(0.0, 1.0)
     }
 
     /// The bars from one place to before another as one shape.
     fn bars(&self, from: usize, to: usize) -> Form {
         let mut steps = Vec::new();
-        for (at, bar) in self.bars.iter().enumerate().take(to).skip(from) {
-            let (x, width) = self.slot(at);
+        for bar in self.bars.iter().take(to).skip(from) {
+            let (x, right) = (self.x(bar.span.start), self.x(bar.span.end));
+            let width = right - x;
             let gap = if width > 5.0 {
                 self.page.unit.min(width / 5.0)
             } else {
                 0.0
             };
-            let height = self.plot.h * bar.messages as f64 / self.busiest as f64;
-            let height = if bar.messages > 0 {
-                height.max(1.0)
+            let height = if bar.rate > 0.0 {
+                (self.plot.h * bar.rate / self.busiest).max(1.0)
             } else {
                 0.0
             };
@@ -127,71 +137,95 @@ impl<'a> Timeline<'a> {
             steps.extend([
                 Step::Move(Point::new(x + gap / 2.0, bottom)),
                 Step::Line(Point::new(x + gap / 2.0, top)),
-                Step::Line(Point::new(x + width - gap / 2.0, top)),
-                Step::Line(Point::new(x + width - gap / 2.0, bottom)),
+                Step::Line(Point::new(right - gap / 2.0, top)),
+                Step::Line(Point::new(right - gap / 2.0, bottom)),
                 Step::Close,
             ]);
         }
         Form::Path(steps)
     }
 
-    /// Signs over the windows in which something came, changed or went: three lanes, one for each.
-    fn marks(&self) -> Group {
-        let mut group = Group::named("marks");
-        let unit = self.page.unit;
+    /// Signs at the times at which something came, changed or went: three lanes, one for each. Signs that would cover
+    /// each other are one, as far as they belong to one window; each knows its window and for how many it stands.
+    fn marks(&self, view: &View) -> Vec<Group> {
+        let mut groups = Vec::new();
+        let radius = LANE * 0.42 * self.page.unit;
+        for (window, frame) in view.frames.iter().enumerate() {
+            for lane in 0..3 {
+                let of_lane = frame.headlines.iter().filter(|h| lane_of(h.kind) == lane);
+                let mut times: Vec<f64> = of_lane.map(|h| self.x(h.time)).collect();
+                times.sort_by(f64::total_cmp);
+                for (at, some) in times.chunk_by(|a, b| b - a < 2.0 * radius).enumerate() {
+                    let x = f64::midpoint(some[0], some[some.len() - 1]);
+                    groups.push(self.mark((window, lane, at), x, radius, some.len()));
+                }
+            }
+        }
+        groups
+    }
+
+    fn mark(
+        &self,
+        (window, lane, at): (usize, usize, usize),
+        x: f64,
+        radius: f64,
+        entries: usize,
+    ) -> Group {
+        let mut group = Group::named(&format!("mark-{window}-{lane}-{at}"));
+        "mark".clone_into(&mut group.class);
+        group.data = vec![
+            ("window", window.to_string()),
+            ("entries", entries.to_string()),
+        ];
         let paint = [
             self.style.added.color,
             self.style.changed.color,
             self.style.removed.color,
         ];
-        for (at, bar) in self.bars.iter().enumerate() {
-            let (x, width) = self.slot(at);
-            let r = (LANE * 0.42 * unit).min(width.max(5.0 * unit) * 0.48);
-            for lane in (0..3).filter(|lane| bar.marks[*lane]) {
-                let y = self.page.timeline.y + (LANE * (lane as f64 + 0.5) + 4.0) * unit;
-                group.shape(Shape::filled(
-                    mark(lane, Point::new(x + width / 2.0, y), r),
-                    paint[lane],
-                ));
-            }
-        }
+        let y = self.page.timeline.y + (LANE * (lane as f64 + 0.5) + 4.0) * self.page.unit;
+        group.shape(Shape::filled(
+            mark(lane, Point::new(x, y), radius),
+            paint[lane],
+        ));
         group
     }
 
-    fn axis(&self, view: &View) -> Group {
+    /// Round times as far as they do not come too near to the last, which is the end.
+    fn axis(&self) -> Group {
         let mut group = Group::named("axis");
-        let (Some(first), Some(last)) = (view.frames.first(), view.frames.last()) else {
-            return group;
-        };
-        let style = &self.style.timeline;
-        let size = style.size * self.page.unit;
-        let y = self.plot.bottom() + size * 1.25;
-        let total = last.span.end.since(first.span.start).max(1);
-        let widest = self
-            .fonts
-            .width(&words::offset_seconds(total), size, Weight::Regular);
+        let size = self.style.timeline.size * self.page.unit;
+        let width = |text: &str| self.fonts.width(text, size, Weight::Regular);
+        let total = self.span.nanos();
+        let last = words::offset(whole(total));
         #[expect(clippy::cast_possible_truncation, reason = "at most a few hundred")]
-        let most = (self.plot.w / (widest * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
+        let most = (self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
         let step = nice(total / most.max(1));
+        let end = self.plot.right() - width(&last) * 1.4;
         // Counted, not added up: a span may be as long as a number can say.
         for at in (0..=total / step).map(|tick| tick * step) {
-            let x = self.plot.x + self.plot.w * (at as f64 / total as f64);
             let text = words::offset(at);
-            let width = self.fonts.width(&text, size, Weight::Regular);
-            let x =
-                (x - width / 2.0).clamp(self.plot.x, (self.plot.right() - width).max(self.plot.x));
-            let color: Color = style.text;
-            group.text(Text {
-                at: Point::new(x, y),
-                anchor: Anchor::Start,
-                size,
-                weight: Weight::Regular,
-                color,
-                halo: None,
-                text,
-            });
+            let wide = width(&text);
+            let x = self.x(self.span.start.plus(at)) - wide / 2.0;
+            let x = x.max(self.plot.x);
+            if x + wide <= end {
+                group.text(self.tick(x, Anchor::Start, text));
+            }
         }
+        group.text(self.tick(self.plot.right(), Anchor::End, last));
         group
+    }
+
+    fn tick(&self, x: f64, anchor: Anchor, text: String) -> Text {
+        let size = self.style.timeline.size * self.page.unit;
+        Text {
+            at: Point::new(x, self.plot.bottom() + size * 1.25),
+            anchor,
+            size,
+            weight: Weight::Regular,
+            color: self.style.timeline.text,
+            halo: None,
+            text,
+        }
     }
 }
 
@@ -199,19 +233,25 @@ impl<'a> Timeline<'a> {
 const LANE: f64 = 8.5;
 
 impl Bar {
-    fn of(frames: &[Frame]) -> Self {
-        let any = |is: fn(&Counts) -> bool| frames.iter().any(|f| is(&f.tally));
-        Self {
-            messages: frames
-                .iter()
-                .map(|f| f.messages)
-                .fold(0, u64::saturating_add),
-            marks: [
-                any(|t| t.nodes_added + t.topics_added + t.edges_added > 0),
-                any(|t| t.rates + t.others > 0),
-                any(|t| t.nodes_removed + t.topics_removed + t.edges_removed > 0),
-            ],
-        }
+    /// The bar of some windows, up to where the next begins. Messages per second of the windows' own time, so that
+    /// neither a short nor an overlapping window lies.
+    fn of(frames: &[Frame], end: Stamp) -> Option<Self> {
+        let start = frames.first()?.span.start;
+        let messages: u64 = frames.iter().fold(0, |n, f| n.saturating_add(f.messages));
+        let nanos: f64 = frames.iter().map(|f| f.span.nanos() as f64).sum();
+        Some(Self {
+            span: Span { start, end },
+            rate: messages as f64 * 1e9 / nanos.max(1.0),
+        })
+    }
+}
+
+/// In which lane a headline stands: what came, changed, went.
+fn lane_of(kind: Kind) -> usize {
+    match kind {
+        Kind::Started | Kind::Appeared => 0,
+        Kind::Stopped | Kind::Vanished => 2,
+        _ => 1,
     }
 }
 

@@ -7,7 +7,7 @@ use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::view::{Counts, Frame, View};
+use crate::view::{Frame, View};
 
 /// The bar's fixed places, decided once for all frames.
 pub(crate) struct Title<'a> {
@@ -37,7 +37,7 @@ impl<'a> Title<'a> {
         let mut chips = [(0.0, 0.0); 3];
         for kind in [2, 1, 0] {
             let widths = view.frames.iter().map(|frame| {
-                let text = &chip_texts(&frame.tally)[kind];
+                let text = &chips::chips(&frame.counts)[kind].0;
                 if text.is_empty() {
                     0.0
                 } else {
@@ -169,18 +169,19 @@ impl<'a> Title<'a> {
     pub(crate) fn chips(&self, frame: &Frame) -> Group {
         let mut group = Group::named("chips");
         let chip = &self.style.chip;
-        let texts = chip_texts(&frame.tally);
+        let texts = chips::chips(&frame.counts);
+        group.data = vec![("entries", frame.counts.total().to_string())];
         let paint = [
             (chip.added, chip.added_text),
             (chip.removed, chip.removed_text),
             (chip.changed, chip.changed_text),
         ];
-        for ((text, (x, width)), paint) in texts.iter().zip(self.chips).zip(paint) {
+        for (((text, _), (x, width)), paint) in texts.iter().zip(self.chips).zip(paint) {
             if !text.is_empty() {
                 self.chip(&mut group, text, x + width, paint);
             }
         }
-        if texts.iter().all(String::is_empty) {
+        if frame.counts.total() == 0 {
             let (x, width) = self.chips[2];
             self.chip(&mut group, NONE, x + width, (chip.none, chip.none_text));
         }
@@ -251,62 +252,38 @@ impl<'a> Title<'a> {
             group.text(text(x, Weight::SemiBold, style.text, phase));
             x += self.phase + 18.0 * self.page.unit;
         }
-        let changes = self.sentence(&frame.caption, size, place.right() - self.left() - x);
+        let changes = self.sentence(frame, size, place.right() - self.left() - x);
         let color = if self.phase > 0.0 {
             style.quiet
         } else {
             style.text
         };
-        group.title = frame.caption.join("; ");
+        group.title = frame.words(usize::MAX);
         group.text(text(x, Weight::Regular, color, changes));
         group
     }
 
     /// As many of the changes as fit, the most important first.
-    fn sentence(&self, changes: &[String], size: f64, most: f64) -> String {
-        let fits = |text: &str| self.fonts.width(text, size, Weight::Regular) <= most;
-        let all = self.fonts.shown(&changes.join("; ")).into_owned();
-        if fits(&all) {
-            return all;
-        }
-        for keep in (1..changes.len()).rev() {
-            let text = format!(
-                "{}; and {} more",
-                self.fonts.shown(&changes[..keep].join("; ")),
-                changes.len() - keep
-            );
-            if fits(&text) {
-                return text;
-            }
-        }
-        self.fonts
-            .fit(&all, size, Weight::Regular, most)
-            .into_owned()
+    fn sentence(&self, frame: &Frame, size: f64, most: f64) -> String {
+        let all = frame.caption.len();
+        let texts = (1..=all)
+            .rev()
+            .map(|keep| self.fonts.shown(&frame.words(keep)).into_owned());
+        let mut fitting =
+            texts.filter(|text| self.fonts.width(text, size, Weight::Regular) <= most);
+        fitting.next().unwrap_or_else(|| {
+            let first = self.fonts.shown(&frame.words(1.min(all))).into_owned();
+            self.fonts
+                .fit(&first, size, Weight::Regular, most)
+                .into_owned()
+        })
     }
 }
 
 const NONE: &str = "no reconfiguration";
 
-fn chip_texts(tally: &Counts) -> [String; 3] {
-    [
-        chips::chip(
-            '+',
-            tally.nodes_added,
-            tally.topics_added,
-            tally.edges_added,
-        ),
-        chips::chip(
-            '−',
-            tally.nodes_removed,
-            tally.topics_removed,
-            tally.edges_removed,
-        ),
-        chips::changed_chip(tally),
-    ]
-}
-
 /// Without fractions of a second where the time is a second or more, as on a clock.
-fn whole(nanos: i64) -> i64 {
+pub(crate) fn whole(nanos: i64) -> i64 {
     const MILLI: i64 = 1_000_000;
     let second = 1000 * MILLI;
     // A window that ends 1 ns after the last message ends, to the eye, at it.

@@ -6,7 +6,7 @@ use super::arrows::{Arrows, is_badged};
 use super::boxes::{Boxes, corner};
 use super::measured::{self, Tells};
 use super::page::Fit;
-use super::{Picture, badge, cards, encoded, tracks};
+use super::{Picture, badge, cards, chips, encoded, tracks};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Group;
 use crate::draw::style::Style;
@@ -44,6 +44,11 @@ pub struct Part {
     pub badge: Point,
     /// The marks that it carries a badge for in some window.
     pub marks: BTreeSet<Mark>,
+}
+
+/// The rate of an element in a window as it is drawn; empty for none.
+pub fn rate_label(shown: &Shown) -> String {
+    chips::rate_in(shown).unwrap_or_default()
 }
 
 /// The badge of a mark around (0, 0).
@@ -107,7 +112,8 @@ impl Picture<'_> {
                 // Whatever it tells, it is a line to be filled.
                 shown.lifecycle = is_live.then(|| "-".into());
                 let mut group = boxes.item(item, &card, &shown);
-                let tells_changes = card.tells == Tells::Changes;
+                let is_rate = |m: &Mark| matches!(m, Mark::Faster | Mark::Slower);
+                let tells_changes = card.tells == Tells::Changes && marks.iter().any(is_rate);
                 if tells_changes {
                     group.text(boxes.pendant_text(card.place, "-"));
                 }
@@ -165,13 +171,7 @@ impl Picture<'_> {
 /// An element of which nothing is to be told but, perhaps, a rate.
 fn plain(hz: Option<f64>) -> Shown {
     Shown {
-        id: 0,
-        state: State::Active,
-        degree: Degree::Measured,
-        mark: None,
         hz,
-        from_hz: None,
-        count: None,
-        lifecycle: None,
+        ..Shown::plain(0, State::Active, Degree::Measured)
     }
 }

@@ -76,15 +76,15 @@ fn place(view: &View, index: usize) -> Result<usize> {
 /// The first window and those that change most; where too few change, others evenly spread.
 fn busiest(view: &View, most: usize) -> Vec<usize> {
     let changes = |t: Counts| {
-        let nodes = t.nodes_added + t.nodes_removed;
-        let topics = t.topics_added + t.topics_removed;
-        8 * nodes + 4 * topics + 2 * (t.edges_added + t.edges_removed + t.others) + t.rates
+        let nodes = t.nodes_added + t.nodes_removed + t.restarted;
+        let others = t.total() - nodes - t.rates;
+        8 * nodes + 4 * others + t.rates
     };
     let mut order: Vec<usize> = (0..view.frames.len()).collect();
     order.sort_by_key(|k| {
         (
             *k != 0,
-            std::cmp::Reverse(changes(view.frames[*k].tally)),
+            std::cmp::Reverse(changes(view.frames[*k].counts)),
             *k,
         )
     });
@@ -97,25 +97,23 @@ fn busiest(view: &View, most: usize) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::base::time::{Span, Stamp};
-    use crate::view::Frame;
+    use crate::view::{Frame, Headline};
 
     /// A view of windows 10, 11, … in which so many nodes appear.
     fn view(added: &[usize]) -> View {
         let frame = |(place, nodes_added): (usize, &usize)| Frame {
-            index: 10 + place,
-            span: Span {
-                start: Stamp(0),
-                end: Stamp(1),
-            },
-            partial: false,
-            messages: 0,
-            items: Vec::new(),
-            arrows: Vec::new(),
-            tally: Counts {
+            headlines: vec![Headline::started(); *nodes_added],
+            counts: Counts {
                 nodes_added: *nodes_added,
                 ..Counts::default()
             },
-            caption: vec!["something appeared".to_owned(); *nodes_added],
+            ..Frame::empty(
+                10 + place,
+                Span {
+                    start: Stamp(0),
+                    end: Stamp(1),
+                },
+            )
         };
         View {
             frames: added.iter().enumerate().map(frame).collect(),

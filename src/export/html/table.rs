@@ -10,8 +10,11 @@ use crate::view::{Frame, View};
 /// More windows with changes than this are counted.
 const MOST_ROWS: usize = 200;
 
+/// So many phrases are written out in one row; the rest is counted.
+const MOST_PHRASES: usize = 5;
+
 fn is_told(frame: &Frame) -> bool {
-    !frame.caption.is_empty()
+    !frame.headlines.is_empty()
 }
 
 /// How many windows there are, and how many of them have changes.
@@ -39,7 +42,7 @@ pub(super) fn rows(view: &View) -> String {
             "<tr><th><a href=\"#t={secs}\">{}</a><td>",
             words::offset(millis * 1_000_000)
         );
-        escape(&mut out, &visible(&frame.caption.join("; ")));
+        escape(&mut out, &visible(&frame.words(MOST_PHRASES)));
         out.push('\n');
     }
     out

@@ -59,7 +59,8 @@ pub(super) fn changed(view: &View) -> Option<(Frame, usize)> {
     let frame = Frame {
         items: pick(&items, &mut boxes.into_iter()),
         arrows: pick(&arrows, &mut drawn.into_iter()),
-        tally: Counts::default(),
+        headlines: Vec::new(),
+        counts: Counts::default(),
         caption: Vec::new(),
         ..*frame
     };
@@ -86,7 +87,7 @@ fn fates(view: &View, shown: fn(&Frame) -> &[Shown]) -> BTreeMap<u32, Shown> {
     };
     let (first, last) = (there(view.frames.first()), there(view.frames.last()));
     for (id, fate) in &mut fates {
-        fate.from_hz = None;
+        fate.rates = None;
         fate.mark = match (first.contains(id), last.contains(id)) {
             (false, true) => Some(Mark::Added),
             (true, false) => Some(Mark::Removed),

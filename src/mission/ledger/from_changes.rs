@@ -1,0 +1,284 @@
+//! The ledger of a mission of which only the windows are known: each change is told in the window that shows it.
+
+use std::collections::BTreeMap;
+
+use super::{Detail, Entry, EntryId, Kind, Ledger};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::{Degree, Evidence};
+use crate::graph::diff::{Change, ValueKind};
+use crate::graph::{Edge, Element, Elements, NodeId, TopicId};
+use crate::mission::Window;
+
+/// What the changes from window to window say. A change without a time inside its window is told at the window's start.
+pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Ledger {
+    let mut entries: Vec<Entry> = Vec::new();
+    for window in windows {
+        let offset = entries.len();
+        let owners = Owners::new(elements, window);
+        let all: Vec<Entry> = owners.entries().collect();
+        for entry in &all {
+            let part_of = entry.part_of.map(|at| id(offset + whole(&all, at)));
+            entries.push(Entry {
+                part_of,
+                ..entry.clone()
+            });
+        }
+    }
+    Ledger {
+        entries: sorted(&entries),
+        phases: Vec::new(),
+    }
+}
+
+/// What explains what explains this: parts have no parts.
+fn whole(entries: &[Entry], mut at: EntryId) -> usize {
+    // A topic may belong to a publication, and that to a node or a hand-over.
+    for _ in 0..3 {
+        at = entries[at as usize].part_of.unwrap_or(at);
+    }
+    at as usize
+}
+
+/// Sorted by time, then kind, then element, which is an order of names; parts still know what they are part of.
+fn sorted(entries: &[Entry]) -> Vec<Entry> {
+    let mut order: Vec<usize> = (0..entries.len()).collect();
+    order.sort_by_key(|at| (entries[*at].time, entries[*at].kind, entries[*at].what, *at));
+    let mut places = vec![0; entries.len()];
+    for (new, old) in order.iter().enumerate() {
+        places[*old] = id(new);
+    }
+    let mut weights = vec![1; entries.len()];
+    for whole in entries.iter().filter_map(|e| e.part_of) {
+        weights[whole as usize] += 1;
+    }
+    let entry = |old: &usize| {
+        let entry = entries[*old].clone();
+        let part_of = entry.part_of.map(|at| places[at as usize]);
+        Entry {
+            part_of,
+            weight: weights[*old],
+            ..entry
+        }
+    };
+    order.iter().map(entry).collect()
+}
+
+fn id(place: usize) -> EntryId {
+    EntryId::try_from(place).unwrap_or(EntryId::MAX)
+}
+
+/// What came or went in one window, and which of it belongs to which.
+struct Owners<'a> {
+    elements: &'a Elements,
+    window: &'a Window,
+    /// What came, what went: the place of its change.
+    came: BTreeMap<Element, usize>,
+    went: BTreeMap<Element, usize>,
+    restarted: BTreeMap<NodeId, usize>,
+    handed: BTreeMap<TopicId, usize>,
+    /// Per topic, its publications that came or went.
+    senders: BTreeMap<TopicId, Vec<(Element, NodeId)>>,
+}
+
+impl<'a> Owners<'a> {
+    fn new(elements: &'a Elements, window: &'a Window) -> Self {
+        let mut owners = Self {
+            elements,
+            window,
+            came: BTreeMap::new(),
+            went: BTreeMap::new(),
+            restarted: BTreeMap::new(),
+            handed: BTreeMap::new(),
+            senders: BTreeMap::new(),
+        };
+        for (at, change) in window.changes.iter().enumerate() {
+            match change {
+                Change::Added { what, .. } => owners.came.insert(*what, at),
+                Change::Removed { what, .. } => owners.went.insert(*what, at),
+                Change::Restarted { node, .. } => owners.restarted.insert(*node, at),
+                Change::HandedOver { topic, .. } => owners.handed.insert(*topic, at),
+                Change::Rate { .. } | Change::Value { .. } => None,
+            };
+            if let Change::Added { what, .. } | Change::Removed { what, .. } = change
+                && let (Element::Publish(_), Some(edge)) = (what, owners.edge(*what))
+            {
+                let all = owners.senders.entry(edge.topic).or_default();
+                all.push((*what, edge.node));
+            }
+        }
+        owners
+    }
+
+    fn edge(&self, what: Element) -> Option<&'a Edge> {
+        match what {
+            Element::Publish(edge) => self.elements.publishes.get(edge as usize),
+            Element::Subscribe(edge) => self.elements.subscribes.get(edge as usize),
+            Element::Node(_) | Element::Topic(_) => None,
+        }
+    }
+
+    fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
+        let changes = self.window.changes.iter().enumerate();
+        changes.map(|(at, change)| self.entry(at, change))
+    }
+
+    fn entry(&self, at: usize, change: &Change) -> Entry {
+        let (kind, what, time, detail) = told(change);
+        let time = time.filter(|t| self.window.span.contains(*t));
+        let whole = self.whole(change).filter(|whole| *whole != at);
+        let Span { start, end } = self.window.span;
+        let time = time.unwrap_or(start);
+        Entry {
+            kind,
+            what,
+            time,
+            earliest: start,
+            latest: end,
+            until: None,
+            detail,
+            degree: Degree::Measured,
+            evidence: Evidence::NONE,
+            part_of: whole.map(id),
+            quiet: false,
+            weight: 1,
+        }
+    }
+
+    /// The change that explains this one, if another does.
+    fn whole(&self, change: &Change) -> Option<usize> {
+        match change {
+            Change::Added { what, .. } => self.mover(*what, &self.came),
+            Change::Removed { what, .. } => self.mover(*what, &self.went),
+            Change::Rate { what, .. } => self.sender(*what),
+            Change::HandedOver { .. } | Change::Restarted { .. } | Change::Value { .. } => None,
+        }
+    }
+
+    /// What brought or took this: a node its edges and topics, a hand-over its publications.
+    fn mover(&self, what: Element, moved: &BTreeMap<Element, usize>) -> Option<usize> {
+        match what {
+            Element::Node(_) => None,
+            Element::Publish(_) | Element::Subscribe(_) => {
+                let edge = self.edge(what)?;
+                let node = moved.get(&Element::Node(edge.node)).copied();
+                let topic = || moved.contains_key(&Element::Topic(edge.topic));
+                let handed = || self.handed.get(&edge.topic).copied();
+                let restarted = || self.restarted.get(&edge.node).copied();
+                let with_topic = || {
+                    topic()
+                        .then(|| self.topic_mover(edge.topic, moved))
+                        .flatten()
+                };
+                node.or_else(handed)
+                    .or_else(restarted)
+                    .or_else(|| match what {
+                        Element::Subscribe(_) => with_topic(),
+                        _ => None,
+                    })
+            }
+            Element::Topic(topic) => self.topic_mover(topic, moved),
+        }
+    }
+
+    /// The node with which a topic came or went, else the publication with which it did.
+    fn topic_mover(&self, topic: TopicId, moved: &BTreeMap<Element, usize>) -> Option<usize> {
+        let senders = self.senders.get(&topic).into_iter().flatten();
+        let mut senders = senders.filter(|(edge, _)| moved.contains_key(edge));
+        if let Some((edge, node)) = senders.next() {
+            let node = moved.get(&Element::Node(*node));
+            return node.or_else(|| moved.get(edge)).copied();
+        }
+        let listeners = moved.keys().filter_map(|what| match what {
+            Element::Subscribe(_) => self.edge(*what).filter(|edge| edge.topic == topic),
+            _ => None,
+        });
+        let nodes = listeners.filter_map(|edge| moved.get(&Element::Node(edge.node)));
+        nodes.copied().next()
+    }
+
+    /// What explains another rate: a publisher that came, went or began anew, or other publishers.
+    fn sender(&self, what: Element) -> Option<usize> {
+        let topic = match what {
+            Element::Topic(topic) => topic,
+            _ => self.edge(what)?.topic,
+        };
+        if let Some(at) = self.handed.get(&topic) {
+            return Some(*at);
+        }
+        let again = |edge: &Edge| {
+            self.restarted
+                .get(&edge.node)
+                .filter(|_| edge.topic == topic)
+        };
+        if let Some(at) = self.elements.publishes.iter().find_map(again) {
+            return Some(*at);
+        }
+        let (edge, node) = self.senders.get(&topic).and_then(|all| all.first())?;
+        let moved = if self.came.contains_key(edge) {
+            &self.came
+        } else {
+            &self.went
+        };
+        let node = moved.get(&Element::Node(*node));
+        node.or_else(|| moved.get(edge)).copied()
+    }
+}
+
+fn told(change: &Change) -> (Kind, Element, Option<Stamp>, Detail) {
+    match change {
+        Change::Added { what, time } => {
+            let is_node = matches!(what, Element::Node(_));
+            let kind = if is_node {
+                Kind::Started
+            } else {
+                Kind::Appeared
+            };
+            (kind, *what, *time, Detail::None)
+        }
+        Change::Removed { what, .. } => {
+            let is_node = matches!(what, Element::Node(_));
+            let kind = if is_node {
+                Kind::Stopped
+            } else {
+                Kind::Vanished
+            };
+            (kind, *what, None, Detail::None)
+        }
+        Change::Rate {
+            what,
+            from_hz,
+            to_hz,
+        } => {
+            let (from_hz, to_hz) = (*from_hz, *to_hz);
+            (Kind::Rate, *what, None, Detail::Rates { from_hz, to_hz })
+        }
+        Change::HandedOver { topic, from, to } => {
+            let (from, to) = (from.clone(), to.clone());
+            let detail = Detail::Senders { from, to };
+            (Kind::HandedOver, Element::Topic(*topic), None, detail)
+        }
+        Change::Restarted { node, time } => (
+            Kind::Restarted,
+            Element::Node(*node),
+            Some(*time),
+            Detail::None,
+        ),
+        Change::Value {
+            kind,
+            what,
+            from,
+            to,
+        } => {
+            let (from, to) = (from.clone(), to.clone());
+            (value(*kind), *what, None, Detail::Values { from, to })
+        }
+    }
+}
+
+fn value(kind: ValueKind) -> Kind {
+    match kind {
+        ValueKind::Lifecycle => Kind::Lifecycle,
+        ValueKind::Type => Kind::Type,
+        ValueKind::Qos => Kind::Qos,
+    }
+}

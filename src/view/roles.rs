@@ -1,0 +1,116 @@
+//! Nodes by what they are for: the runs of one anonymous node are one box, called without what is new in every run.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::{Item, ItemKind};
+use crate::base::time::Stamp;
+use crate::graph::{Elements, Node};
+
+/// Per node of the mission, the name of its box: its role, if all nodes of that role lived one after the other.
+pub(crate) fn boxes(elements: &Elements) -> Vec<Arc<str>> {
+    let mut by_role: BTreeMap<&str, Vec<&Node>> = BTreeMap::new();
+    for node in elements.nodes.iter().filter(|n| is_anonymous(n)) {
+        by_role.entry(&node.role).or_default().push(node);
+    }
+    by_role.retain(|role, runs| runs.len() > 1 && follow(runs) && !is_taken(elements, role));
+    let name = |node: &Node| {
+        let folded = is_anonymous(node) && by_role.contains_key(&*node.role);
+        if folded {
+            Arc::clone(&node.role)
+        } else {
+            node.name.shared()
+        }
+    };
+    elements.nodes.iter().map(name).collect()
+}
+
+/// Gives each node's box its role as a label, numbered where several of a role live at once: `/rviz`, `/rviz ~2`.
+pub(crate) fn label(items: &mut [Item], elements: &Elements) {
+    let mut seen: BTreeMap<Arc<str>, usize> = BTreeMap::new();
+    let mut order: Vec<(Stamp, usize, Arc<str>)> = Vec::new();
+    for (at, item) in items.iter().enumerate() {
+        let Some(node) = single_node(item, elements).filter(|n| is_anonymous(n)) else {
+            continue;
+        };
+        let first = node.first.unwrap_or(Stamp::MIN);
+        order.push((first, at, Arc::clone(&node.role)));
+    }
+    order.sort();
+    for (_, at, role) in order {
+        let count = seen
+            .entry(Arc::clone(&role))
+            .or_insert_with(|| usize::from(is_taken(elements, &role)));
+        *count += 1;
+        items[at].label = match count {
+            1 => role,
+            n => format!("{role} ~{n}").into(),
+        };
+    }
+}
+
+fn single_node<'a>(item: &Item, elements: &'a Elements) -> Option<&'a Node> {
+    match (item.kind, &item.members[..]) {
+        (ItemKind::Node, [crate::graph::Element::Node(id)]) => elements.nodes.get(*id as usize),
+        _ => None,
+    }
+}
+
+fn is_anonymous(node: &Node) -> bool {
+    *node.role != *node.name.as_str()
+}
+
+/// Whether a node is really called so.
+fn is_taken(elements: &Elements, role: &str) -> bool {
+    elements.nodes.iter().any(|n| n.name.as_str() == role)
+}
+
+/// Whether each was last seen before the next was first seen.
+fn follow(runs: &mut [&Node]) -> bool {
+    runs.sort_by_key(|n| n.first);
+    runs.windows(2)
+        .all(|pair| match (pair[0].last, pair[1].first) {
+            (Some(last), Some(first)) => last < first,
+            _ => false,
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::testing::mission;
+    use crate::view::{ViewOptions, view};
+
+    /// The labels of the boxes when these nodes live in these seconds.
+    fn labels(lives: &[(&str, i64, i64)]) -> Vec<String> {
+        let names: Vec<&str> = lives.iter().map(|l| l.0).collect();
+        let mut mission = mission(&[&names.join(" ")]);
+        for (name, first, last) in lives {
+            let node = mission
+                .elements
+                .nodes
+                .iter_mut()
+                .find(|n| n.name.as_str() == *name);
+            let node = node.unwrap();
+            node.role = name
+                .trim_end_matches(|c: char| c == '_' || c.is_ascii_digit())
+                .into();
+            (node.first, node.last) = (Some(Stamp(*first)), Some(Stamp(*last)));
+        }
+        let (view, _) = view(&mission, &ViewOptions::default());
+        view.items.iter().map(|i| i.label.to_string()).collect()
+    }
+
+    #[test]
+    fn runs_that_follow_are_one_box_and_those_side_by_side_are_counted() {
+        assert_eq!(labels(&[("/det_1", 0, 4), ("/det_2", 5, 9)]), ["/det"]);
+        assert_eq!(
+            labels(&[("/det_1", 3, 6), ("/det_2", 1, 9)]),
+            ["/det ~2", "/det"]
+        );
+        assert_eq!(
+            labels(&[("/det_1", 0, 4), ("/det", 0, 9)]),
+            ["/det", "/det ~2"]
+        );
+    }
+}
