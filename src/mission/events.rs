@@ -1,5 +1,6 @@
 //! The reconfiguration log: every change of a mission as one row with its time, in order.
 
+use crate::base::csv::table;
 use crate::base::name::last_part;
 use crate::base::time::Stamp;
 use crate::base::words;
@@ -126,4 +127,69 @@ impl Event {
         let about = if self.exact { "" } else { "~" };
         format!("{about}{}", words::offset(mission.offset(self.time)))
     }
+}
+
+/// The log as text, a line each.
+pub fn text(mission: &Mission) -> String {
+    let line = |event: Event| {
+        let sentence = event.sentence();
+        format!("{:>12}  {}\n", event.at(mission), words::visible(&sentence))
+    };
+    events(mission).into_iter().map(line).collect()
+}
+
+/// The log as a table: a row per event.
+pub fn csv(mission: &Mission) -> String {
+    let columns = "time_ns is_exact win kind what name topic from_value to_value";
+    let columns: Vec<&str> = columns.split(' ').collect();
+    let row = |event: Event| {
+        vec![
+            event.time.0.to_string(),
+            event.exact.to_string(),
+            event.window.to_string(),
+            event.kind.to_owned(),
+            event.what.to_owned(),
+            event.name,
+            event.topic.unwrap_or_default(),
+            event.from.unwrap_or_default(),
+            event.to.unwrap_or_default(),
+        ]
+    };
+    table(&columns, events(mission).into_iter().map(row))
+}
+
+/// The log as JSON, an object a line.
+pub fn ndjson(mission: &Mission) -> String {
+    let line = |event: Event| {
+        let object = serde_json::json!({
+            "time_ns": event.time.0,
+            "exact": event.exact,
+            "window": event.window,
+            "kind": event.kind,
+            "what": event.what,
+            "name": event.name,
+            "topic": event.topic,
+            "from": event.from,
+            "to": event.to,
+        });
+        words::visible_json(&object.to_string()) + "\n"
+    };
+    events(mission).into_iter().map(line).collect()
+}
+
+/// What Markdown would obey.
+const SIGNS: &str = "\\`*_[]<>|#&";
+
+/// The log as a table in Markdown.
+pub fn markdown(mission: &Mission) -> String {
+    let mut out = "| time | event |\n|---:|---|\n".to_owned();
+    for event in events(mission) {
+        out.extend(["| ", &event.at(mission), " | "]);
+        for c in words::visible(&event.sentence()).chars() {
+            out.extend(SIGNS.contains(c).then_some('\\'));
+            out.push(c);
+        }
+        out.push_str(" |\n");
+    }
+    out
 }
