@@ -13,6 +13,8 @@ pub(crate) mod lives;
 mod map;
 pub(crate) mod notes;
 mod page;
+mod panel;
+mod parts;
 mod place;
 pub(crate) mod rows;
 pub(crate) mod source;

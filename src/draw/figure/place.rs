@@ -1,10 +1,11 @@
 //! Boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed afterwards.
 
 use super::canvas::{Canvas, Type, ink};
+use super::parts::{PARTED, Part, parts, shelves};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Step, Stroke};
 use crate::draw::style::Color;
-use crate::layout::{Engine, Layout, Link, Options, Orientation, Plan, Route, lay_out};
+use crate::layout::{Engine, Layout, Options, Orientation, Plan, Route, lay_out};
 
 /// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings.
 const TIGHTNESS: [f64; 5] = [3.6, 4.8, 6.5, 9.0, 12.0];
@@ -117,8 +118,6 @@ const LOST: f64 = 4.0;
 const TENTH: usize = 10;
 const EXCESS: f64 = 15.0;
 const MANY: usize = 15;
-/// The room between parts.
-const PARTED: f64 = 3.0;
 
 /// The cheapest drawing of a part that is at most this wide, else the narrowest.
 fn choice(all: &[Placed], most: f64) -> Option<usize> {
@@ -126,107 +125,6 @@ fn choice(all: &[Placed], most: f64) -> Option<usize> {
     let fitting = (0..all.len()).filter(|at| all[*at].size.w <= most);
     let best = fitting.min_by(|a, b| cost(&all[*a]).total_cmp(&cost(&all[*b])));
     best.or_else(|| (0..all.len()).min_by(|a, b| all[*a].size.w.total_cmp(&all[*b].size.w)))
-}
-
-/// The corners of parts on shelves, the highest parts first, and the size of all.
-fn shelves(sizes: &[Size], width: f64) -> (Vec<Point>, Size) {
-    let mut order: Vec<usize> = (0..sizes.len()).collect();
-    order.sort_by(|a, b| sizes[*b].h.total_cmp(&sizes[*a].h).then(a.cmp(b)));
-    let mut corners = vec![Point::default(); sizes.len()];
-    let (mut x, mut y, mut high, mut wide) = (0.0, 0.0, 0.0_f64, 0.0_f64);
-    for at in order {
-        let size = sizes[at];
-        if x > 0.0 && x + size.w > width {
-            (x, y, high) = (0.0, y + high + PARTED * 0.7, 0.0);
-        }
-        corners[at] = Point::new(x, y);
-        high = high.max(size.h);
-        wide = wide.max(x + size.w);
-        x += size.w + PARTED;
-    }
-    (corners, Size::new(wide, y + high))
-}
-
-/// Some vertices with all that links them, or frames them together.
-struct Part {
-    vertices: Vec<usize>,
-    links: Vec<usize>,
-    clusters: Vec<usize>,
-}
-
-/// The parts of a plan, in the order of their first vertices.
-fn parts(plan: &Plan) -> Vec<Part> {
-    let mut of: Vec<usize> = (0..plan.vertices.len()).collect();
-    let clusters = plan.clusters.len();
-    loop {
-        let mut frame: Vec<usize> = vec![usize::MAX; clusters];
-        let before = of.clone();
-        for link in &plan.links {
-            let least = of[link.from].min(of[link.to]);
-            (of[link.from], of[link.to]) = (least, least);
-        }
-        for (at, vertex) in plan.vertices.iter().enumerate() {
-            if let Some(own) = vertex.cluster.and_then(|c| frame.get_mut(c)) {
-                *own = (*own).min(of[at]);
-            }
-        }
-        for (at, vertex) in plan.vertices.iter().enumerate() {
-            if let Some(own) = vertex.cluster.and_then(|c| frame.get(c)) {
-                of[at] = of[at].min(*own);
-            }
-        }
-        if of == before {
-            break;
-        }
-    }
-    let mut roots = of.clone();
-    roots.sort_unstable();
-    roots.dedup();
-    let part = |root: usize| Part {
-        vertices: (0..of.len()).filter(|at| of[*at] == root).collect(),
-        links: (0..plan.links.len())
-            .filter(|at| of[plan.links[*at].from] == root)
-            .collect(),
-        clusters: (0..clusters)
-            .filter(|c| {
-                (0..of.len()).any(|at| of[at] == root && plan.vertices[at].cluster == Some(*c))
-            })
-            .collect(),
-    };
-    roots.into_iter().map(part).collect()
-}
-
-impl Part {
-    fn plan(&self, whole: &Plan) -> Plan {
-        let new = |old: usize| self.vertices.binary_search(&old).unwrap_or(0);
-        let mut plan = Plan::default();
-        for at in &self.vertices {
-            let mut vertex = whole.vertices[*at].clone();
-            vertex.cluster = vertex
-                .cluster
-                .and_then(|c| self.clusters.binary_search(&c).ok());
-            plan.vertices.push(vertex);
-        }
-        for at in &self.links {
-            let link = whole.links[*at];
-            plan.links.push(Link {
-                from: new(link.from),
-                to: new(link.to),
-                label: None,
-            });
-        }
-        plan.clusters = self
-            .clusters
-            .iter()
-            .map(|c| whole.clusters[*c].clone())
-            .collect();
-        plan
-    }
-
-    fn labels(&self, all: &[Vec<Size>]) -> Vec<Vec<Size>> {
-        let own = self.links.iter().filter_map(|at| all.get(*at));
-        own.cloned().collect()
-    }
 }
 
 /// Every drawing of a part that fits.
