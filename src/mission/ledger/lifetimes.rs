@@ -32,7 +32,11 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
         tell_role(told, drafts, &mut wholes, turns);
     }
     let edges = told.elements.publishes.iter().zip(&told.lives.publishes);
-    for (id, (edge, known)) in (0..).zip(edges) {
+    let recorded = |what: Element| !told.is_only_code(what);
+    for (id, (edge, known)) in (0..)
+        .zip(edges)
+        .filter(|(id, _)| recorded(Element::Publish(*id)))
+    {
         tell_edge(
             told,
             drafts,
@@ -42,7 +46,10 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
         );
     }
     let edges = told.elements.subscribes.iter().zip(&told.lives.subscribes);
-    for (id, (edge, known)) in (0..).zip(edges) {
+    for (id, (edge, known)) in (0..)
+        .zip(edges)
+        .filter(|(id, _)| recorded(Element::Subscribe(*id)))
+    {
         tell_edge(
             told,
             drafts,
@@ -51,7 +58,8 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
             (edge, known),
         );
     }
-    for (id, known) in (0..).zip(&told.lives.topics) {
+    let topics = (0..).zip(&told.lives.topics);
+    for (id, known) in topics.filter(|(id, _)| recorded(Element::Topic(*id))) {
         for (turn, at) in turns(known) {
             let mut entry = told.entry(kind(turn), Element::Topic(id), at);
             entry.part_of = wholes.topics.get(&(id, turn, at.time)).copied();
@@ -82,7 +90,8 @@ type Turns = Vec<(Stamp, Turn, NodeId, Bound)>;
 /// The turns of all nodes: of each anonymous role together; any other node is a role of its own.
 fn turns_by_role<'a>(told: &Told<'a>) -> BTreeMap<&'a str, Turns> {
     let mut all: BTreeMap<&str, Turns> = BTreeMap::new();
-    for (id, (node, known)) in (0..).zip(told.elements.nodes.iter().zip(&told.lives.nodes)) {
+    let nodes = (0..).zip(told.elements.nodes.iter().zip(&told.lives.nodes));
+    for (id, (node, known)) in nodes.filter(|(id, _)| !told.is_only_code(Element::Node(*id))) {
         let of = all.entry(&*node.role).or_default();
         of.extend(turns(known).map(|(turn, at)| (at.time, turn, id, at)));
     }

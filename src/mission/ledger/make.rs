@@ -103,6 +103,12 @@ impl Told<'_> {
         }
     }
 
+    /// Whether only source code says that there is such an element: code does not know when.
+    pub(crate) fn is_only_code(&self, what: Element) -> bool {
+        let mut words = self.elements.evidence(what).words().peekable();
+        words.peek().is_some() && words.all(|word| matches!(word, "source" | "source_only"))
+    }
+
     /// Whether an element is housekeeping or the recorder's.
     pub(crate) fn is_quiet(&self, what: Element) -> bool {
         is_housekeeping(self.elements, what)
