@@ -7,6 +7,7 @@ pub mod terminal;
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write as _;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use clap::{CommandFactory as _, Parser as _};
@@ -20,9 +21,8 @@ use crate::evidence::topology;
 use crate::export::Output;
 use crate::graph;
 use crate::graph::window::{Division, Length};
-use crate::mission::Mission;
-use crate::mission::events::{LogFormat, LogOptions, log};
 use crate::mission::info::{SurveyRow, json, survey_csv, survey_text};
+use crate::mission::{Mission, events};
 use crate::pipeline::{
     Drawing, Reading, Render, Rendered, Watch as _, explain, is_survey, read, survey,
 };
@@ -42,6 +42,23 @@ const PARTS: u32 = 32;
 /// Runs the command line `args`, the program's name first, and answers its exit code: 0 done, 1 failed, 2 usage,
 /// 3 done but data was skipped.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
+    hush();
+    // A mistake of ours is a failure, and has been told by now.
+    catch_unwind(AssertUnwindSafe(|| command(args))).unwrap_or(FAILED)
+}
+
+/// Says nothing of what `layout-rs` states by panics: they are caught, and the graph is laid out by another engine.
+fn hush() {
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let is_caught = |at: &std::panic::Location<'_>| at.file().contains("layout-rs-");
+        if !panic.location().is_some_and(is_caught) {
+            tell(panic);
+        }
+    }));
+}
+
+fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     let typed = match Typed::try_parse_from(args) {
         Ok(typed) => typed,
         Err(error) => return untyped(&error),
@@ -51,7 +68,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = match typed.command {
         Command::Render(args) => render(&args, &mut terminal),
         Command::Info(args) => info(&args, &mut terminal),
-        Command::Events(args) => events(&args, &mut terminal),
+        Command::Events(args) => log(&args, &mut terminal),
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
             let mut text = Vec::new();
@@ -292,20 +309,20 @@ fn default_output(inputs: &[Input]) -> String {
     format!("out/{}.gif", stem.replace('/', "_"))
 }
 
-fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+fn log(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     let mission = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
-    let options = LogOptions {
+    let options = events::LogOptions {
         parts: args.parts,
         all: args.all,
         phases: args.phases,
     };
     let format = match args.format {
-        EventsFormat::Text => LogFormat::Text,
-        EventsFormat::Csv => LogFormat::Csv,
-        EventsFormat::Ndjson => LogFormat::Ndjson,
-        EventsFormat::Markdown => LogFormat::Markdown,
+        EventsFormat::Text => events::LogFormat::Text,
+        EventsFormat::Csv => events::LogFormat::Csv,
+        EventsFormat::Ndjson => events::LogFormat::Ndjson,
+        EventsFormat::Markdown => events::LogFormat::Markdown,
     };
-    terminal.results(&log(&mission, format, options))?;
+    terminal.results(&events::log(&mission, format, options))?;
     terminal.notices(&mission.notices);
     Ok(code(&mission))
 }

@@ -36,7 +36,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
-        &["cluster", "collapse", "counts", "filter", "lives", "names", "runs", "settle", "union"],
+        &["cluster", "collapse", "counts", "filter", "lives", "names", "roles", "runs", "settle", "union"],
         &["options"],
         &["group", "select"],
         &["items"],
@@ -71,6 +71,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "evidence/source/qos",
             "evidence/topology",
             "export/html",
+            "mission/events",
             "mission/info",
             "mission/json",
         ],

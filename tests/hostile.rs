@@ -36,6 +36,7 @@ const PRINTING: &[&[&str]] = &[
     &["info", COURIER, "--why", "/tf"],
     &["info", concat!(env!("CARGO_MANIFEST_DIR"), "/examples")],
     &["events", COURIER],
+    &["events", COURIER, "--format", "ndjson"],
     &["styles"],
     &["styles", "light"],
     &["man"],
@@ -272,5 +273,6 @@ fn a_clock_that_is_set_late_makes_no_windows_of_fifty_years() {
     assert!(said.contains(" 6 windows of 20 s"), "{said}");
 }
 
+mod printed;
 #[cfg(unix)]
 mod unix;

@@ -219,6 +219,21 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
+/// JSON with the invisible characters of its texts as `\uXXXX`, for printing: all that JSON leaves raw stand in texts.
+pub(crate) fn visible_json(json: &str) -> String {
+    let mut out = String::with_capacity(json.len());
+    for c in json.chars() {
+        if c != '\n' && is_invisible(c) {
+            let mut units = [0; 2];
+            let units = c.encode_utf16(&mut units).iter();
+            out.extend(units.map(|unit| format!("\\u{unit:04x}")));
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
 /// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
 pub fn is_invisible(c: char) -> bool {
     c.is_control()
@@ -231,6 +246,14 @@ pub fn is_invisible(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn json_means_the_same_when_it_is_visible() {
+        let name = "/a\u{9b}2J\u{202e}\u{e0001}ß\u{1b}";
+        let shown = visible_json(&serde_json::to_string_pretty(&[name]).unwrap());
+        assert!(!shown.contains(|c| c != '\n' && is_invisible(c)), "{shown}");
+        assert_eq!(serde_json::from_str::<Vec<String>>(&shown).unwrap(), [name]);
+    }
 
     #[test]
     fn everything_is_spelled_in_one_way() {

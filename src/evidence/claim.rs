@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::io;
 use std::sync::Arc;
 
+use crate::base::budget;
 use crate::base::time::Stamp;
 use crate::evidence::texts::Texts;
 use crate::evidence::times::{SeriesId, Stamps};
@@ -174,9 +175,6 @@ pub struct EvidenceLine {
     pub text: String,
 }
 
-/// The most texts and claims kept; a bag with more is hostile, and the rest is only counted.
-const MOST: usize = 1 << 20;
-
 /// All claims of a mission.
 #[derive(Debug, Default)]
 pub(crate) struct Claims {
@@ -195,28 +193,46 @@ pub(crate) struct Claims {
     pub(crate) spoken: Texts,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
+    /// The bytes of all texts.
+    bytes: usize,
     places: HashMap<(Claim, SourceId, Option<Name>), usize>,
     pub(crate) list: Vec<ClaimRecord>,
     pub(crate) times: Stamps,
+    /// What stands for the texts that found no room.
+    overflow: Option<Name>,
     /// Claims that found no room.
     pub(crate) dropped: u64,
 }
 
 impl Claims {
-    /// The handle on a text; a text that finds no room is the empty one.
+    /// The handle on a text; the handle on nothing for one that finds no room.
     pub(crate) fn name(&mut self, text: &str) -> Name {
         if let Some(name) = self.ids.get(text) {
             return *name;
         }
-        if self.texts.len() >= MOST {
-            self.dropped += 1;
-            return self.ids.get("").copied().unwrap_or(Name(0));
+        let bytes = self.bytes.saturating_add(text.len());
+        if self.texts.len() >= budget::NAMES
+            || text.len() > budget::NAME
+            || bytes > budget::NAMES_BYTES
+        {
+            return self.overflow();
         }
         let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
+        self.bytes = bytes;
         let text: Arc<str> = text.into();
         self.texts.push(Arc::clone(&text));
         self.ids.insert(text, name);
         name
+    }
+
+    /// The handle on all texts that find no room; nothing claimed about it is kept.
+    fn overflow(&mut self) -> Name {
+        let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
+        let texts = &mut self.texts;
+        *self.overflow.get_or_insert_with(|| {
+            texts.push("".into());
+            name
+        })
     }
 
     /// The handle on a text that was seen already.
@@ -239,8 +255,8 @@ impl Claims {
         time: Option<Stamp>,
         words: impl FnOnce() -> String,
     ) {
-        if self.is_watched(said.claim.names()) && self.pieces.len() < MOST {
-            let text = words();
+        if self.is_watched(said.claim.names()) && self.pieces.len() < budget::EVIDENCE_LINES {
+            let text: String = words().chars().take(budget::EVIDENCE_LINE).collect();
             if !text.is_empty() {
                 self.pieces.push(EvidenceLine {
                     time,
@@ -284,10 +300,14 @@ impl Claims {
 
     /// Takes in that `source` claims something, at `time` if it is a matter of time.
     pub(crate) fn add(&mut self, source: SourceId, said: Statement, time: Option<Stamp>) {
+        if self.overflow.is_some() && said.claim.names().contains(&self.overflow) {
+            self.dropped += 1;
+            return;
+        }
         let key = (said.claim, source, said.snapshot);
         let place = match self.places.get(&key) {
             Some(place) => *place,
-            None if self.list.len() >= MOST => {
+            None if self.list.len() >= budget::CLAIMS => {
                 self.dropped += 1;
                 return;
             }
@@ -322,6 +342,7 @@ impl Claims {
             .iter()
             .map(|old| Arc::clone(&self.texts[*old]))
             .collect();
+        self.overflow = self.overflow.map(to);
         let names = (0..).map(Name);
         self.ids = self.texts.iter().cloned().zip(names).collect();
         for fact in &mut self.list {
@@ -345,4 +366,48 @@ pub(crate) struct Statement {
     pub(crate) claim: Claim,
     pub(crate) degree: Degree,
     pub(crate) snapshot: Option<Name>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn alive(node: Name) -> Statement {
+        Statement {
+            claim: Claim::Node(node),
+            degree: Degree::Stated,
+            snapshot: None,
+        }
+    }
+
+    #[test]
+    fn names_beyond_the_budget_are_counted_and_left_out() {
+        let mut claims = Claims::default();
+        let long = "x".repeat(budget::NAME + 1);
+        for k in 0..budget::NAMES + 10 {
+            let node = claims.name(&format!("/n{k}"));
+            claims.add(0, alive(node), None);
+        }
+        let node = claims.name(&long);
+        claims.add(0, alive(node), None);
+        assert_eq!((claims.list.len(), claims.dropped), (budget::NAMES, 11));
+        claims.renumber();
+        let node = claims.name("/one more");
+        claims.add(0, alive(node), None);
+        assert_eq!(claims.dropped, 12);
+    }
+
+    #[test]
+    fn long_names_fill_no_memory() {
+        let mut claims = Claims::default();
+        for k in 0..1000 {
+            claims.name(&format!("{k:060000}"));
+        }
+        assert!(claims.bytes <= budget::NAMES_BYTES);
+        assert!(
+            (500..600).contains(&claims.texts.len()),
+            "{}",
+            claims.texts.len()
+        );
+    }
 }

@@ -176,6 +176,15 @@ impl Collector {
             .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));
         self.notices
             .extend(publishers::judge(&mut self.streams, &self.facts));
+        if self.facts.dropped > 0 {
+            self.notices.add(Notice {
+                kind: NoticeKind::Damaged,
+                count: self.facts.dropped,
+                text:
+                    "there are more names, or longer ones, than any robot has: a claim was left out"
+                        .to_owned(),
+            });
+        }
         let mut all = Collected {
             streams: self.streams,
             messages: self.messages,

@@ -5,6 +5,7 @@
 use csv::Writer;
 
 use super::{Encoder, Written};
+use crate::base::csv::cell;
 use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
@@ -124,7 +125,7 @@ fn rows(mission: &Mission, table: &Table, sink: Sink) -> std::io::Result<Sink> {
     let mut result = Ok(());
     (table.fill)(mission, &mut |row| {
         if result.is_ok() {
-            result = writer.write_record(row);
+            result = writer.write_record(row.iter().map(|text| cell(text).into_owned()));
         }
     });
     result?;

@@ -13,6 +13,7 @@ pub use text::text;
 pub use why::why;
 
 use crate::base::name::is_recorder;
+use crate::base::words::visible_json;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, NodeId};
 use crate::mission::Mission;
@@ -222,7 +223,7 @@ fn is_ros1(mission: &Mission) -> Option<bool> {
 /// Any part of this module as JSON, ending in a new line.
 pub fn json(value: &impl Serialize) -> String {
     // Only maps with keys that are no strings fail, and there are none.
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+    visible_json(&serde_json::to_string_pretty(value).unwrap_or_default()) + "\n"
 }
 
 fn bags(mission: &Mission) -> Vec<BagInfo> {

@@ -1,6 +1,7 @@
 //! Our own form of a topology: under `nodes` each node with `publishes`, `subscribes`, and `start` and `end` in seconds
 //! after the bag's start.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::Value;
@@ -13,7 +14,7 @@ const HINT: &str =
     "write `nodes:`, then below it `/name: {publishes: [/a], subscribes: [/b], start: 0, end: 60}`";
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
-    let file = File { path, text };
+    let file = File::new(path, text);
     let data = yaml::parse(text).map_err(|e| bad(path, e.line, e.reason, HINT))?;
     let Some(Value::Object(nodes)) = data.get("nodes") else {
         return Err(file.wrong("nodes", "there is no mapping `nodes`"));
@@ -25,12 +26,25 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     Ok(topology)
 }
 
+/// How many lines that begin alike are looked at for the first of them.
+const MOST_ALIKE: usize = 100;
+
 struct File<'a> {
     path: &'a Path,
-    text: &'a str,
+    /// The start of every line, behind blanks, dashes and quotes, with the first line that has it, 1...
+    lines: BTreeMap<&'a str, usize>,
 }
 
-impl File<'_> {
+impl<'a> File<'a> {
+    fn new(path: &'a Path, text: &'a str) -> Self {
+        let mut lines = BTreeMap::new();
+        for (number, line) in (1..).zip(text.lines()) {
+            let start = line.trim_start_matches([' ', '\t', '-', '"', '\'']);
+            lines.entry(start).or_insert(number);
+        }
+        Self { path, lines }
+    }
+
     /// The error about a key, at the first line that holds it.
     fn wrong(&self, key: &str, reason: &str) -> Error {
         bad(self.path, self.line(key), reason.to_owned(), HINT)
@@ -38,12 +52,12 @@ impl File<'_> {
 
     /// The first line that begins with a key; 0 if none does.
     fn line(&self, key: &str) -> usize {
-        let begins = |line: &str| {
-            line.trim_start()
-                .trim_start_matches(['-', ' ', '"', '\''])
-                .starts_with(key)
-        };
-        self.text.lines().position(begins).map_or(0, |at| at + 1)
+        // All that begin with it stand together in the order of their text.
+        let from = self.lines.range(key..);
+        let own = from
+            .take_while(|(line, _)| line.starts_with(key))
+            .take(MOST_ALIKE);
+        own.map(|(_, number)| *number).min().unwrap_or(0)
     }
 
     fn node(&self, name: &str, value: &Value) -> Result<Vec<Entry>> {

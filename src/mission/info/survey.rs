@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::Info;
 use crate::base::csv::table;
 use crate::base::time::Stamp;
-use crate::base::words;
+use crate::base::words::{self, visible};
 
 /// A bag in a survey.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -108,16 +108,19 @@ pub fn survey_text(rows: &[SurveyRow]) -> String {
 
 fn text_row(row: &SurveyRow) -> Vec<String> {
     let (Some(info), None) = (&row.info, &row.error) else {
-        return vec![row.path.clone(), row.error.clone().unwrap_or_default()];
+        let error = row.error.as_deref().unwrap_or_default();
+        return [&row.path, error]
+            .map(|text| visible(text).into_owned())
+            .into();
     };
     let bag = info.bags.first();
     let evidence: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
     vec![
-        row.path.clone(),
+        visible(&row.path).into_owned(),
         bag.map(|b| b.format.clone()).unwrap_or_default(),
         bag.map(|b| words::bytes(b.file_bytes)).unwrap_or_default(),
         Stamp(info.start_ns).to_string().chars().take(19).collect(),
-        words::offset_seconds(info.end_ns - info.start_ns),
+        words::offset_seconds(info.end_ns.saturating_sub(info.start_ns)),
         info.messages.to_string(),
         info.topics.len().to_string(),
         info.nodes_by_degree.total().to_string(),

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Degrees, Info, NodeInfo, TopicInfo};
 use crate::base::time::Stamp;
-use crate::base::words;
+use crate::base::words::{self, visible};
 
 /// How many columns a sparkline has at most.
 const COLUMNS: usize = 32;
@@ -26,19 +26,20 @@ fn head(out: &mut String, info: &Info) -> std::fmt::Result {
         let how = bag
             .tier_reason
             .as_ref()
-            .map_or_else(String::new, |why| format!(" ({why})"));
+            .map_or_else(String::new, |why| format!(" ({})", visible(why)));
         let state = if bag.complete { "" } else { ", damaged" };
         let compression = bag.compression.join("+");
+        let compression = visible(&compression);
         writeln!(
             out,
             "{}  {} {compression}, {}, read by {}{how}{state}",
-            bag.name,
+            visible(&bag.name),
             bag.format,
             words::bytes(bag.file_bytes),
             bag.tier
         )?;
         for (key, value) in &bag.facts {
-            writeln!(out, "  {key}: {value}")?;
+            writeln!(out, "  {}: {}", visible(key), visible(value))?;
         }
     }
     let (start, end) = (Stamp(info.start_ns), Stamp(info.end_ns));
@@ -135,11 +136,13 @@ fn topics(out: &mut String, topics: &[TopicInfo]) -> std::fmt::Result {
     for topic in topics {
         let rate = topic.hz.map_or_else(String::new, words::rate);
         let types = topic.types.join(" ");
+        let types = visible(&types);
         let bars = sparkline(&topic.activity);
         writeln!(
             out,
             "  {:<width$}  {types:<kinds$}  {:>9}  {rate:>9}  {bars}",
-            topic.name, topic.count
+            visible(topic.name.as_str()),
+            topic.count
         )?;
     }
     writeln!(out)
@@ -165,7 +168,7 @@ fn nodes(out: &mut String, info: &Info) -> std::fmt::Result {
         writeln!(
             out,
             "  {:<width$}  {:<9} {span:>15}  {}",
-            node.name,
+            visible(node.name.as_str()),
             node.degree,
             load(node, info.duration_s)
         )?;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
-use crate::base::words;
+use crate::base::words::{self, visible};
 use crate::evidence::EvidenceLine;
 use crate::graph::{Edge, Element};
 use crate::mission::Mission;
@@ -34,7 +34,7 @@ pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Resu
             "{at:>12}  {:<18} {:<9} {}",
             piece.source,
             piece.degree.word(),
-            piece.text.escape_debug()
+            visible(&piece.text)
         );
     }
     Ok(out)
@@ -98,7 +98,8 @@ fn describe(
     let words: Vec<&str> = evidence.words().collect();
     writeln!(
         out,
-        "{title}\n  proved by {}; first sign {}, last sign {}",
+        "{}\n  proved by {}; first sign {}, last sign {}",
+        visible(title),
         words.join(", "),
         at(first),
         at(last)
