@@ -4,8 +4,9 @@
 //! one file below `bag/` and one row in `FORMATS`.
 
 mod adapters;
+mod chunked;
 pub(crate) mod decompress;
-mod index;
+mod deferred;
 mod input;
 mod mcap;
 mod model;
@@ -20,6 +21,7 @@ use std::path::PathBuf;
 
 use crate::base::error::Result;
 
+pub(crate) use deferred::open_each;
 pub(crate) use input::Place;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{head, place};
@@ -51,12 +53,10 @@ pub enum Kind {
 /// # Errors
 /// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`] with a hint if it is none of ours.
 pub fn sniff(input: &Input) -> Result<Kind> {
-    let Input::Path(path) = input else {
-        return Ok(Kind::Bag(&FORMATS[0]));
+    let path = match input {
+        Input::Path(path) if !input.is_pipe() => path,
+        _ => return Ok(Kind::Bag(&FORMATS[0])),
     };
-    if !path.is_dir() && !path.is_file() && path.exists() {
-        return Ok(Kind::Bag(&FORMATS[0]));
-    }
     let mut place = place(input)?;
     let head = head(&mut place)?;
     let json = head.trim_ascii_start().first() == Some(&b'{');

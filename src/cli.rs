@@ -24,7 +24,7 @@ use crate::graph::window::{Division, Length};
 use crate::mission::info::{SurveyRow, json, survey_csv, survey_text};
 use crate::mission::{Mission, events};
 use crate::pipeline::{
-    Drawing, Reading, Render, Rendered, Watch as _, explain, is_survey, read, survey,
+    Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
 };
 use args::{
     Command, EventsArgs, EventsFormat, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs,
@@ -336,13 +336,13 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
         && is_survey(input)
     {
-        let rows = survey(folder, &reading, terminal)?;
+        let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
         terminal.results(&match args.format {
             InfoFormat::Text => survey_text(&rows),
             InfoFormat::Csv => survey_csv(&rows),
             InfoFormat::Json => json(&rows),
         })?;
-        return Ok(DONE);
+        return Ok(if skipped { SKIPPED } else { DONE });
     }
     if !args.why.is_empty() {
         let mut reading = reading;

@@ -9,7 +9,7 @@ mod survey;
 pub use draw::Drawing;
 pub use export::{Render, Rendered, check, render, show};
 pub use read::{Reading, explain, read};
-pub use survey::{is_survey, survey};
+pub use survey::{Survey, is_survey, survey};
 
 /// A part of the work, as progress and timings tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -14,6 +14,7 @@ mod lives;
 mod marks;
 mod names;
 mod options;
+mod roles;
 pub mod runs;
 mod select;
 mod settle;
@@ -90,6 +91,8 @@ pub struct Item {
     pub kind: ItemKind,
     /// The full name, unique among items of its word: `/base/driver`, `/go/action_topics`, `/tf`.
     pub name: Arc<str>,
+    /// The name as it is drawn, in full: that of a node without what is new in every run.
+    pub label: Arc<str>,
     /// The nodes and topics it stands for, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
     /// The innermost namespace whose box it stands in: a place in [`View::namespaces`].

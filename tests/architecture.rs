@@ -23,7 +23,9 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
-        &["adapters", "index", "input"],
+        &["adapters", "input"],
+        &["deferred"],
+        &["chunked"],
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[

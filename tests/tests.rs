@@ -10,6 +10,7 @@
 
 mod architecture;
 mod cli;
+mod damaged;
 mod docs;
 mod edges;
 mod encode;
@@ -24,4 +25,5 @@ mod reading;
 mod ros2_example;
 mod story;
 mod support;
+mod telling;
 mod warehouse;

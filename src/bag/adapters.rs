@@ -71,6 +71,8 @@ pub(crate) struct Gather {
     runs: Vec<(Vec<Stamp>, Vec<u32>)>,
     touched: Vec<ConnectionId>,
     held: usize,
+    /// Some of it had to be handed over before its time.
+    spilled: bool,
 }
 
 /// How many stamps are gathered at most: 3 MB.
@@ -92,14 +94,68 @@ impl Gather {
         self.held += 1;
         if self.held >= MOST_GATHERED {
             self.flush(sink);
+            self.spilled = true;
         }
+    }
+
+    /// How many messages of a connection are held.
+    pub(crate) fn count(&self, id: ConnectionId) -> u64 {
+        let run = self.runs.get(id.0 as usize);
+        run.map_or(0, |run| run.0.len() as u64)
+    }
+
+    /// Whether exactly these are held of a connection, in any order.
+    pub(crate) fn holds(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
+        let held = self.runs.get(id.0 as usize).map_or(&[][..], |run| &run.0);
+        let sorted = |stamps: &[Stamp]| {
+            let mut stamps = stamps.to_vec();
+            stamps.sort_unstable();
+            stamps
+        };
+        held == stamps || held.len() == stamps.len() && sorted(held) == sorted(stamps)
+    }
+
+    /// Forgets what is held of a connection; answers how much that was, or nothing if some has been handed over.
+    pub(crate) fn take(&mut self, id: ConnectionId) -> Option<u64> {
+        if self.spilled {
+            return None;
+        }
+        let Some(run) = self.runs.get_mut(id.0 as usize) else {
+            return Some(0);
+        };
+        let held = run.0.len();
+        run.0.clear();
+        run.1.clear();
+        self.touched.retain(|touched| *touched != id);
+        self.held -= held;
+        Some(held as u64)
+    }
+
+    /// Keeps the messages whose time is right, and of those at one time one; answers how many are gone.
+    pub(crate) fn retain(&mut self, is_right: impl Fn(Stamp) -> bool) -> u64 {
+        let mut gone = 0;
+        for id in &self.touched {
+            let (stamps, sizes) = &mut self.runs[id.0 as usize];
+            let before = stamps.len();
+            let mut pairs: Vec<_> = stamps.drain(..).zip(sizes.drain(..)).collect();
+            pairs.retain(|(at, _)| is_right(*at));
+            pairs.dedup_by_key(|(at, _)| *at);
+            (*stamps, *sizes) = pairs.into_iter().unzip();
+            gone += before - stamps.len();
+        }
+        self.held -= gone;
+        gone as u64
     }
 
     /// Hands over all that was gathered, by connection.
     pub(crate) fn flush(&mut self, sink: &mut dyn Sink) {
         self.touched.sort_unstable();
+        self.spilled = false;
         for id in self.touched.drain(..) {
             let (stamps, sizes) = &mut self.runs[id.0 as usize];
+            if stamps.is_empty() {
+                continue;
+            }
             sink.stamps(id, stamps, (!self.sizeless).then_some(sizes));
             stamps.clear();
             sizes.clear();

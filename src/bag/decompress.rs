@@ -2,6 +2,10 @@
 
 use std::io::{self, Read};
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::base::budget::{UNPACKED, UNPACKED_FOLD};
 
 /// A compression that a bag may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,6 +42,14 @@ impl Compression {
         }
     }
 
+    /// The work of unpacking a byte, by the fastest. bzip2 takes that many times as long, even for zeros.
+    fn cost(self) -> u64 {
+        match self {
+            Self::Bz2 => 16,
+            Self::None | Self::Lz4 | Self::Zstd => 1,
+        }
+    }
+
     /// A reader of what `from` holds compressed. Memory: at most 4 MiB per LZ4 block, 8 MiB per Zstandard window.
     ///
     /// # Errors
@@ -59,37 +71,87 @@ impl Compression {
     }
 }
 
-/// How much may be unpacked of one bag, so that a small file cannot keep a reader busy for hours.
+/// How much may be unpacked of one bag, wherever it is unpacked, so that a small file cannot keep a reader busy for
+/// hours. Shared by threads; which of them first meets the end of a bomb's allowance is chance.
 #[derive(Debug, Default)]
 pub(crate) struct Allowance {
-    spent: u64,
+    packed: AtomicU64,
+    plain: AtomicU64,
 }
 
 impl Allowance {
-    /// What may still be unpacked, in bytes, when `packed` bytes have been read: 4 GiB, and a thousand for each.
-    pub(crate) fn left(&self, packed: u64) -> u64 {
-        let all = packed.saturating_mul(1000).saturating_add(4 << 30);
-        all.saturating_sub(self.spent)
+    /// A reader of what `from` holds compressed, which fails once the allowance is spent.
+    ///
+    /// # Errors
+    /// As [`Compression::reader`].
+    pub(crate) fn open<'a>(
+        self: &Arc<Self>,
+        how: Compression,
+        from: impl Read + Send + 'a,
+    ) -> io::Result<Box<dyn Read + Send + 'a>> {
+        let packed = Counted {
+            from,
+            allowance: Arc::clone(self),
+            spends: None,
+        };
+        Ok(Box::new(Counted {
+            from: how.reader(packed)?,
+            allowance: Arc::clone(self),
+            spends: Some(how.cost()),
+        }))
     }
 
-    /// Takes note that `plain` bytes were unpacked.
-    pub(crate) fn spend(&mut self, plain: u64) {
-        self.spent = self.spent.saturating_add(plain);
+    fn spend(&self, work: u64) -> io::Result<()> {
+        let spent = self
+            .plain
+            .fetch_add(work, Ordering::Relaxed)
+            .saturating_add(work);
+        let packed = self.packed.load(Ordering::Relaxed);
+        if spent
+            > packed
+                .saturating_mul(UNPACKED_FOLD)
+                .saturating_add(UNPACKED)
+        {
+            return Err(io::Error::other(UNFOLDS));
+        }
+        Ok(())
+    }
+}
+
+/// Counts what is read.
+struct Counted<R> {
+    from: R,
+    allowance: Arc<Allowance>,
+    /// What a byte costs of the allowance; `None` for packed bytes, which add to it.
+    spends: Option<u64>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let n = self.from.read(into)?;
+        match self.spends {
+            Some(cost) => self.allowance.spend(cost * n as u64)?,
+            None => drop(self.allowance.packed.fetch_add(n as u64, Ordering::Relaxed)),
+        }
+        Ok(n)
     }
 }
 
 /// What is said of a bag that spent its [`Allowance`].
-pub(crate) const UNFOLDS: &str =
-    "a chunk was left out: the bag unfolds to more than a thousand times its size";
+const UNFOLDS: &str = "the bag unfolds to far more than its size";
 
 /// The largest look-back that a Zstandard frame may ask for, as a power of two: 8 MiB, what every decoder must offer.
 const LARGEST_WINDOW: u32 = 23;
 
 /// The whole of one Zstandard frame of at most `limit` bytes, such as a payload that rosbag2 compressed by itself.
 /// `None` if it is damaged or larger.
-pub(crate) fn zstd_payload(bytes: &[u8], limit: usize) -> Option<Vec<u8>> {
+pub(crate) fn zstd_payload(
+    bytes: &[u8],
+    limit: usize,
+    allowance: &Arc<Allowance>,
+) -> Option<Vec<u8>> {
     let mut out = Vec::new();
-    let reader = Compression::Zstd.reader(bytes).ok()?;
+    let reader = allowance.open(Compression::Zstd, bytes).ok()?;
     let most = u64::try_from(limit).ok()?.saturating_add(1);
     reader.take(most).read_to_end(&mut out).ok()?;
     (out.len() <= limit).then_some(out)
@@ -260,8 +322,9 @@ mod tests {
     #[test]
     fn a_payload_larger_than_its_limit_is_refused() {
         let bomb = packed(Compression::Zstd, &vec![0; 1 << 24]);
-        assert_eq!(zstd_payload(&bomb, 1 << 20), None);
-        assert_eq!(zstd_payload(&bomb, 1 << 24).map(|b| b.len()), Some(1 << 24));
-        assert_eq!(zstd_payload(b"not a frame", 100), None);
+        let payload = |bytes, limit| zstd_payload(bytes, limit, &Arc::default());
+        assert_eq!(payload(&bomb, 1 << 20), None);
+        assert_eq!(payload(&bomb, 1 << 24).map(|b| b.len()), Some(1 << 24));
+        assert_eq!(payload(b"not a frame", 100), None);
     }
 }

@@ -18,6 +18,14 @@ pub enum Input {
 }
 
 impl Input {
+    /// Whether it can be read only once: standard input, a named pipe, a device.
+    pub fn is_pipe(&self) -> bool {
+        match self {
+            Self::Path(path) => path.exists() && !path.is_file() && !path.is_dir(),
+            Self::Stdin => true,
+        }
+    }
+
     /// The bag's own name, no path.
     pub fn name(&self) -> String {
         match self {

@@ -1,28 +1,27 @@
-//! MCAP files: by the summary and the message indexes, else record by record.
+//! The grammar of MCAP files.
 //!
-//! The format: <https://mcap.dev/spec>. The files `mcap_*.rs` are parts of this one.
+//! The format: <https://mcap.dev/spec>.
 
-mod chunk;
-mod forward;
 mod records;
 mod summary;
 mod verify;
 
-use std::collections::BTreeSet;
+use std::collections::HashMap;
+use std::io;
 use std::path::Path;
 
-use crate::bag::adapters::{Clip, GROUP, in_order};
-use crate::bag::decompress::Compression;
-use crate::bag::index::threads;
-use crate::bag::input::{FormatRow, Medium, Place, file_name};
-use crate::bag::model::{OpenOptions, Reader, Report, Sink, Tier};
-use crate::bag::source::{FAR, NEAR, Source, Stream};
-use crate::base::error::{Error, Result};
-use crate::base::notice::{Notice, NoticeKind};
-use crate::base::time::Span;
-use chunk::Chunk;
-use records::{Cursor, MAGIC, op};
-use summary::{Summary, Unindexed};
+use mcap::MAGIC;
+use mcap::records::{Record as Parsed, op};
+
+use crate::bag::chunked::{
+    self, Connections, Grammar, Index, IndexSum, Plan, Record, Stop, Unindexed, Verified,
+};
+use crate::bag::input::{FormatRow, Medium};
+use crate::bag::model::{Connection, Sink};
+use crate::bag::source::{Source, Stream};
+use crate::base::error::Result;
+use crate::base::time::Stamp;
+use records::{Cursor, Schema};
 
 /// MCAP files.
 pub(crate) const FORMAT: FormatRow = FormatRow {
@@ -31,175 +30,125 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     extensions: &["mcap"],
     medium: Medium::Stream,
     sniff: |_, head| head.starts_with(MAGIC),
-    open,
+    open: chunked::open::<Mcap>,
 };
 
-/// A file, with its summary if that can be relied on.
-struct Indexed {
-    source: Source,
-    summary: Result<Summary, Unindexed>,
-    facts: Vec<(String, String)>,
-    verify: bool,
+/// Remembers schemas, which channels refer to.
+#[derive(Default)]
+struct Mcap {
+    schemas: HashMap<u16, Schema>,
+    held: usize,
 }
 
-/// A file from a pipe.
-struct Piped {
-    name: String,
-    stream: Stream<'static>,
+/// The two kinds of records that describe a connection.
+#[derive(Clone, Copy)]
+enum Described {
+    Schema,
+    Channel,
 }
 
-fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
-    match place {
-        Place::File(source) => {
-            let summary = summary::of(&source).map_err(Error::io("read", source.path()))?;
-            let facts = facts(&source);
-            Ok(Box::new(Indexed {
-                source,
-                summary,
-                facts,
-                verify: options.verify,
-            }))
-        }
-        Place::Pipe(name, stream) => Ok(Box::new(Piped { name, stream })),
-        Place::Folder(path) => Err(super::explain(&path, &[], true)),
+impl Grammar for Mcap {
+    const NAME: &'static str = FORMAT.name;
+    const INDEX_IS_GUESSED: bool = false;
+    const HAS_END: bool = true;
+    const CLOSING: &'static [u8] = MAGIC;
+    type Description = Described;
+
+    fn accept(_path: &Path, _head: &[u8]) -> Result<()> {
+        Ok(())
     }
-}
 
-/// What the file's header says of itself.
-fn facts(source: &Source) -> Vec<(String, String)> {
-    let mut stream = Stream::of_file(source, MAGIC.len() as u64, source.len(), NEAR);
-    let Ok(Some((op::HEADER, len))) = records::next(&mut stream) else {
-        return Vec::new();
-    };
-    let Ok(Some(record)) = records::whole(&mut stream, len) else {
-        return Vec::new();
-    };
-    let mut cursor = Cursor(record);
-    let values = [("profile", cursor.text()), ("library", cursor.text())];
-    let known = values
-        .into_iter()
-        .filter_map(|(name, value)| Some((name.to_owned(), value?)));
-    known.filter(|(_, value)| !value.is_empty()).collect()
-}
+    fn begin(stream: &mut Stream<'_>) {
+        if stream.peek(MAGIC.len()).is_ok() {
+            stream.advance(MAGIC.len());
+        }
+    }
 
-impl Reader for Indexed {
-    fn span(&mut self) -> Result<Option<Span>> {
-        Ok(self
-            .summary
-            .as_ref()
+    fn next(stream: &mut Stream<'_>) -> Result<Record<Described>, Stop> {
+        records::next(stream)
+    }
+
+    fn describe(
+        &mut self,
+        what: &Described,
+        data: &[u8],
+        known: &Connections,
+    ) -> Option<(u32, Connection)> {
+        match what {
+            Described::Schema => {
+                records::schema(self, data);
+                None
+            }
+            Described::Channel => records::channel(self, data, known),
+        }
+    }
+
+    fn is_chunk(bytes: &[u8]) -> bool {
+        records::is_chunk(bytes)
+    }
+
+    fn index(bytes: &[u8], promised: &IndexSum) -> Option<Index> {
+        let mut found = IndexSum::default();
+        let mut index = Index::default();
+        let mut rest = Cursor(bytes);
+        // The crate reads these into a vector of pairs each, which takes several times as long.
+        while let Some(kind) = rest.u8() {
+            let len = usize::try_from(rest.u64()?).ok()?;
+            let (record, after) = rest.0.split_at_checked(len)?;
+            rest = Cursor(after);
+            if kind != op::MESSAGE_INDEX {
+                continue;
+            }
+            let mut cursor = Cursor(record);
+            let channel = u32::from(cursor.u16()?);
+            let entries = cursor.bytes()?.chunks_exact(records::ENTRY);
+            found.add(channel, u32::try_from(entries.len()).ok()?);
+            index.add(channel, entries.filter_map(entry));
+        }
+        (found == *promised).then_some(index)
+    }
+
+    fn index_stamps(data: &[u8]) -> Vec<Stamp> {
+        let entries = data.get(6..).unwrap_or_default();
+        let entries = entries.chunks_exact(records::ENTRY);
+        entries.filter_map(|e| Some(entry(e)?.0)).collect()
+    }
+
+    fn plan(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
+        summary::read(source)
+    }
+
+    /// What the file's header says of itself.
+    fn facts(head: &[u8]) -> Vec<(String, String)> {
+        let mut cursor = Cursor(head.get(MAGIC.len()..).unwrap_or_default());
+        let (kind, len) = (cursor.u8(), cursor.u64().unwrap_or(0));
+        let record = usize::try_from(len)
             .ok()
-            .and_then(|s| s.span(&self.source)))
-    }
-
-    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
-        let mut sink = Clip::new(range, sink);
-        let report = match &self.summary {
-            _ if self.verify => by_the_crate(&self.source, &mut sink),
-            Ok(summary) => by_index(&self.source, summary, range, &mut sink),
-            Err(reason) => from_the_front(&self.source, reason, &mut sink),
+            .and_then(|len| cursor.0.get(..len));
+        let (Some(op::HEADER), Some(record)) = (kind, record) else {
+            return Vec::new();
         };
-        Ok(Report {
-            bytes_read: self.source.bytes_read(),
-            file_bytes: self.source.len(),
-            facts: self.facts.clone(),
-            ..report
-        })
+        let Ok(Parsed::Header(header)) = mcap::parse_record(op::HEADER, record) else {
+            return Vec::new();
+        };
+        let known = [("profile", header.profile), ("library", header.library)];
+        let known = known.into_iter().filter(|(_, value)| !value.is_empty());
+        known
+            .map(|(name, value)| (name.to_owned(), value))
+            .collect()
     }
-}
 
-/// What every report of this format begins with.
-fn report(name: String, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
-    Report {
-        name,
-        format: FORMAT.name.to_owned(),
-        compression: compression.iter().map(|c| c.word().to_owned()).collect(),
-        tier,
-        tier_reason: None,
-        complete: true,
-        bytes_read: 0,
-        file_bytes: 0,
-        facts: Vec::new(),
-    }
-}
-
-fn by_index(
-    source: &Source,
-    summary: &Summary,
-    range: Option<Span>,
-    sink: &mut Clip<'_>,
-) -> Report {
-    let wants: Vec<_> = summary
-        .table
-        .list()
-        .iter()
-        .map(|c| sink.connection(c))
-        .collect();
-    let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
-    let chunks: Vec<&Chunk> = summary.chunks.iter().filter(inside).collect();
-    let resolve = |raw| summary.resolve(raw);
-    let reader = summary::reader(source, &resolve, &wants, range);
-    let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
-    let work = |at: usize, sink: &mut dyn Sink| {
-        for chunk in groups[at] {
-            reader.read(chunk, sink);
+    /// The crate reads from the front, with or without a summary.
+    fn verify(source: &Source, _plan: &Result<Plan, Unindexed>, sink: &mut dyn Sink) -> Verified {
+        Verified {
+            stopped: verify::read(source, sink).err(),
+            ..Verified::default()
         }
-    };
-    let total = groups.len() as u64;
-    let threads = threads(chunks.len(), summary.longest_index());
-    in_order(groups.len(), threads, &work, sink, |at, sink| {
-        sink.progress(at as u64 + 1, total);
-    });
-    let samples = [chunks.first(), chunks.get(chunks.len() / 2), chunks.last()];
-    let samples = samples.into_iter().flatten();
-    let compression = samples
-        .filter_map(|c| Some(reader.body(c).ok()??.how))
-        .collect();
-    Report {
-        complete: !sink.lost,
-        ..report(file_name(source.path()), Tier::Index, &compression)
     }
 }
 
-/// Everything, by the crate `mcap`.
-fn by_the_crate(source: &Source, sink: &mut Clip<'_>) -> Report {
-    let mut stream = Stream::of_file(source, 0, source.len(), FAR);
-    let stopped = verify::read(&mut stream, sink).err();
-    Report {
-        complete: stopped.is_none() && !sink.lost,
-        tier_reason: stopped.map(|why| format!("the second reader stopped: {why}")),
-        ..report(file_name(source.path()), Tier::Verify, &BTreeSet::new())
-    }
-}
-
-fn from_the_front(source: &Source, reason: &Unindexed, sink: &mut dyn Sink) -> Report {
-    let text = format!("read from the front, since {}", reason.0);
-    sink.notice(Notice::new(NoticeKind::Downgraded, text));
-    let mut stream = Stream::of_file(source, MAGIC.len() as u64, source.len(), FAR);
-    let found = forward::read(&mut stream, source.len(), sink);
-    Report {
-        complete: found.complete,
-        tier_reason: Some(reason.0.clone()),
-        ..report(file_name(source.path()), Tier::Forward, &found.compression)
-    }
-}
-
-impl Reader for Piped {
-    fn span(&mut self) -> Result<Option<Span>> {
-        Ok(None)
-    }
-
-    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
-        let name = self.name.clone();
-        self.stream
-            .peek(MAGIC.len())
-            .map_err(Error::io("read", Path::new(&name)))?;
-        self.stream.advance(MAGIC.len());
-        let found = forward::read(&mut self.stream, 0, &mut Clip::new(range, sink));
-        Ok(Report {
-            complete: found.complete,
-            tier_reason: Some("a pipe has no index".to_owned()),
-            bytes_read: self.stream.position(),
-            ..report(name, Tier::Forward, &found.compression)
-        })
-    }
+/// The time and the offset in an entry of a message index.
+fn entry(bytes: &[u8]) -> Option<(Stamp, u64)> {
+    let mut cursor = Cursor(bytes);
+    Some((Stamp::from_nanos(cursor.u64()?), cursor.u64()?))
 }

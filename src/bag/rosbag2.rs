@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::bag::deferred::open_each;
 use crate::bag::input::{FormatRow, Input, Medium, Place, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
@@ -24,13 +25,13 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     extensions: &[],
     medium: Medium::Folder,
     sniff: |place, _| match place {
-        Place::Folder(path) => path.join("metadata.yaml").is_file() || !storage(path).is_empty(),
+        Place::Folder(path) => path.join("metadata.yaml").is_file() || holds_storage(path),
         _ => false,
     },
     open,
 };
 
-/// A folder's storage files, open.
+/// A folder's storage files.
 struct Folder {
     name: String,
     parts: Vec<Box<dyn Reader>>,
@@ -63,8 +64,9 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         ),
     }
     let mut failed = None;
-    for file in folder.files(&path) {
-        match super::open(&Input::Path(file.clone()), options) {
+    let files = folder.files(&path).into_iter().map(Input::Path);
+    for part in open_each(files, options) {
+        match part {
             Ok(reader) => folder.parts.push(reader),
             Err(e) => {
                 folder.say(NoticeKind::Damaged, format!("a part was left out: {e}"));
@@ -79,13 +81,9 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     }
 }
 
-/// The storage files in a folder, in the order of their numbers.
+/// The storage files in a folder, in the order of their numbers, without links out of it.
 fn storage(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = folder.read_dir() else {
-        return Vec::new();
-    };
-    let files = entries.filter_map(|e| Some(e.ok()?.path()));
-    let mut files: Vec<PathBuf> = files.filter(|p| is_storage(p) && p.is_file()).collect();
+    let (mut files, _) = storage_and_links(folder);
     files.sort_by_cached_key(|p| {
         let name = file_name(p);
         let stem = name.split('.').next().unwrap_or_default();
@@ -94,6 +92,22 @@ fn storage(folder: &Path) -> Vec<PathBuf> {
     });
     files.truncate(MOST_FILES);
     files
+}
+
+/// Whether a folder holds storage files, or links to some.
+fn holds_storage(folder: &Path) -> bool {
+    let (files, links) = storage_and_links(folder);
+    !(files.is_empty() && links.is_empty())
+}
+
+/// The storage files in a folder, and what looks like one but is a link out of it.
+fn storage_and_links(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    let Ok(entries) = folder.read_dir() else {
+        return (Vec::new(), Vec::new());
+    };
+    let files = entries.filter_map(|e| Some(e.ok()?.path()));
+    let files = files.filter(|p| is_storage(p) && p.is_file());
+    files.partition(|file| metadata::is_inside(folder, file))
 }
 
 impl Folder {
@@ -143,7 +157,12 @@ impl Folder {
 
     /// The error for a folder of which no file is there.
     fn nothing(&self, path: &Path) -> Error {
-        let said: Vec<&str> = self.notices.iter().map(|n| n.text.as_str()).collect();
+        let mut said: Vec<String> = self.notices.iter().map(|n| n.text.clone()).collect();
+        if said.is_empty() {
+            let (_, links) = storage_and_links(path);
+            let names = links.iter().filter_map(|link| link.file_name());
+            said.extend(names.map(|name| metadata::leads_out(&name.to_string_lossy())));
+        }
         if said.is_empty() {
             return explain(path, &[], true);
         }

@@ -99,7 +99,11 @@ impl Temporary {
     /// # Errors
     /// The system's refusal.
     pub(crate) fn new() -> Result<Self> {
-        let folder = tempfile::tempdir();
+        let mut builder = tempfile::Builder::new();
+        // What is copied here may be private where it comes from.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
+        let folder = builder.tempdir();
         let folder = folder.map_err(Error::io("make a folder in", &std::env::temp_dir()))?;
         Ok(Self {
             _left: Leftover::at(folder.path()),
@@ -173,6 +177,14 @@ impl<'a> Stream<'a> {
         }
         let end = self.buffer.len().min(self.used + n);
         Ok(&self.buffer[self.used..end])
+    }
+
+    /// How many bytes follow, if that is known without reading on.
+    pub(crate) fn left(&self) -> Option<u64> {
+        match self.from {
+            From::File { end, .. } => Some(end.saturating_sub(self.at)),
+            From::Reader(_) => None,
+        }
     }
 
     /// All that has been read ahead and not taken.
@@ -264,6 +276,15 @@ fn read_some(reader: &mut dyn Read, into: &mut [u8]) -> io::Result<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn what_is_unpacked_is_for_its_owner_alone() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = Temporary::new().unwrap();
+        let mode = folder.path().metadata().unwrap().permissions().mode();
+        assert_eq!(mode & 0o077, 0, "{mode:o}");
+    }
 
     #[test]
     fn a_stream_peeks_takes_and_skips_the_same_from_a_file_and_a_reader() {

@@ -16,6 +16,7 @@ use crate::bag::input::{FormatRow, Medium, Place, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
+use crate::bag::source::Source;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
@@ -38,6 +39,8 @@ struct Bag {
     path: PathBuf,
     file_bytes: u64,
     ready: Ready,
+    /// What was wrong when it was opened.
+    notices: Vec<Notice>,
     topics: Vec<Connection>,
     ids: HashMap<i64, ConnectionId>,
     /// Payloads are Zstandard frames, so their lengths are not those of the messages.
@@ -59,12 +62,25 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         }
     };
     let path = source.path().to_owned();
-    let ready = place::ready(&path)?;
+    let mut ready = place::ready(&path)?;
+    let mut notices = Vec::new();
+    if let Some(text) = cut(&source).filter(|_| !ready.is_copy()) {
+        notices.push(Notice::new(NoticeKind::Truncated, text));
+        ready.damaged = true;
+    }
     let broken = |e: Refusal| broken(&path, &e);
-    let db = Db::open(&ready).map_err(broken)?;
-    need(&db, &path, "messages", &["topic_id", "timestamp", "data"])?;
-    let columns = need(&db, &path, "topics", &["id", "name", "type"])?;
+    let mut tables = tables(&ready, &path);
+    if let Err(Error::Malformed { expected, .. }) = &tables
+        && !ready.damaged
+    {
+        let text = format!("the database is damaged: not {expected}");
+        notices.push(Notice::new(NoticeKind::Damaged, text));
+        ready.damaged = true;
+        tables = self::tables(&ready, &path).or(tables);
+    }
+    let (db, columns) = tables?;
     let mut bag = Bag {
+        notices,
         file_bytes: source.len(),
         topics: Vec::new(),
         ids: HashMap::new(),
@@ -76,6 +92,37 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     };
     bag.read_topics(&db, &columns).map_err(broken)?;
     Ok(Box::new(bag))
+}
+
+/// The database, and the columns of its table of topics.
+fn tables(ready: &Ready, path: &Path) -> Result<(Db, Vec<String>)> {
+    let db = Db::open(ready).map_err(|e| broken(path, &e))?;
+    need(&db, path, "messages", &["topic_id", "timestamp", "data"])?;
+    let columns = need(&db, path, "topics", &["id", "name", "type"])?;
+    Ok((db, columns))
+}
+
+/// Says so if the file is shorter than its own head has it.
+///
+/// The head: <https://www.sqlite.org/fileformat2.html>, sections 1.3.2 and 1.3.7.
+fn cut(source: &Source) -> Option<String> {
+    let mut head = [0; 100];
+    source.read_at(0, &mut head).ok().filter(|n| *n == 100)?;
+    let number = |at: usize| {
+        head.get(at..at + 4)?
+            .try_into()
+            .ok()
+            .map(u32::from_be_bytes)
+    };
+    let page = match u16::from_be_bytes([head[16], head[17]]) {
+        1 => 65_536,
+        size => u64::from(size),
+    };
+    // The count of pages is only right if the last writer knew of it.
+    let pages = number(28).filter(|_| number(24) == number(92))?;
+    let whole = page * u64::from(pages);
+    let is = source.len();
+    (is < whole).then(|| format!("the database is cut at byte {is} of {whole}"))
 }
 
 fn broken(path: &Path, why: &Refusal) -> Error {
@@ -106,7 +153,8 @@ fn need(db: &Db, path: &Path, table: &str, names: &[&str]) -> Result<Vec<String>
 }
 
 fn has(columns: &[String], names: &[&str]) -> bool {
-    names.iter().all(|n| columns.iter().any(|c| c == n))
+    let is = |name: &str| columns.iter().any(|c| c.eq_ignore_ascii_case(name));
+    names.iter().all(|name| is(name))
 }
 
 /// More topics than this are not kept; real bags stay below 1,000.
@@ -270,6 +318,7 @@ impl Reader for Bag {
             let text = "the newest rows lie in a log beside the bag that is too large to copy";
             clip.notice(Notice::new(NoticeKind::Damaged, text));
         }
+        self.notices.iter().for_each(|n| clip.notice(n.clone()));
         let db = Db::open(&self.ready).map_err(|e| broken(&self.path, &e))?;
         if self.verify {
             check(&db, &mut clip);

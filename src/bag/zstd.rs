@@ -3,9 +3,10 @@
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::bag::FORMATS;
-use crate::bag::decompress::Compression;
+use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::input::{FormatRow, HEAD, Medium, Place, file_name};
 use crate::bag::model::{OpenOptions, Reader, Report, Sink};
 use crate::bag::source::{Source, Stream, Temporary};
@@ -51,7 +52,8 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     };
     let path = Path::new(&name);
     let fail = || Error::io("decompress", path);
-    let plain = Compression::Zstd.reader(packed).map_err(fail())?;
+    let allowance: Arc<Allowance> = Arc::default();
+    let plain = allowance.open(Compression::Zstd, packed).map_err(fail())?;
     let mut stream = Stream::of_reader(plain);
     let head = stream.peek(HEAD).map_err(fail())?.to_vec();
     let inside = |row: &&FormatRow| {

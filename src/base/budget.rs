@@ -49,3 +49,9 @@ pub(crate) const EVIDENCE_LINE: usize = 500;
 
 /// How much of what a child process says is kept, in bytes: its last words.
 pub(crate) const LAST_WORDS: usize = 1 << 16;
+
+/// How much may be unpacked of any bag, in bytes: seconds of work.
+pub(crate) const UNPACKED: u64 = 4 << 30;
+
+/// How many bytes more for each byte of packed data that was read for it; real bags fold their data ten times.
+pub(crate) const UNPACKED_FOLD: u64 = 1000;

@@ -18,7 +18,7 @@ pub enum NoticeKind {
     Playback,
     /// A payload that does not have the layout its type promises.
     Undecodable,
-    /// Messages set aside because their time is impossible.
+    /// Messages set aside because their time is impossible. The command exits 3: they are in no count.
     ImpossibleTime,
     /// Something that the picture leaves out or collapses, and how to see it.
     Hidden,
@@ -33,7 +33,7 @@ pub enum NoticeKind {
 impl NoticeKind {
     /// Whether data was skipped, so that the command exits 3.
     pub fn is_loss(self) -> bool {
-        matches!(self, Self::Damaged | Self::Truncated)
+        matches!(self, Self::Damaged | Self::Truncated | Self::ImpossibleTime)
     }
 
     const ALL: [Self; 11] = [

@@ -18,15 +18,17 @@ impl Stamp {
     pub const MIN: Self = Self(i64::MIN);
     /// The latest stamp that can be held.
     pub const MAX: Self = Self(i64::MAX);
+    /// The latest stamp of a message: a half-open interval can still end behind it.
+    pub const LAST: Self = Self(i64::MAX - 1);
 
     /// The stamp of a ROS time, `secs` since 1970 and `nanos` on top (0.. ; values of a second or more carry over).
     pub const fn from_ros(secs: u32, nanos: u32) -> Self {
         Self(secs as i64 * SECOND + nanos as i64)
     }
 
-    /// The stamp of an unsigned nanosecond count as MCAP writes it; past the year 2262 it stays at [`Stamp::MAX`].
+    /// The stamp of an unsigned nanosecond count as MCAP writes it; past the year 2262 it stays at [`Stamp::LAST`].
     pub fn from_nanos(nanos: u64) -> Self {
-        Self(i64::try_from(nanos).unwrap_or(i64::MAX))
+        Self(i64::try_from(nanos).unwrap_or(i64::MAX)).min(Self::LAST)
     }
 
     /// `nanos` later (earlier if negative), held at the ends of the range.

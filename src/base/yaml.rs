@@ -37,8 +37,18 @@ pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
         line: e
             .location()
             .map_or(0, |l| usize::try_from(l.line()).unwrap_or(0)),
-        reason: e.to_string().lines().next().unwrap_or_default().to_owned(),
+        reason: reason(&e),
     })
+}
+
+/// The parser's words, but for its own limits, whose names mean nothing to anybody else.
+fn reason(error: &serde_saphyr::Error) -> String {
+    let text = error.to_string();
+    let first = text.lines().next().unwrap_or_default();
+    if first.contains("budget") {
+        return "it holds too many values, or nests them too deep".to_owned();
+    }
+    first.to_owned()
 }
 
 #[cfg(test)]
@@ -75,5 +85,11 @@ mod tests {
         }
         assert!(parse(&text).is_err());
         assert!(parse(&"[".repeat(100_000)).is_err());
+    }
+
+    #[test]
+    fn a_document_past_the_limits_is_refused_in_words_of_ours() {
+        let many = parse(&format!("[{}]", "a, ".repeat(400_000))).unwrap_err();
+        assert!(many.reason.contains("too many values"), "{many:?}");
     }
 }

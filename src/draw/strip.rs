@@ -401,6 +401,7 @@ mod tests {
         let item = |(id, name): (u32, &str)| Item {
             kind: ItemKind::Node,
             name: Arc::from(name),
+            label: Arc::from(name),
             members: vec![Element::Node(id)],
             cluster: None,
         };

@@ -141,6 +141,10 @@ pub(crate) struct Findings<'a> {
     pub(crate) copies: BTreeSet<(Name, Name)>,
     /// The mission's first and last moment.
     pub(crate) mission: (Stamp, Stamp),
+    /// The streams of each topic.
+    recorded: BTreeMap<Name, Vec<usize>>,
+    /// How many publishers each topic had when its recording began.
+    offers: BTreeMap<Name, u32>,
     /// Why times could not be read, if so.
     pub(crate) failed: Option<io::Error>,
     publishers: BTreeMap<Name, BTreeSet<Name>>,
@@ -155,8 +159,14 @@ impl<'a> Findings<'a> {
         facts: &'a mut Claims,
         mission: (Stamp, Stamp),
     ) -> Self {
+        let mut recorded: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        for (at, stream) in streams.iter().enumerate() {
+            recorded.entry(stream.topic).or_default().push(at);
+        }
         Self {
             mission,
+            recorded,
+            offers: offers(&facts.offers, streams),
             streams,
             facts,
             proofs: Vec::new(),
@@ -241,8 +251,8 @@ impl<'a> Findings<'a> {
         if self.knows(what) || self.denies(what) {
             return;
         }
-        for (at, stream) in self.streams.iter().enumerate() {
-            if stream.topic == topic && stream.publisher.is_none() {
+        for at in self.recorded.get(&topic).cloned().unwrap_or_default() {
+            if self.streams[at].publisher.is_none() {
                 let proof = Proof {
                     what,
                     source,
@@ -277,20 +287,21 @@ impl<'a> Findings<'a> {
 
     /// Whether a bag has a connection of this topic, be it without messages.
     pub(crate) fn is_recorded(&self, topic: Name) -> bool {
-        self.streams.iter().any(|s| s.topic == topic)
+        self.recorded.contains_key(&topic)
     }
 
     /// The type of a recorded topic as ROS 1 writes it, without `/msg`; empty if no bag tells it.
     pub(crate) fn kind(&self, topic: Name) -> String {
-        let stream = self.streams.iter().find(|s| s.topic == topic);
-        stream.map_or_else(String::new, |s| {
-            s.connection.type_name.replacen("/msg/", "/", 1)
+        let first = self.recorded.get(&topic).and_then(|all| all.first());
+        first.map_or_else(String::new, |at| {
+            let kind = &self.streams[*at].connection.type_name;
+            kind.replacen("/msg/", "/", 1)
         })
     }
 
     /// How many publishers a topic had when its recording began; `None` if the bag does not tell.
     pub(crate) fn offers(&self, topic: Name) -> Option<u32> {
-        offered(&self.facts.offers, self.streams, topic)
+        self.offers.get(&topic).copied()
     }
 
     /// The known node that a logger belongs to: the one of its name, or the nearest above it.
@@ -507,15 +518,16 @@ impl<'a> Findings<'a> {
     }
 }
 
-/// How many publishers were offered on a topic, at most in one bag.
-pub(crate) fn offered(
-    offers: &BTreeMap<usize, u32>,
-    streams: &[Stream],
-    topic: Name,
-) -> Option<u32> {
-    let of_topic = |at: &usize| streams.get(*at).is_some_and(|s| s.topic == topic);
-    let counts = offers.iter().filter(|(at, _)| of_topic(at));
-    counts.map(|(_, count)| *count).max()
+/// How many publishers each topic was offered by, at most in one bag.
+pub(crate) fn offers(of_streams: &BTreeMap<usize, u32>, streams: &[Stream]) -> BTreeMap<Name, u32> {
+    let mut offers: BTreeMap<Name, u32> = BTreeMap::new();
+    for (at, count) in of_streams {
+        if let Some(stream) = streams.get(*at) {
+            let most = offers.entry(stream.topic).or_default();
+            *most = (*most).max(*count);
+        }
+    }
+    offers
 }
 
 /// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.

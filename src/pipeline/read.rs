@@ -58,11 +58,27 @@ impl Default for Reading {
 /// # Errors
 /// Where an input cannot be read at all or none holds a message, and for times that make no sense.
 pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
+    if reading.verify
+        && let Some(pipe) = reading.inputs.iter().find(|input| input.is_pipe())
+    {
+        let what = format!(
+            "`--verify` reads a bag twice, and {} only gives it once",
+            pipe.name()
+        );
+        return Err(Error::usage(what, "save the bag in a file first"));
+    }
     let (mut mission, _) = explain(reading, watch)?;
     if reading.verify && mission_file(&reading.inputs)?.is_none() {
         watch.stage(Stage::Verify);
-        let second = build(&mut Recorded::read(reading, true, watch)?, reading, watch)?;
-        compare(&mut mission, &second);
+        let second = Recorded::read(reading, true, watch);
+        match second.and_then(|mut second| build(&mut second, reading, watch)) {
+            Ok(second) => compare(&mut mission, &second),
+            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(why) => {
+                let text = format!("the bag could not be verified: {why}");
+                mission.notices.add(Notice::new(NoticeKind::Damaged, text));
+            }
+        }
     }
     Ok(mission)
 }
@@ -127,11 +143,8 @@ impl Recorded {
     /// Reads every bag once.
     fn read(reading: &Reading, verify: bool, watch: &mut dyn Watch) -> Result<Self> {
         let options = OpenOptions { verify };
-        let mut readers = reading
-            .inputs
-            .iter()
-            .map(|i| bag::open(i, &options))
-            .collect::<Result<Vec<_>>>()?;
+        let (inputs, twice) = each_once(&reading.inputs)?;
+        let mut readers = bag::open_each(inputs, &options).collect::<Result<Vec<_>>>()?;
         let cut = reading.division.start.is_some() || reading.division.end.is_some();
         let known = if cut { known_span(&mut readers)? } else { None };
         let range = known
@@ -139,13 +152,14 @@ impl Recorded {
             .transpose()?;
         let mut collector = Collector::new(affordable(reading));
         let mut bags = Vec::new();
-        for reader in &mut readers {
+        for mut reader in readers {
             let mut progress = |done, total| watch.progress(done, total);
             bags.push(reader.read(range, &mut collector.bag(&mut progress))?);
         }
-        let collected = collector.finish()?;
+        let mut collected = collector.finish()?;
+        collected.notices.extend(twice);
         let Some(span) = collected.span else {
-            return Err(no_messages(&reading.inputs));
+            return Err(no_messages(&reading.inputs, &collected.notices));
         };
         let range = match range {
             Some(range) => range,
@@ -159,6 +173,28 @@ impl Recorded {
     }
 }
 
+/// Every input once; a bag that was named twice would count twice.
+fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
+    let mut seen = BTreeSet::new();
+    let (mut once, mut twice) = (Vec::new(), Vec::new());
+    for input in inputs {
+        let real = match input {
+            Input::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
+            Input::Stdin => PathBuf::from("-"),
+        };
+        if seen.insert(real) {
+            once.push(input.clone());
+        } else if input.is_pipe() {
+            let what = format!("{} was named twice, and can be read once", input.name());
+            return Err(Error::usage(what, "name it once"));
+        } else {
+            let text = format!("`{}` was named twice and read once", input.name());
+            twice.push(Notice::new(NoticeKind::Note, text));
+        }
+    }
+    Ok((once, twice))
+}
+
 /// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
 /// use if every payload were read.
 fn affordable(reading: &Reading) -> collector::Options {
@@ -170,12 +206,26 @@ fn affordable(reading: &Reading) -> collector::Options {
     options
 }
 
-fn no_messages(inputs: &[Input]) -> Error {
+/// What is said of a bag that is whole and empty.
+pub(super) const NOTHING_RECORDED: &str = "it was closed before anything was recorded";
+
+/// The error for bags without a message, with what was lost on the way.
+fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
+    let lost: Vec<String> = notices
+        .iter()
+        .filter(|n| n.kind.is_loss())
+        .take(3)
+        .map(|n| format!("{} (×{})", n.text, n.count))
+        .collect();
     Error::NoMessages {
         path: inputs
             .first()
             .map_or_else(PathBuf::new, |i| PathBuf::from(i.name())),
-        hint: "`bagreel info` tells what the file holds".to_owned(),
+        hint: if lost.is_empty() {
+            NOTHING_RECORDED.to_owned()
+        } else {
+            lost.join("; ")
+        },
     }
 }
 
@@ -282,22 +332,29 @@ fn merged(mission: &Mission, windows: &Windows) -> Windows {
     }
 }
 
-/// Notices where the second reader counts otherwise than the first.
+/// Notices where the second reader counts otherwise than the first, and what it could not verify.
 fn compare(first: &mut Mission, second: &Mission) {
+    let verified = unverified(first, second);
     let (ours, theirs) = (counts(first), counts(second));
     let differing = ours.symmetric_difference(&theirs).count();
-    let (text, kind) = if first.messages == second.messages && differing == 0 {
-        let text = format!(
-            "a second reader counts the same {} messages",
-            first.messages
-        );
-        (text, NoticeKind::Note)
-    } else {
-        let text = format!(
-            "a second reader counts {} messages instead of {}; {differing} counts of topics in windows differ",
-            second.messages, first.messages
-        );
-        (text, NoticeKind::Damaged)
+    let same = first.messages == second.messages && differing == 0;
+    let messages = first.messages;
+    let (text, kind) = match (same, verified) {
+        (true, true) => (
+            format!("a second reader counts the same {messages} messages"),
+            NoticeKind::Note,
+        ),
+        (true, false) => (
+            format!("a second reading counts the same {messages} messages"),
+            NoticeKind::Note,
+        ),
+        (false, _) => (
+            format!(
+                "a second reader counts {} messages instead of {messages}; {differing} counts of topics in windows differ",
+                second.messages
+            ),
+            NoticeKind::Damaged,
+        ),
     };
     first.notices.add(Notice::new(kind, text));
     first
@@ -306,6 +363,26 @@ fn compare(first: &mut Mission, second: &Mission) {
     for bag in &mut first.bags {
         bag.tier = bag::Tier::Verify;
     }
+}
+
+/// Says of which bags not everything could be verified; answers whether there are none.
+fn unverified(first: &mut Mission, second: &Mission) -> bool {
+    let mut all = true;
+    for (bag, again) in first.bags.iter_mut().zip(&second.bags) {
+        if let Some(why) = &again.tier_reason {
+            all = false;
+            // A reader that refuses from the start says nothing of the bag; one that stops has met damage.
+            let kind = if again.complete {
+                NoticeKind::Note
+            } else {
+                NoticeKind::Damaged
+            };
+            let text = format!("`{}` could not be verified: {why}", bag.name);
+            first.notices.add(Notice::new(kind, text));
+        }
+        bag.complete &= again.complete;
+    }
+    all
 }
 
 /// Every count of a topic in a window.

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::read::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
 use crate::bag::{self, Input, Kind};
 use crate::base::error::{Error, Result};
@@ -16,11 +17,19 @@ pub fn is_survey(input: &Input) -> bool {
     matches!(input, Input::Path(path) if path.is_dir() && bag::sniff(input).is_err())
 }
 
-/// One row per bag below `folder`, sorted by path; a bag that cannot be read has a row that says why.
+/// What was found of the bags below a folder.
+pub struct Survey {
+    /// One row per bag, sorted by path; a bag that cannot be read has a row that says why.
+    pub rows: Vec<SurveyRow>,
+    /// Whether data of some bag was skipped, or all of it.
+    pub skipped: bool,
+}
+
+/// Reads every bag below `folder`.
 ///
 /// # Errors
 /// If the folder itself cannot be read or holds no bag.
-pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result<Vec<SurveyRow>> {
+pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result<Survey> {
     let mut bags = Vec::new();
     find(folder, DEEPEST, &mut bags)?;
     if bags.is_empty() {
@@ -31,6 +40,7 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
             hint,
         });
     }
+    let mut skipped = false;
     let row = |path: PathBuf| {
         let shown = path
             .strip_prefix(folder)
@@ -41,7 +51,14 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
             inputs: vec![Input::Path(path)],
             ..reading.clone()
         };
-        match read(&one, watch) {
+        let read = read(&one, watch);
+        skipped |= match &read {
+            Ok(mission) => mission.notices.any_loss(),
+            // An empty bag may be a whole one.
+            Err(Error::NoMessages { hint, .. }) => hint != NOTHING_RECORDED,
+            Err(_) => true,
+        };
+        match read {
             Ok(mission) => SurveyRow {
                 path: shown,
                 error: None,
@@ -54,7 +71,8 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
             },
         }
     };
-    Ok(bags.into_iter().map(row).collect())
+    let rows = bags.into_iter().map(row).collect();
+    Ok(Survey { rows, skipped })
 }
 
 /// Adds every bag in `folder` in order of names; a folder that is a bag counts as one. Links are not followed.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::items::Viewed;
-use super::{Headline, Phrase};
+use super::{Headline, ItemKind, Phrase};
 use crate::base::name::last_part;
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId};
@@ -18,13 +18,14 @@ const LONGEST_NAME: usize = 48;
 /// Puts headlines into words, with full names: what is called alike in two namespaces is told apart.
 pub(crate) struct Speaker<'a> {
     elements: &'a Elements,
+    viewed: &'a Viewed,
     ledger: &'a Ledger,
     /// Per headline of a node, how many topics came or went with it.
     topics: BTreeMap<EntryId, usize>,
 }
 
 impl<'a> Speaker<'a> {
-    pub(crate) fn new(mission: &'a Mission, viewed: &Viewed) -> Self {
+    pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed) -> Self {
         let mut topics = BTreeMap::new();
         for entry in &mission.ledger.entries {
             if let (Some(whole), Element::Topic(_)) = (entry.part_of, entry.what)
@@ -36,6 +37,7 @@ impl<'a> Speaker<'a> {
         }
         Self {
             elements: &mission.elements,
+            viewed,
             ledger: &mission.ledger,
             topics,
         }
@@ -159,10 +161,20 @@ impl<'a> Speaker<'a> {
                 .map(|t| t.name.as_str())
         };
         match what {
-            Element::Node(id) => self.elements.nodes.get(id as usize).map(|n| &*n.role),
+            Element::Node(id) => self.node_name(id),
             Element::Topic(id) => topic(id),
             Element::Publish(id) => topic(self.elements.publishes.get(id as usize)?.topic),
             Element::Subscribe(id) => topic(self.elements.subscribes.get(id as usize)?.topic),
+        }
+    }
+
+    /// The label of its box; its role if it has none of its own.
+    fn node_name(&self, id: NodeId) -> Option<&str> {
+        let item = self.viewed.node.get(id as usize).copied().flatten();
+        let item = item.and_then(|at| self.viewed.items.get(at as usize));
+        match item.filter(|i| i.kind == ItemKind::Node) {
+            Some(item) => Some(&item.label),
+            None => self.elements.nodes.get(id as usize).map(|n| &*n.role),
         }
     }
 

@@ -92,6 +92,7 @@ mod tests {
         let item = |name: &&str| Item {
             kind: ItemKind::Node,
             name: Arc::from(*name),
+            label: Arc::from(*name),
             members: Vec::new(),
             cluster: None,
         };

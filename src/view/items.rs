@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::collapse::{Collapse, swallows};
 use super::group::{Groups, groups};
 use super::names::is_debug_label;
+use super::roles;
 use super::select::{Selection, finish, select};
 use super::{Arrow, ArrowKind, Item, ItemKind, Mode, ViewOptions};
 use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
@@ -92,9 +93,14 @@ impl Viewed {
     fn set_items(&mut self, elements: &Elements, options: &ViewOptions, groups: &Groups) {
         let collapse = Collapse::new(options);
         let seen = |reasons: &[Option<_>], at: usize| reasons.get(at) == Some(&None);
-        let nodes: Vec<Option<Key>> = (elements.nodes.iter().enumerate())
-            .map(|(at, node)| {
-                let plain = || (ItemKind::Node, node.name.shared());
+        let names = if options.exact_names {
+            elements.nodes.iter().map(|n| n.name.shared()).collect()
+        } else {
+            roles::boxes(elements)
+        };
+        let nodes: Vec<Option<Key>> = (elements.nodes.iter().zip(&names).enumerate())
+            .map(|(at, (node, name))| {
+                let plain = || (ItemKind::Node, Arc::clone(name));
                 seen(&self.selection.nodes, at).then(|| {
                     let space = collapse.of(node.name.as_str());
                     space.map_or_else(plain, |s| (ItemKind::Namespace, s.into()))
@@ -133,10 +139,14 @@ impl Viewed {
             .map(|((kind, name), members)| Item {
                 kind: *kind,
                 name: Arc::clone(name),
+                label: Arc::clone(name),
                 members,
                 cluster: None,
             })
             .collect();
+        if !options.exact_names {
+            roles::label(&mut self.items, elements);
+        }
     }
 
     fn set_arrows(&mut self, elements: &Elements) {

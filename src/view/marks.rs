@@ -132,6 +132,8 @@ impl Reach {
     fn of_item(viewed: &Viewed, id: u32) -> Self {
         match viewed.items.get(id as usize) {
             Some(item) if item.kind == ItemKind::Namespace => Self::Inside,
+            // Runs of one node, of which one lives at a time.
+            Some(item) if item.kind == ItemKind::Node => Self::Whole,
             Some(item) if item.members.len() > 1 => Self::Part,
             _ => Self::Whole,
         }
@@ -142,6 +144,13 @@ impl Reach {
             .arrows
             .get(id as usize)
             .map_or(0, |a| a.members.len());
+        let is_role = |id: u32| {
+            let item = viewed.items.get(id as usize);
+            item.is_some_and(|i| i.kind == ItemKind::Node && i.members.len() > 1)
+        };
+        let ends = viewed.arrows.get(id as usize).map(|a| [a.from, a.to]);
+        let topics = ends.is_some_and(|ends| ends.into_iter().any(is_role));
+        let members = if topics { 1 } else { members };
         let joined = viewed.pairs.get(id as usize).map_or(members, Vec::len);
         if joined > 1 { Self::Part } else { Self::Whole }
     }

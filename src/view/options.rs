@@ -194,6 +194,8 @@ pub struct ViewOptions {
     pub expand: Vec<Arc<str>>,
     /// Whether to show the recorder and the player.
     pub show_recorder: bool,
+    /// Whether anonymous nodes are drawn under their full names, each run a box of its own.
+    pub exact_names: bool,
 }
 
 impl ViewOptions {
@@ -213,6 +215,7 @@ impl ViewOptions {
                 namespaces: Some(2),
                 ..Grouping::default()
             },
+            exact_names: true,
             ..Self::default()
         }
     }

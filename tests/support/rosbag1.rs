@@ -84,11 +84,14 @@ struct Chunk {
     plain: Vec<u8>,
     /// Per connection: times and offsets.
     index: BTreeMap<u32, Vec<(i64, u32)>>,
+    /// What stands behind the packed records.
+    behind: Vec<u8>,
 }
 
 /// The chunk's record, its index records, and what the tail says of it.
 fn close(chunk: &Chunk, how: Pack, pos: u64) -> (Vec<u8>, Vec<u8>) {
-    let (name, data) = packed(how, &chunk.plain);
+    let (name, mut data) = packed(how, &chunk.plain);
+    data.extend(&chunk.behind);
     let size = u32::try_from(chunk.plain.len()).unwrap();
     let mut bytes = record(
         &[
@@ -148,6 +151,11 @@ fn bag_header(index_pos: u64, connections: usize, chunks: usize) -> Vec<u8> {
 
 /// A bag with chunks of about `chunk` plain bytes.
 pub fn write(recording: &Recording, how: Pack, chunk: usize) -> Vec<u8> {
+    write_with(recording, how, chunk, &[])
+}
+
+/// A bag with these bytes behind the packed records of every chunk.
+fn write_with(recording: &Recording, how: Pack, chunk: usize, behind: &[u8]) -> Vec<u8> {
     const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
     let mut bytes = MAGIC.to_vec();
     bytes.extend(bag_header(0, 0, 0));
@@ -168,12 +176,14 @@ pub fn write(recording: &Recording, how: Pack, chunk: usize) -> Vec<u8> {
         ];
         open.plain.extend(record(&fields, payload));
         if open.plain.len() >= chunk {
+            open.behind = behind.to_vec();
             let (record, info) = close(&std::mem::take(&mut open), how, bytes.len() as u64);
             bytes.extend(record);
             infos.push(info);
         }
     }
     if !open.plain.is_empty() {
+        open.behind = behind.to_vec();
         let (record, info) = close(&open, how, bytes.len() as u64);
         bytes.extend(record);
         infos.push(info);
@@ -195,4 +205,35 @@ pub fn unindexed(bag: &[u8]) -> Vec<u8> {
     let mut cut = bag[..usize::try_from(index_pos).unwrap()].to_vec();
     cut[at..at + 8].fill(0);
     cut
+}
+
+/// Small bags that unfold to twenty gigabytes: where a chunk was never closed, where its index is wrong, and where a
+/// message is said to lie deep in it.
+pub fn bombs(recording: &Recording) -> Vec<(&'static str, Vec<u8>)> {
+    // A record that is nearly as long as one can be, and zeros: 64 MB in each of many streams.
+    let mut long = record(&[("op", &[9])], &[]);
+    let at = long.len() - 4;
+    long[at..].fill(0xff);
+    let mut behind = packed(Pack::Bz2, &long).1;
+    behind.extend(packed(Pack::Bz2, &vec![0; 64 << 20]).1.repeat(300));
+    let bag = write_with(recording, Pack::Bz2, 1 << 20, &behind);
+    let behind_field = |name: &[u8], nth: usize| {
+        let mut found = bag
+            .windows(name.len())
+            .enumerate()
+            .filter(|(_, w)| *w == name);
+        found.nth(nth).unwrap().0 + name.len()
+    };
+    let (mut open, mut wrong, mut deep) = (unindexed(&bag), bag.clone(), bag.clone());
+    let chunk = behind_field(b"compression=bz2", 0);
+    let size = behind_field(b"\x09\0\0\0size=", 0);
+    open[size..size + 8].fill(0);
+    assert!(size > chunk);
+    // The bag's head has counts of its own, of other names.
+    let count = behind_field(b"\x0a\0\0\0count=", 0);
+    wrong[count] += 1;
+    // Behind the count: the length of the entries, then time and offset of each.
+    let second = count + 4 + 4 + 12 + 8;
+    deep[second..second + 4].copy_from_slice(&4_000_000_000u32.to_le_bytes());
+    vec![("open", open), ("wrong", wrong), ("deep", deep)]
 }

@@ -1,98 +1,182 @@
-//! The records of an MCAP file, read with bounds, and the channels they announce.
+//! The records of an MCAP file, read with bounds, and the channels they describe.
 //!
-//! The format: <https://mcap.dev/spec>.
+//! What is read once per file is parsed by the crate `mcap`; what is read once per chunk or message here, from a stream
+//! and without copies, and text that is not UTF-8 is replaced where the crate refuses the record.
 
-use std::collections::HashMap;
-use std::io;
 use std::sync::Arc;
 
-use crate::bag::model::{Connection, ConnectionId, Encoding, MOST_PAYLOAD};
+use mcap::records::op;
+
+use super::{Described, Mcap};
+use crate::bag::chunked::{ChunkHead, Connections, Record, Stop};
+use crate::bag::decompress::Compression;
+use crate::bag::model::{Connection, ConnectionId, Encoding};
 use crate::bag::source::Stream;
 use crate::base::time::Stamp;
-
-/// What a file begins and ends with.
-pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-
-/// The kinds of records that concern us.
-pub(super) mod op {
-    pub(in super::super) const HEADER: u8 = 1;
-    pub(in super::super) const FOOTER: u8 = 2;
-    pub(in super::super) const SCHEMA: u8 = 3;
-    pub(in super::super) const CHANNEL: u8 = 4;
-    pub(in super::super) const MESSAGE: u8 = 5;
-    pub(in super::super) const CHUNK: u8 = 6;
-    pub(in super::super) const MESSAGE_INDEX: u8 = 7;
-    pub(in super::super) const CHUNK_INDEX: u8 = 8;
-    pub(in super::super) const STATISTICS: u8 = 11;
-    pub(in super::super) const DATA_END: u8 = 15;
-}
 
 /// The bytes of a record's head: kind and length.
 pub(super) const HEAD: u64 = 9;
 /// The bytes of a message before its payload.
-pub(super) const MESSAGE_HEAD: u64 = 22;
+const MESSAGE_HEAD: usize = 22;
+/// The bytes of an entry of a message index: time and offset.
+pub(super) const ENTRY: usize = 16;
+/// The bytes of a footer, and of the end of the data, which tells them from records with a damaged kind.
+pub(super) const FOOTER: u64 = 20;
+const DATA_END: u64 = 4;
 
-/// Takes the head of the next record: its kind, and the length of what `stream` then stands at. `None` at the end.
-pub(super) fn next(stream: &mut Stream<'_>) -> io::Result<Option<(u8, u64)>> {
+/// Takes the head of the next record.
+pub(super) fn next(stream: &mut Stream<'_>) -> Result<Record<Described>, Stop> {
+    let (kind, len) = head(stream)?;
+    // One flipped bit makes a chunk an index, or the end of the file.
+    let is_common = matches!(kind, op::MESSAGE | op::SCHEMA | op::CHANNEL | op::CHUNK);
+    if !is_common && is_chunk_of(stream.peek(CHUNK_HEAD + 32)?, len) {
+        let chunk = chunk(stream, len)?;
+        return Ok(Record::Chunk(ChunkHead {
+            misnamed: true,
+            ..chunk
+        }));
+    }
+    Ok(match kind {
+        // Zeros where the disk was full.
+        0 => return Err(Stop::Broken),
+        op::CHUNK => Record::Chunk(chunk(stream, len)?),
+        op::MESSAGE => message(stream, len)?,
+        op::MESSAGE_INDEX => index(stream, len)?,
+        op::STATISTICS => Record::Total {
+            messages: Cursor(stream.peek(8)?).u64().ok_or(Stop::Cut)?,
+            len,
+        },
+        op::SCHEMA => Record::Description {
+            what: Described::Schema,
+            len,
+        },
+        op::CHANNEL => Record::Description {
+            what: Described::Channel,
+            len,
+        },
+        op::DATA_END if len == DATA_END => Record::DataEnd { len },
+        op::FOOTER if len == FOOTER => Record::FileEnd { len },
+        op::DATA_END | op::FOOTER => return Err(Stop::Broken),
+        _ => Record::Other { len },
+    })
+}
+
+/// Takes a record's kind and the length of what `stream` then stands at.
+pub(super) fn head(stream: &mut Stream<'_>) -> Result<(u8, u64), Stop> {
     let head = stream.peek(9)?;
     if head.is_empty() {
-        return Ok(None);
+        return Err(Stop::End);
     }
     let mut cursor = Cursor(head);
     let (Some(kind), Some(len)) = (cursor.u8(), cursor.u64()) else {
-        return Err(io::ErrorKind::UnexpectedEof.into());
+        return Err(Stop::Cut);
     };
     stream.advance(9);
-    Ok(Some((kind, len)))
+    Ok((kind, len))
 }
 
-/// The whole record that `stream` stands at, without taking it; `None` if it is too long to be one of those that are
-/// looked into, or cut.
-pub(super) fn whole<'s>(stream: &'s mut Stream<'_>, len: u64) -> io::Result<Option<&'s [u8]>> {
-    let len = usize::try_from(len).unwrap_or(usize::MAX);
-    if len > MOST_PAYLOAD {
-        return Ok(None);
+/// Takes what stands before a message's payload.
+fn message(stream: &mut Stream<'_>, len: u64) -> Result<Record<Described>, Stop> {
+    let size = len.checked_sub(MESSAGE_HEAD as u64);
+    let size = size.and_then(|size| u32::try_from(size).ok());
+    let mut cursor = Cursor(stream.peek(MESSAGE_HEAD)?);
+    let (channel, _sequence) = (cursor.u16(), cursor.u32());
+    let (log_time, publish_time) = (cursor.u64(), cursor.u64());
+    let (Some(raw), Some(time), Some(_)) = (channel, log_time, publish_time) else {
+        return Err(Stop::Cut);
+    };
+    let size = size.ok_or(Stop::Broken)?;
+    stream.advance(MESSAGE_HEAD);
+    Ok(Record::Message {
+        raw: u32::from(raw),
+        time: Stamp::from_nanos(time),
+        size,
+    })
+}
+
+/// Looks at the head of a message index, whose entries fill the rest of it.
+fn index(stream: &mut Stream<'_>, len: u64) -> Result<Record<Described>, Stop> {
+    let mut cursor = Cursor(stream.peek(6)?);
+    let (channel, entries) = (cursor.u16(), cursor.u32().map(u64::from));
+    let (Some(channel), Some(entries)) = (channel, entries) else {
+        return Err(Stop::Cut);
+    };
+    if entries > len.saturating_sub(6) || entries % ENTRY as u64 != 0 {
+        return Err(Stop::Broken);
     }
-    let bytes = stream.peek(len)?;
-    Ok((bytes.len() == len).then_some(bytes))
+    Ok(Record::Index {
+        raw: u32::from(channel),
+        count: u32::try_from(entries / ENTRY as u64).unwrap_or(u32::MAX),
+        len,
+    })
 }
 
-/// Takes the head of a message record: its channel, its log time, the length of its payload.
-pub(super) fn message(stream: &mut Stream<'_>, len: u64) -> Option<(u16, Stamp, u32)> {
-    let size = u32::try_from(len.checked_sub(MESSAGE_HEAD)?).ok()?;
-    let mut cursor = Cursor(stream.peek(22).ok()?);
-    let (channel, _sequence) = (cursor.u16()?, cursor.u32()?);
-    let (log, _publish) = (cursor.u64()?, cursor.u64()?);
-    stream.advance(22);
-    Some((channel, Stamp::from_nanos(log), size))
-}
+/// More bytes than this behind a chunk's records are no part of it: one of the two lengths is damaged.
+const MOST_PADDING: u64 = 4096;
 
-/// What stands before a chunk's records.
-pub(super) struct ChunkHead {
-    pub(super) compression: Vec<u8>,
-    /// Where the compressed records begin, from the start of what follows the record's head.
-    pub(super) skip: u64,
-    pub(super) compressed: u64,
-}
+/// The bytes of a chunk before the name of its compression.
+const CHUNK_HEAD: usize = 8 + 8 + 8 + 4;
 
-/// Reads the head of the chunk that `stream` stands at, without taking it.
-pub(super) fn chunk(stream: &mut Stream<'_>) -> io::Result<Option<ChunkHead>> {
+/// Takes what stands before a chunk's records.
+fn chunk(stream: &mut Stream<'_>, len: u64) -> Result<ChunkHead, Stop> {
     let bytes = stream.peek(256)?;
     let total = bytes.len();
     let mut cursor = Cursor(bytes);
     let mut read = || {
-        let (_start, _end, _size, _crc) =
-            (cursor.u64()?, cursor.u64()?, cursor.u64()?, cursor.u32()?);
-        let compression = cursor.bytes()?.to_vec();
-        let compressed = cursor.u64()?;
-        let skip = (total - cursor.0.len()) as u64;
-        Some(ChunkHead {
-            compression,
-            skip,
-            compressed,
-        })
+        let (first, last, plain) = (cursor.u64()?, cursor.u64()?, cursor.u64()?);
+        let crc = cursor.u32()?;
+        let name = cursor.bytes()?;
+        // What calls its compression by no word is no chunk.
+        let is_word = name.len() <= 16 && name.iter().all(u8::is_ascii_graphic);
+        let how = Compression::named(name);
+        let packed = cursor.u64().filter(|_| is_word)?;
+        let times = (Stamp::from_nanos(first), Stamp::from_nanos(last));
+        Some((times, plain, crc, how, packed))
     };
-    Ok(read())
+    let Some((times, plain, crc, how, packed)) = read() else {
+        return Err(if total < 256 { Stop::Cut } else { Stop::Broken });
+    };
+    let skip = total - cursor.0.len();
+    let room = len.checked_sub(skip as u64).ok_or(Stop::Broken)?;
+    stream.advance(skip);
+    let packed = packed.min(room);
+    Ok(ChunkHead {
+        how,
+        packed,
+        padding: Some(room - packed)
+            .filter(|n| *n <= MOST_PADDING)
+            .unwrap_or(0),
+        plain,
+        crc: (crc != 0).then_some(crc),
+        times: (last_is_known(times)).then_some(times),
+        misnamed: false,
+        unclosed: false,
+    })
+}
+
+/// Whether a chunk's times are stated: an empty one has zeros.
+fn last_is_known((first, last): (Stamp, Stamp)) -> bool {
+    first <= last && last > Stamp(0)
+}
+
+/// Whether a chunk begins here.
+pub(super) fn is_chunk(bytes: &[u8]) -> bool {
+    if bytes.first() != Some(&op::CHUNK) {
+        return false;
+    }
+    let mut cursor = Cursor(&bytes[1..]);
+    cursor.u64().is_some_and(|len| is_chunk_of(cursor.0, len))
+}
+
+/// Whether a record of `len` bytes that begin so is a chunk: its two lengths agree.
+fn is_chunk_of(bytes: &[u8], len: u64) -> bool {
+    let mut rest = Cursor(bytes.get(CHUNK_HEAD..).unwrap_or_default());
+    let Some(name) = rest.bytes() else {
+        return false;
+    };
+    let head = (CHUNK_HEAD + 4 + name.len() + 8) as u64;
+    let packed = rest.u64().and_then(|packed| packed.checked_add(head));
+    Compression::named(name).is_some() && packed == Some(len)
 }
 
 /// Fields one after the other, never past the end.
@@ -136,83 +220,64 @@ impl<'a> Cursor<'a> {
 }
 
 /// A schema: the name of a type and its definition.
-struct Schema {
+pub(super) struct Schema {
     name: Arc<str>,
     definition: Option<Arc<str>>,
-}
-
-/// The channels of a file by their ids in it.
-#[derive(Default)]
-pub(super) struct Table {
-    list: Vec<Connection>,
-    ids: HashMap<u16, ConnectionId>,
-    schemas: HashMap<u16, Schema>,
-    held: usize,
 }
 
 /// More text of definitions than this is not kept, in bytes.
 const MOST_TEXT: usize = 8 << 20;
 
-impl Table {
-    /// The connection of a channel.
-    pub(super) fn get(&self, channel: u16) -> Option<ConnectionId> {
-        self.ids.get(&channel).copied()
+/// Adds what a schema record says. A second one of the same id is passed over.
+pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
+    let mut cursor = Cursor(record);
+    let id = cursor.u16()?;
+    if grammar.schemas.contains_key(&id) {
+        return None;
     }
+    let (name, encoding) = (cursor.text()?, cursor.text()?);
+    let data = cursor.bytes()?;
+    let is_text = encoding.starts_with("ros") || encoding.ends_with("idl");
+    let text = std::str::from_utf8(data)
+        .ok()
+        .filter(|t| is_text && !t.is_empty());
+    grammar.held += data.len();
+    let definition = text.filter(|_| grammar.held < MOST_TEXT).map(Arc::from);
+    let name = name.into();
+    grammar.schemas.insert(id, Schema { name, definition });
+    Some(())
+}
 
-    /// All connections in the order of their announcement.
-    pub(super) fn list(&self) -> &[Connection] {
-        &self.list
+/// The connection that a channel record describes, if it is new.
+pub(super) fn channel(
+    grammar: &Mcap,
+    record: &[u8],
+    known: &Connections,
+) -> Option<(u32, Connection)> {
+    let mut cursor = Cursor(record);
+    let (id, schema) = (u32::from(cursor.u16()?), cursor.u16()?);
+    if known.get(id).is_some() {
+        return None;
     }
-
-    /// Adds what a schema record says. A second one of the same id is passed over.
-    pub(super) fn schema(&mut self, record: &[u8]) -> Option<()> {
-        let mut cursor = Cursor(record);
-        let (id, name, encoding) = (cursor.u16()?, cursor.text()?, cursor.text()?);
-        let data = cursor.bytes()?;
-        let is_text = encoding.starts_with("ros") || encoding.ends_with("idl");
-        let text = std::str::from_utf8(data)
-            .ok()
-            .filter(|t| is_text && !t.is_empty());
-        self.held += data.len();
-        let definition = text.filter(|_| self.held < MOST_TEXT).map(Arc::from);
-        let name = name.into();
-        self.schemas
-            .entry(id)
-            .or_insert(Schema { name, definition });
-        Some(())
-    }
-
-    /// Adds what a channel record says; answers the connection if it is new. A second one of the same id is passed
-    /// over.
-    pub(super) fn channel(&mut self, record: &[u8]) -> Option<&Connection> {
-        let mut cursor = Cursor(record);
-        let (id, schema) = (cursor.u16()?, cursor.u16()?);
-        if self.ids.contains_key(&id) {
-            return None;
-        }
-        let (topic, encoding) = (cursor.text()?, cursor.text()?);
-        let place = ConnectionId(u32::try_from(self.list.len()).ok()?);
-        let schema = self.schemas.get(&schema);
-        let mut connection = Connection {
-            id: place,
-            topic: topic.into(),
-            type_name: schema.map_or_else(|| "".into(), |s| Arc::clone(&s.name)),
-            definition: schema.and_then(|s| s.definition.clone()),
-            type_hash: None,
-            publisher: None,
-            latching: false,
-            qos: None,
-            encoding: match encoding.as_str() {
-                "ros1" => Encoding::Ros1,
-                "cdr" => Encoding::Cdr,
-                _ => Encoding::Other(encoding),
-            },
-        };
-        describe(&mut connection, cursor.bytes().unwrap_or_default());
-        self.ids.insert(id, place);
-        self.list.push(connection);
-        self.list.last()
-    }
+    let (topic, encoding) = (cursor.text()?, cursor.text()?);
+    let schema = grammar.schemas.get(&schema);
+    let mut connection = Connection {
+        id: ConnectionId(0),
+        topic: topic.into(),
+        type_name: schema.map_or_else(|| "".into(), |s| Arc::clone(&s.name)),
+        definition: schema.and_then(|s| s.definition.clone()),
+        type_hash: None,
+        publisher: None,
+        latching: false,
+        qos: None,
+        encoding: match encoding.as_str() {
+            "ros1" => Encoding::Ros1,
+            "cdr" => Encoding::Cdr,
+            _ => Encoding::Other(encoding),
+        },
+    };
+    describe(&mut connection, cursor.bytes().unwrap_or_default());
+    Some((id, connection))
 }
 
 /// What ROS keeps in a channel's metadata.

@@ -2,185 +2,192 @@
 
 use std::io;
 
-use super::chunk::{self, Chunk, Chunks};
-use super::records::{self, Cursor, HEAD, MAGIC, Table, op};
-use crate::bag::index::{IndexSum, Query, pass, span_of};
-use crate::bag::model::{ConnectionId, Want};
-use crate::bag::source::{FAR, Source, Stream};
-use crate::base::time::{Span, Stamp};
+use mcap::MAGIC;
+use mcap::records::{Record as Parsed, Statistics, op};
 
-/// What the summary says.
-#[derive(Default)]
-pub(super) struct Summary {
-    pub(super) table: Table,
-    /// In the order of the file, none twice, none over another.
-    pub(super) chunks: Vec<Chunk>,
-    /// Messages and chunks by the file's own statistics.
-    statistics: Option<(u64, u32)>,
-}
-
-/// Why a file cannot be read by its summary.
-#[derive(Clone, Debug)]
-pub(super) struct Unindexed(pub(super) String);
-
-impl Unindexed {
-    fn because<T>(reason: &str) -> Result<T, Self> {
-        Err(Self(reason.to_owned()))
-    }
-}
-
-/// More chunks than this are not planned for.
-const MOST_CHUNKS: usize = 1 << 20;
+use super::records::{self, Cursor, FOOTER, HEAD};
+use super::{Described, Mcap};
+use crate::bag::chunked::{
+    Chunk, Grammar as _, IndexSum, MOST_CHUNKS, Plan, Record, Stop, Unindexed, Used, pass,
+};
+use crate::bag::model::MOST_PAYLOAD;
+use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::base::time::Stamp;
 
 /// As many as there are ids for channels.
 const MOST_CHANNELS: usize = 1 << 16;
 
-/// A footer record and what closes the file.
-const FOOTER: u64 = HEAD + 8 + 8 + 4 + 8;
-
 /// Reads the end of `source`.
-pub(super) fn of(source: &Source) -> io::Result<Result<Summary, Unindexed>> {
+pub(super) fn read(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
     let start = match footer(source)? {
         Ok(start) => start,
         Err(reason) => return Ok(Err(reason)),
     };
     let mut summary = Summary::default();
-    let told = summary.read(source, start)?;
-    Ok(told.and_then(|()| summary.settle(start)).map(|()| summary))
+    summary.plan.body = MAGIC.len() as u64..start;
+    match summary.records(source) {
+        Ok(()) => {}
+        Err(Stop::Io(e)) => return Err(e),
+        Err(_) => return Ok(Unindexed::because("its summary is damaged")),
+    }
+    Ok(summary.settle(source))
 }
+
+/// The bytes of a footer record and of what closes the file.
+const END: usize = 9 + 20 + 8;
 
 /// Where the summary begins.
 fn footer(source: &Source) -> io::Result<Result<u64, Unindexed>> {
-    let mut bytes = [0; 37];
-    let Some(at) = source.len().checked_sub(FOOTER) else {
+    let mut bytes = [0; END];
+    let Some(at) = source.len().checked_sub(bytes.len() as u64) else {
         return Ok(Unindexed::because("it is cut"));
     };
     let got = source.read_at(at, &mut bytes)?;
     let mut cursor = Cursor(&bytes[..got]);
     let head = (cursor.u8(), cursor.u64());
-    let start = cursor.u64().unwrap_or(0);
-    if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(20)) {
+    if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(FOOTER)) {
         return Ok(Unindexed::because("its end is missing"));
     }
-    Ok(match start {
+    let Ok(Parsed::Footer(footer)) = mcap::parse_record(op::FOOTER, cursor.0) else {
+        return Ok(Unindexed::because("its end is missing"));
+    };
+    Ok(match footer.summary_start {
         0 => Unindexed::because("it has no summary"),
-        n if n < 8 || n > at => Unindexed::because("its summary lies outside the file"),
+        n if n < MAGIC.len() as u64 || n > at => {
+            Unindexed::because("its summary lies outside the file")
+        }
         n => Ok(n),
     })
 }
 
+/// What has been read of a summary.
+#[derive(Default)]
+struct Summary {
+    plan: Plan,
+    grammar: Mcap,
+    used: Used,
+    statistics: Option<Statistics>,
+    /// A chunk holds records and has no message index.
+    blind: bool,
+}
+
 impl Summary {
-    fn read(&mut self, source: &Source, start: u64) -> io::Result<Result<(), Unindexed>> {
-        let mut stream = Stream::of_file(source, start, source.len(), FAR);
+    fn records(&mut self, source: &Source) -> Result<(), Stop> {
+        let mut stream = Stream::of_file(source, self.plan.body.end, source.len(), FAR);
         let mut channels: Vec<Vec<u8>> = Vec::new();
-        while let Some((kind, len)) = records::next(&mut stream)? {
-            if kind == op::FOOTER {
-                break;
-            }
-            let Some(record) = records::whole(&mut stream, len)? else {
-                return Ok(Unindexed::because("its summary is damaged"));
+        loop {
+            let (kind, len) = match records::head(&mut stream) {
+                Ok((op::FOOTER, _)) | Err(Stop::End) => break,
+                head => head?,
             };
+            if len > MOST_PAYLOAD as u64 {
+                return Err(Stop::Broken);
+            }
+            let wanted = usize::try_from(len).unwrap_or(usize::MAX);
+            let record = stream.peek(wanted)?;
+            if record.len() < wanted {
+                return Err(Stop::Cut);
+            }
             match kind {
-                op::SCHEMA => drop(self.table.schema(record)),
+                op::SCHEMA => drop(records::schema(&mut self.grammar, record)),
                 // A channel may stand before its schema.
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
                 op::STATISTICS => self.statistics = statistics(record),
-                op::CHUNK_INDEX => match chunk_index(record) {
-                    Some(chunk) if self.chunks.len() < MOST_CHUNKS => self.chunks.push(chunk),
-                    _ => return Ok(Unindexed::because("its chunk index is damaged or too long")),
-                },
+                op::CHUNK_INDEX => {
+                    let (chunk, size) = chunk_index(record, &mut self.used).ok_or(Stop::Broken)?;
+                    self.blind |= chunk.promised.is_none() && size > 0;
+                    if self.plan.chunks.len() >= MOST_CHUNKS {
+                        return Err(Stop::Broken);
+                    }
+                    self.plan.chunks.push(chunk);
+                }
                 _ => {}
             }
             pass(&mut stream, len)?;
         }
         for channel in &channels {
-            self.table.channel(channel);
+            let connections = &mut self.plan.connections;
+            let described = self
+                .grammar
+                .describe(&Described::Channel, channel, connections);
+            if let Some((raw, connection)) = described {
+                connections.add(raw, connection);
+            }
         }
-        Ok(Ok(()))
+        Ok(())
     }
 
     /// Orders the chunks and decides whether they hold all messages.
-    fn settle(&mut self, end: u64) -> Result<(), Unindexed> {
-        self.chunks.sort_by_key(|c| c.start);
-        self.chunks.dedup_by_key(|c| c.start);
-        let mut free = 8;
-        for chunk in &self.chunks {
-            if chunk.start < free || chunk.end() > end {
-                return Unindexed::because("its index names chunks where none can be");
-            }
-            free = chunk.end();
-        }
-        let known: u64 = self
-            .chunks
+    fn settle(mut self, source: &Source) -> Result<Plan, Unindexed> {
+        let chunks = &mut self.plan.chunks;
+        chunks.sort_by_key(|c| c.start);
+        chunks.dedup_by_key(|c| c.start);
+        let known: u64 = chunks
             .iter()
-            .filter_map(|c| Some(c.tally?.messages))
+            .filter_map(|c| Some(c.promised?.messages))
             .sum();
-        let blind = |c: &Chunk| c.tally.is_none() && c.size > 0;
-        match self.statistics {
-            Some((_, chunks)) if chunks as usize != self.chunks.len() => {
-                Unindexed::because("its index does not name all of its chunks")
+        match &self.statistics {
+            Some(all) if all.chunk_count as usize != chunks.len() => {
+                return Unindexed::because("its index does not name all of its chunks");
             }
-            Some((messages, _)) if messages == known => Ok(()),
-            Some((_, 0)) => Unindexed::because("its messages lie outside chunks"),
-            _ if self.chunks.iter().any(blind) => {
-                Unindexed::because("its chunks have no message index")
+            Some(all) if all.message_count == known => {}
+            Some(all) if all.chunk_count == 0 => {
+                return Unindexed::because("its messages lie outside chunks");
             }
-            Some(_) => Unindexed::because("its index and its statistics disagree"),
-            None if self.chunks.is_empty() => Unindexed::because("its summary names no chunks"),
-            None => Ok(()),
+            _ if self.blind => return Unindexed::because("its chunks have no message index"),
+            Some(_) => return Unindexed::because("its index and its statistics disagree"),
+            None if chunks.is_empty() => {
+                return Unindexed::because("its summary names no chunks");
+            }
+            None => {}
         }
-    }
-
-    /// How many bytes the longest index takes.
-    pub(super) fn longest_index(&self) -> u64 {
-        self.chunks.iter().map(|c| c.index_len).max().unwrap_or(0)
-    }
-
-    /// The time covered.
-    pub(super) fn span(&self, source: &Source) -> Option<Span> {
-        let wants = vec![Want::Stamps; self.table.list().len()];
-        let resolve = |raw| self.resolve(raw);
-        let reader = reader(source, &resolve, &wants, None);
-        let full = self.chunks.iter().enumerate();
-        let full = full.filter(|(_, c)| c.tally.is_some_and(|t| t.messages > 0));
-        let claims = full.map(|(at, c)| (at, c.first, c.last));
-        span_of(claims, |at, sink| reader.read(&self.chunks[at], sink))
-    }
-
-    /// The connection of a channel.
-    pub(super) fn resolve(&self, raw: u32) -> Option<ConnectionId> {
-        self.table.get(u16::try_from(raw).ok()?)
+        self.used.are_in(&self.plan.connections)?;
+        gaps(source, &self.plan)?;
+        Ok(self.plan)
     }
 }
 
-/// What reads the chunks of `source`.
-pub(super) fn reader<'a>(
-    source: &'a Source,
-    resolve: &'a (dyn Fn(u32) -> Option<ConnectionId> + Sync),
-    wants: &'a [Want],
-    range: Option<Span>,
-) -> Chunks<'a> {
-    let head = chunk::head;
-    let ask = Query {
-        resolve,
-        wants,
-        range,
-        head,
-    };
-    Chunks { source, ask }
+/// Looks between the chunks, where other records may stand, but no messages that the summary does not know of.
+fn gaps(source: &Source, plan: &Plan) -> Result<(), Unindexed> {
+    let mut free = plan.body.start;
+    let ends = plan.chunks.iter().map(|c| (c.start, c.end));
+    for (start, end) in ends.chain([(plan.body.end, plan.body.end)]) {
+        if start < free || end > plan.body.end {
+            return Unindexed::because("its index names chunks where none can be");
+        }
+        let mut stream = Stream::of_file(source, free, start, NEAR);
+        while stream.position() < start {
+            match Mcap::next(&mut stream) {
+                Ok(Record::Chunk(_) | Record::Message { .. }) => {
+                    return Unindexed::because("its summary does not name all of its messages");
+                }
+                Ok(
+                    Record::Description { len, .. }
+                    | Record::Index { len, .. }
+                    | Record::Total { len, .. }
+                    | Record::DataEnd { len }
+                    | Record::FileEnd { len }
+                    | Record::Other { len },
+                ) if pass(&mut stream, len).is_ok() => {}
+                // What is no record hides no message that could be read.
+                _ => break,
+            }
+        }
+        free = end;
+    }
+    Ok(())
 }
 
-/// The counts of messages and chunks in a statistics record.
-fn statistics(record: &[u8]) -> Option<(u64, u32)> {
-    let mut cursor = Cursor(record);
-    let messages = cursor.u64()?;
-    let (_schemas, _channels, _attachments, _metadata) =
-        (cursor.u16()?, cursor.u32()?, cursor.u32()?, cursor.u32()?);
-    Some((messages, cursor.u32()?))
+/// The counts in a statistics record.
+fn statistics(record: &[u8]) -> Option<Statistics> {
+    match mcap::parse_record(op::STATISTICS, record) {
+        Ok(Parsed::Statistics(statistics)) => Some(statistics),
+        _ => None,
+    }
 }
 
-/// What a chunk index record says.
-fn chunk_index(record: &[u8]) -> Option<Chunk> {
+/// What a chunk index record says, and the length of the chunk's records.
+fn chunk_index(record: &[u8], used: &mut Used) -> Option<(Chunk, u64)> {
     let mut cursor = Cursor(record);
     let (first, last) = (cursor.u64()?, cursor.u64()?);
     let (start, len) = (cursor.u64()?, cursor.u64()?);
@@ -188,26 +195,25 @@ fn chunk_index(record: &[u8]) -> Option<Chunk> {
     let index_len = cursor.u64()?;
     let _compression = cursor.bytes()?;
     let (_compressed, size) = (cursor.u64()?, cursor.u64()?);
-    start.checked_add(len)?.checked_add(index_len)?;
+    let behind = start.checked_add(len)?;
+    let end = behind.checked_add(index_len)?;
     if len < HEAD {
         return None;
     }
-    let mut chunk = Chunk {
+    let chunk = Chunk {
         start,
-        len,
-        index_len,
-        size,
+        index: behind..end,
+        end,
         first: Stamp::from_nanos(first),
         last: Stamp::from_nanos(last),
-        tally: None,
+        promised: promised(offsets, behind, end, used),
     };
-    chunk.tally = tally(offsets, start + len, chunk.end());
-    Some(chunk)
+    Some((chunk, size))
 }
 
 /// The counts that follow from where the message indexes of a chunk's channels begin: they stand one behind the other,
 /// 15 bytes and 16 for each message. `None` if they do not, or if there are none.
-fn tally(offsets: &[u8], start: u64, end: u64) -> Option<IndexSum> {
+fn promised(offsets: &[u8], start: u64, end: u64, used: &mut Used) -> Option<IndexSum> {
     let mut places = Vec::with_capacity(offsets.len() / 10);
     let mut cursor = Cursor(offsets);
     while let (Some(channel), Some(at)) = (cursor.u16(), cursor.u64()) {
@@ -217,21 +223,17 @@ fn tally(offsets: &[u8], start: u64, end: u64) -> Option<IndexSum> {
     if places.first()?.0 != start {
         return None;
     }
-    let mut tally = IndexSum::default();
+    let mut sum = IndexSum::default();
     let ends = places.iter().skip(1).map(|p| p.0).chain([end]);
     for ((at, channel), end) in places.iter().zip(ends) {
         let entries = end.checked_sub(*at)?.checked_sub(15)?;
         if entries % 16 != 0 {
             return None;
         }
-        tally.add(u32::from(*channel), u32::try_from(entries / 16).ok()?);
+        sum.add(u32::from(*channel), u32::try_from(entries / 16).ok()?);
+        if entries > 0 {
+            used.add(u32::from(*channel));
+        }
     }
-    Some(tally)
-}
-
-impl Chunk {
-    /// Where the message indexes behind it end.
-    pub(super) fn end(&self) -> u64 {
-        self.start + self.len + self.index_len
-    }
+    Some(sum)
 }

@@ -3,13 +3,14 @@
 use std::io::{self, Read};
 
 use mcap::parse_record;
-use mcap::records::Record;
+use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::records::{Table, op};
+use super::{Described, Mcap};
 use crate::bag::adapters::Gather;
-use crate::bag::index::{hand_over_slice, nameless};
+use crate::bag::chunked::{Connections, Grammar as _, hand_over_slice, nameless};
 use crate::bag::model::{Sink, Want};
+use crate::bag::source::{FAR, Source, Stream};
 use crate::base::time::Stamp;
 
 /// Longer records are not looked into, in bytes.
@@ -18,16 +19,18 @@ const LONGEST_RECORD: usize = 256 << 20;
 /// The crate's findings on their way to a sink.
 struct Crate<'s> {
     sink: &'s mut dyn Sink,
-    table: Table,
+    grammar: Mcap,
+    connections: Connections,
     wants: Vec<Want>,
     gather: Gather,
 }
 
-/// Tells `sink` all that the crate finds in `from`, which begins with the magic.
+/// Tells `sink` all that the crate finds.
 ///
 /// # Errors
 /// Why it did not get to the end: a wrong checksum, a cut, or anything else that is not as the format has it.
-pub(super) fn read(from: &mut dyn Read, sink: &mut dyn Sink) -> Result<(), String> {
+pub(super) fn read(source: &Source, sink: &mut dyn Sink) -> Result<(), String> {
+    let mut from = Stream::of_file(source, 0, source.len(), FAR);
     let options = LinearReaderOptions::default()
         .with_validate_chunk_crcs(true)
         .with_validate_data_section_crc(true)
@@ -36,11 +39,12 @@ pub(super) fn read(from: &mut dyn Read, sink: &mut dyn Sink) -> Result<(), Strin
     let mut reader = LinearReader::new_with_options(options);
     let mut found = Crate {
         sink,
-        table: Table::default(),
+        grammar: Mcap::default(),
+        connections: Connections::default(),
         wants: Vec::new(),
         gather: Gather::default(),
     };
-    let told = found.records(&mut reader, from);
+    let told = found.records(&mut reader, &mut from);
     found.gather.flush(found.sink);
     told
 }
@@ -64,12 +68,8 @@ impl Crate<'_> {
     /// Only these kinds are given to the crate's parser: it panics on a short attachment.
     fn record(&mut self, kind: u8, data: &[u8]) -> Result<(), String> {
         match kind {
-            op::SCHEMA => drop(self.table.schema(data)),
-            op::CHANNEL => {
-                if let Some(connection) = self.table.channel(data) {
-                    self.wants.push(self.sink.connection(connection));
-                }
-            }
+            op::SCHEMA => self.describe(Described::Schema, data),
+            op::CHANNEL => self.describe(Described::Channel, data),
             op::MESSAGE => {
                 let record = parse_record(kind, data).map_err(|e| e.to_string())?;
                 if let Record::Message { header, data } = record {
@@ -81,8 +81,17 @@ impl Crate<'_> {
         Ok(())
     }
 
+    fn describe(&mut self, what: Described, data: &[u8]) {
+        let described = self.grammar.describe(&what, data, &self.connections);
+        if let Some((raw, connection)) = described
+            && let Some(connection) = self.connections.add(raw, connection)
+        {
+            self.wants.push(self.sink.connection(connection));
+        }
+    }
+
     fn message(&mut self, channel: u16, time: Stamp, data: &[u8]) {
-        let Some(id) = self.table.get(channel) else {
+        let Some(id) = self.connections.get(u32::from(channel)) else {
             return nameless(self.sink, 1);
         };
         hand_over_slice(data, (id, time), self.wants[id.0 as usize], self.sink);

@@ -1,9 +1,10 @@
-//! The records of a ROS 1 bag: headers of fields, never trusted, and the connections they announce.
+//! The records of a ROS 1 bag: headers of fields, never trusted, and the connections they describe.
 
-use std::collections::{HashMap, HashSet};
-use std::io;
 use std::sync::Arc;
 
+use super::{Described, Rosbag1};
+use crate::bag::chunked::{ChunkHead, Record, Stop};
+use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId, Encoding};
 use crate::bag::source::Stream;
 use crate::base::name::{NodeName, TopicName};
@@ -11,7 +12,7 @@ use crate::base::time::Stamp;
 
 /// A record's header, as far as it concerns us.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Record {
+pub(super) enum Header {
     Bag {
         index_pos: u64,
         connections: u32,
@@ -23,15 +24,15 @@ pub(super) enum Record {
         size: u32,
     },
     Connection {
-        id: u32,
+        raw: u32,
         topic: Vec<u8>,
     },
     Message {
-        id: u32,
+        raw: u32,
         time: Stamp,
     },
     Index {
-        id: u32,
+        raw: u32,
         count: u32,
     },
     ChunkInfo {
@@ -44,44 +45,48 @@ pub(super) enum Record {
     Other,
 }
 
-/// Why no record comes.
-#[derive(Debug)]
-pub(super) enum Stop {
-    /// The bytes end where a record could begin.
-    End,
-    /// They end inside a record.
-    Cut,
-    /// What stands here is no record.
-    Broken,
-    /// The system, or a decompressor, refuses.
-    Io(io::Error),
-}
-
-impl From<io::Error> for Stop {
-    fn from(error: io::Error) -> Self {
-        match error.kind() {
-            io::ErrorKind::UnexpectedEof => Self::Cut,
-            _ => Self::Io(error),
-        }
-    }
-}
-
 /// The longest header that is believed, in bytes; real ones stay below 300.
 const LONGEST_HEADER: usize = 1 << 20;
 
-/// Takes the head of the next record: what it is, and the length of the data that `stream` then stands at.
-///
-/// An index record's length comes from its count: writers of 2010 put a wrong one.
-pub(super) fn next(stream: &mut Stream<'_>) -> Result<(Record, u32), Stop> {
-    let (record, mut len) = next_as_stated(stream)?;
-    if let Record::Index { count, .. } = record {
-        len = count.checked_mul(ENTRY).ok_or(Stop::Broken)?;
-    }
-    Ok((record, len))
+/// Takes the head of the next record.
+pub(super) fn next(stream: &mut Stream<'_>) -> Result<Record<Described>, Stop> {
+    let (header, len) = header(stream)?;
+    let size = len;
+    let len = u64::from(len);
+    Ok(match header {
+        Header::Chunk { compression, size } => Record::Chunk(chunk(&compression, size, len)),
+        Header::Message { raw, time } => Record::Message { raw, time, size },
+        Header::Connection { raw, topic } => Record::Description {
+            what: Described { raw, topic },
+            len,
+        },
+        // Its length comes from its count: writers of 2010 put a wrong one.
+        Header::Index { raw, count } => Record::Index {
+            raw,
+            count,
+            len: u64::from(count.checked_mul(ENTRY).ok_or(Stop::Broken)?),
+        },
+        _ => Record::Other { len },
+    })
 }
 
-/// As [`next`], with the length that the record states.
-pub(super) fn next_as_stated(stream: &mut Stream<'_>) -> Result<(Record, u32), Stop> {
+/// What stands before a chunk's records. A recorder writes the lengths when it closes the chunk.
+fn chunk(compression: &[u8], size: u32, len: u64) -> ChunkHead {
+    let how = Compression::named(compression);
+    ChunkHead {
+        how,
+        packed: len,
+        padding: 0,
+        plain: u64::from(size),
+        crc: None,
+        times: None,
+        misnamed: false,
+        unclosed: size == 0 && len == 0 && how.is_some_and(|how| how != Compression::None),
+    }
+}
+
+/// Takes the header of the next record, and the length that it states of the data that `stream` then stands at.
+pub(super) fn header(stream: &mut Stream<'_>) -> Result<(Header, u32), Stop> {
     let head = stream.peek(4)?;
     if head.is_empty() {
         return Err(Stop::End);
@@ -103,7 +108,7 @@ pub(super) fn next_as_stated(stream: &mut Stream<'_>) -> Result<(Record, u32), S
 pub(super) const ENTRY: u32 = 12;
 
 /// What a header says; `None` if it is none: a field without a name, or longer than the header.
-pub(super) fn parse(header: &[u8]) -> Option<Record> {
+pub(super) fn parse(header: &[u8]) -> Option<Header> {
     let mut fields = Fields::default();
     let mut rest = header;
     while !rest.is_empty() {
@@ -114,15 +119,7 @@ pub(super) fn parse(header: &[u8]) -> Option<Record> {
             fields.count += 1;
         }
     }
-    Some(fields.record().unwrap_or(Record::Other))
-}
-
-/// Whether a chunk's record begins here.
-pub(super) fn is_chunk(bytes: &[u8]) -> bool {
-    // Real headers take 40 to 60 bytes; the test is made at every byte.
-    let len = u32_at(bytes, 0).filter(|n| (20..200).contains(n));
-    let header = len.and_then(|n| bytes.get(4..4 + n as usize));
-    matches!(header.and_then(parse), Some(Record::Chunk { .. }))
+    Some(fields.record().unwrap_or(Header::Other))
 }
 
 /// Real headers have up to six fields.
@@ -154,34 +151,34 @@ impl<'a> Fields<'a> {
         time_at(self.get(name)?, 0)
     }
 
-    fn record(&self) -> Option<Record> {
+    fn record(&self) -> Option<Header> {
         Some(match self.get(b"op")?.first()? {
-            2 => Record::Message {
-                id: self.u32(b"conn")?,
+            2 => Header::Message {
+                raw: self.u32(b"conn")?,
                 time: self.time(b"time")?,
             },
-            3 => Record::Bag {
+            3 => Header::Bag {
                 index_pos: self.u64(b"index_pos")?,
                 connections: self.u32(b"conn_count")?,
                 chunks: self.u32(b"chunk_count")?,
                 encryptor: text(self.get(b"encryptor").unwrap_or_default()),
             },
-            4 if self.u32(b"ver")? == 1 => Record::Index {
-                id: self.u32(b"conn")?,
+            4 if self.u32(b"ver")? == 1 => Header::Index {
+                raw: self.u32(b"conn")?,
                 count: self.u32(b"count")?,
             },
-            5 => Record::Chunk {
+            5 => Header::Chunk {
                 compression: self.get(b"compression")?.to_vec(),
                 size: self.u32(b"size")?,
             },
-            6 if self.u32(b"ver")? == 1 => Record::ChunkInfo {
+            6 if self.u32(b"ver")? == 1 => Header::ChunkInfo {
                 pos: self.u64(b"chunk_pos")?,
                 start: self.time(b"start_time")?,
                 end: self.time(b"end_time")?,
                 count: self.u32(b"count")?,
             },
-            7 => Record::Connection {
-                id: self.u32(b"conn")?,
+            7 => Header::Connection {
+                raw: self.u32(b"conn")?,
                 topic: self.get(b"topic")?.to_vec(),
             },
             _ => return None,
@@ -213,81 +210,47 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// The connections of a bag by their ids in it.
-#[derive(Default)]
-pub(super) struct Table {
-    list: Vec<Connection>,
-    ids: HashMap<u32, ConnectionId>,
-    definitions: HashSet<Arc<str>>,
-    held: usize,
-}
-
-/// More connections than this are not kept; real bags stay below 1,000.
-const MOST_CONNECTIONS: usize = 100_000;
 /// More text of definitions than this is not kept, in bytes.
 const MOST_TEXT: usize = 8 << 20;
 
-impl Table {
-    /// The connection that the bag calls `id`.
-    pub(super) fn get(&self, id: u32) -> Option<ConnectionId> {
-        self.ids.get(&id).copied()
-    }
-
-    /// All of them in the order of their announcement.
-    pub(super) fn list(&self) -> &[Connection] {
-        &self.list
-    }
-
-    /// Adds what a connection record says; answers the connection if it is new. A second one of the same id is
-    /// passed over, as every reader does.
-    pub(super) fn add(&mut self, id: u32, topic: &[u8], data: &[u8]) -> Option<&Connection> {
-        if self.ids.contains_key(&id) || self.list.len() >= MOST_CONNECTIONS {
-            return None;
-        }
-        let place = ConnectionId(u32::try_from(self.list.len()).ok()?);
-        let mut connection = blank(place, text(topic).into());
-        self.describe(&mut connection, data);
-        self.ids.insert(id, place);
-        self.list.push(connection);
-        self.list.last()
-    }
-
-    fn describe(&mut self, connection: &mut Connection, mut data: &[u8]) {
-        while let Some((name, value, rest)) = field(data) {
-            data = rest;
-            match name {
-                b"type" => connection.type_name = text(value).into(),
-                b"md5sum" => connection.type_hash = Some(text(value).into()),
-                b"message_definition" => connection.definition = self.definition(value),
-                b"latching" => connection.latching = value == b"1",
-                b"callerid" if !value.is_empty() => {
-                    connection.publisher = Some(NodeName::from(text(value)));
-                }
-                _ => {}
+/// The connection that a record describes.
+pub(super) fn connection(grammar: &mut Rosbag1, topic: &[u8], mut data: &[u8]) -> Connection {
+    let mut connection = blank(text(topic).into());
+    while let Some((name, value, rest)) = field(data) {
+        data = rest;
+        match name {
+            b"type" => connection.type_name = text(value).into(),
+            b"md5sum" => connection.type_hash = Some(text(value).into()),
+            b"message_definition" => connection.definition = definition(grammar, value),
+            b"latching" => connection.latching = value == b"1",
+            b"callerid" if !value.is_empty() => {
+                connection.publisher = Some(NodeName::from(text(value)));
             }
+            _ => {}
         }
     }
+    connection
+}
 
-    /// Equal definitions share one text.
-    fn definition(&mut self, value: &[u8]) -> Option<Arc<str>> {
-        let text = String::from_utf8_lossy(value);
-        if let Some(known) = self.definitions.get(text.as_ref()) {
-            return Some(Arc::clone(known));
-        }
-        self.held += text.len();
-        if self.held > MOST_TEXT {
-            return None;
-        }
-        let new: Arc<str> = text.into();
-        self.definitions.insert(Arc::clone(&new));
-        Some(new)
+/// Equal definitions share one text.
+fn definition(grammar: &mut Rosbag1, value: &[u8]) -> Option<Arc<str>> {
+    let text = String::from_utf8_lossy(value);
+    if let Some(known) = grammar.definitions.get(text.as_ref()) {
+        return Some(Arc::clone(known));
     }
+    grammar.held += text.len();
+    if grammar.held > MOST_TEXT {
+        return None;
+    }
+    let new: Arc<str> = text.into();
+    grammar.definitions.insert(Arc::clone(&new));
+    Some(new)
 }
 
 /// A connection of which only the topic is known.
-fn blank(id: ConnectionId, topic: TopicName) -> Connection {
+fn blank(topic: TopicName) -> Connection {
     Connection {
-        id,
+        id: ConnectionId(0),
         topic,
         type_name: "".into(),
         definition: None,

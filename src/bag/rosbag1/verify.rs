@@ -1,28 +1,20 @@
 //! A ROS 1 bag read a second time by somebody else's reader, the crate `rosbag`, once every chunk is known to be bounded.
 
-use std::collections::BTreeSet;
 use std::io;
+use std::sync::Arc;
 
 use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
 
-use super::plan::Plan;
-use super::records::{self, Record, Stop, Table};
+use super::records::{self, ENTRY, Header};
+use super::{Described, Rosbag1};
 use crate::bag::adapters::Gather;
-use crate::bag::decompress::Compression;
-use crate::bag::index::{Body, hand_over_slice, nameless, pass};
+use crate::bag::chunked::{
+    Body, Connections, Grammar as _, Plan, Stop, Verified, hand_over_slice, nameless, pass,
+};
+use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{Sink, Want};
 use crate::bag::source::{FAR, Source, Stream};
 use crate::base::time::Stamp;
-
-/// What the second reader did.
-#[derive(Default)]
-pub(super) struct Verified {
-    pub(super) compression: BTreeSet<Compression>,
-    /// Why it did not get to the end.
-    pub(super) stopped: Option<String>,
-    /// It told nothing at all.
-    pub(super) refused: bool,
-}
 
 /// The largest chunk that the crate may unpack into memory, in bytes.
 const LARGEST_CHUNK: u32 = 256 << 20;
@@ -40,7 +32,8 @@ pub(super) fn read(source: &Source, plan: &Plan, sink: &mut dyn Sink) -> Verifie
     let told = bag.and_then(|bag| {
         Crate {
             sink,
-            table: Table::default(),
+            grammar: Rosbag1::default(),
+            connections: Connections::default(),
             wants: Vec::new(),
             gather: Gather::default(),
         }
@@ -53,41 +46,55 @@ pub(super) fn read(source: &Source, plan: &Plan, sink: &mut dyn Sink) -> Verifie
 /// Walks the chunks as the crate will, and refuses what it could not bear: it unpacks a chunk before it looks at its
 /// size.
 fn bound(source: &Source, plan: &Plan, verified: &mut Verified) -> Result<(), String> {
-    let broken = |e: io::Error| format!("the bag cannot be read: {e}");
-    let mut stream = Stream::of_file(source, plan.body, plan.index_pos, FAR);
+    let allowance = Arc::default();
+    let mut stream = Stream::of_file(source, plan.body.start, plan.body.end, FAR);
     loop {
-        let (record, len) = match records::next_as_stated(&mut stream) {
+        let (header, len) = match records::header(&mut stream) {
             Ok(found) => found,
             Err(Stop::End) => return Ok(()),
             Err(_) => return Err("the chunks are not one behind the other".to_owned()),
         };
         let start = stream.position();
-        pass(&mut stream, u64::from(len)).map_err(broken)?;
-        match record {
-            Record::Chunk { compression, size } => {
+        pass(&mut stream, u64::from(len)).map_err(|stop| stop.to_string())?;
+        match header {
+            Header::Chunk { compression, size } => {
                 let how = Compression::named(&compression)
                     .ok_or("a chunk is compressed in an unknown way")?;
                 verified.compression.insert(how);
-                let body = Body {
-                    how,
-                    range: start..start + u64::from(len),
-                };
-                let unpacked = unpacked_len(source, &body, size).map_err(broken)?;
-                if unpacked != u64::from(size) || size > LARGEST_CHUNK {
-                    return Err(format!(
-                        "a chunk unfolds to {unpacked} bytes, not to {size}"
-                    ));
-                }
+                let range = start..start + u64::from(len);
+                bound_chunk(source, &Body { how, range }, size, &allowance)?;
             }
-            Record::Index { count, .. } if count.checked_mul(records::ENTRY) == Some(len) => {}
+            Header::Index { count, .. } if count.checked_mul(ENTRY) == Some(len) => {}
             _ => return Err("a record among the chunks is not what it should be".to_owned()),
         }
     }
 }
 
+/// Refuses a chunk that is not as long as it says, or too long.
+fn bound_chunk(
+    source: &Source,
+    body: &Body,
+    size: u32,
+    allowance: &Arc<Allowance>,
+) -> Result<(), String> {
+    let unpacked = unpacked_len(source, body, size, allowance);
+    let unpacked = unpacked.map_err(|e| format!("a chunk cannot be unpacked: {e}"))?;
+    if unpacked != u64::from(size) || size > LARGEST_CHUNK {
+        return Err(format!(
+            "a chunk unfolds to {unpacked} bytes, not to {size}"
+        ));
+    }
+    Ok(())
+}
+
 /// How long a chunk is when unpacked; at most one more than `most`.
-fn unpacked_len(source: &Source, body: &Body, most: u32) -> io::Result<u64> {
-    let (mut plain, base) = body.plain(source, FAR)?;
+fn unpacked_len(
+    source: &Source,
+    body: &Body,
+    most: u32,
+    allowance: &Arc<Allowance>,
+) -> io::Result<u64> {
+    let (mut plain, base) = body.plain(source, FAR, allowance)?;
     plain.skip(u64::from(most) + 1)?;
     Ok(plain.position() - base)
 }
@@ -95,7 +102,8 @@ fn unpacked_len(source: &Source, body: &Body, most: u32) -> io::Result<u64> {
 /// The crate's findings on their way to a sink.
 struct Crate<'s> {
     sink: &'s mut dyn Sink,
-    table: Table,
+    grammar: Rosbag1,
+    connections: Connections,
     wants: Vec<Want>,
     gather: Gather,
 }
@@ -141,16 +149,20 @@ impl Crate<'_> {
             data.extend(len.to_le_bytes());
             data.extend(name.bytes().chain([b'=']).chain(value.bytes()));
         }
-        if let Some(connection) = self
-            .table
-            .add(found.id, found.storage_topic.as_bytes(), &data)
+        let what = Described {
+            raw: found.id,
+            topic: found.storage_topic.as_bytes().to_vec(),
+        };
+        let described = self.grammar.describe(&what, &data, &self.connections);
+        if let Some((raw, connection)) = described
+            && let Some(connection) = self.connections.add(raw, connection)
         {
             self.wants.push(self.sink.connection(connection));
         }
     }
 
     fn message(&mut self, found: &rosbag::record_types::MessageData<'_>) {
-        let Some(id) = self.table.get(found.conn_id) else {
+        let Some(id) = self.connections.get(found.conn_id) else {
             return nameless(self.sink, 1);
         };
         let time = Stamp::from_nanos(found.time);

@@ -128,21 +128,22 @@ pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
     let Some(found) = found.iter().find(is_storage) else {
         return Err(format!("`{}` is missing", last.to_string_lossy()));
     };
-    let inside = || {
-        Some(
-            found
-                .canonicalize()
-                .ok()?
-                .starts_with(folder.canonicalize().ok()?),
-        )
-    };
-    if inside() == Some(true) {
+    if is_inside(folder, found) {
         Ok(found.clone())
     } else {
-        Err(format!(
-            "`{name}` is a link out of the folder and was not followed"
-        ))
+        Err(leads_out(name))
     }
+}
+
+/// Whether a file lies in a folder once all links are followed.
+pub(super) fn is_inside(folder: &Path, file: &Path) -> bool {
+    let real = file.canonicalize().ok().zip(folder.canonicalize().ok());
+    real.is_some_and(|(file, folder)| file.starts_with(folder))
+}
+
+/// What is said of a link that is not.
+pub(super) fn leads_out(name: &str) -> String {
+    format!("`{name}` is a link out of the folder and was not followed")
 }
 
 fn with_end(path: &Path, end: &str) -> PathBuf {

@@ -71,7 +71,13 @@ impl Db {
         };
         let flags = access | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let db = Connection::open_with_flags(address(ready), flags)?;
-        db.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
+        // Of a damaged database SQLite reads on only where it could be mended as well; nothing can be written all the
+        // same, neither to a file opened for reading nor by a connection that may only query.
+        if ready.damaged {
+            db.pragma_update(None, "writable_schema", 1)?;
+        } else {
+            db.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
+        }
         db.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)?;
         db.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false)?;
         db.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false)?;
@@ -84,7 +90,7 @@ impl Db {
 
     /// The columns of a table that hold what they say; none if it is no table.
     pub(super) fn columns(&self, table: &str) -> Result<Vec<String>, Refusal> {
-        let is_table = "SELECT count(*) FROM sqlite_schema WHERE name = ?1 AND type = 'table' AND rootpage > 0";
+        let is_table = "SELECT count(*) FROM sqlite_schema WHERE name = ?1 COLLATE NOCASE AND type = 'table' AND rootpage > 0";
         let count: i64 = self.0.query_row(is_table, [table], |row| row.get(0))?;
         let mut columns = Vec::new();
         if count == 0 {

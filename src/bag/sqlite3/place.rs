@@ -9,6 +9,8 @@ use crate::base::error::{Error, Result};
 /// A database ready to be opened.
 pub(super) struct Ready {
     pub(super) path: PathBuf,
+    /// The database is cut or damaged, and read as far as it goes.
+    pub(super) damaged: bool,
     /// Rows that are not looked at since the copy would be too large.
     pub(super) left_behind: bool,
     /// Removed when the bag has been read.
@@ -34,6 +36,7 @@ pub(super) fn ready(path: &Path) -> Result<Ready> {
         .collect();
     let mut ready = Ready {
         path: path.to_owned(),
+        damaged: false,
         left_behind: false,
         copy: None,
     };

@@ -1,11 +1,12 @@
 //! The rows of `messages`, part by part, and what is wanted of their payloads.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use super::Bag;
 use super::db::{Db, Refusal, Row};
 use crate::bag::adapters::Gather;
-use crate::bag::decompress::zstd_payload;
+use crate::bag::decompress::{Allowance, zstd_payload};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
@@ -20,28 +21,120 @@ pub(super) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 pub(super) struct Rows<'a> {
     bag: &'a Bag,
     sql: String,
+    /// The same without payloads.
+    bare: String,
     wants: &'a [Want],
     /// Whether the sizes of all payloads are told.
     sized: bool,
+    /// Rows come in the order of their ids: not by the index of times, which a range may use.
+    in_order: bool,
+    /// For payloads that are compressed one by one.
+    allowance: Arc<Allowance>,
 }
 
-/// Rows that say nothing.
+/// Rows that say nothing, or not all.
 #[derive(Default)]
 struct Lost {
     orphans: u64,
     odd: u64,
+    payloads: u64,
+}
+
+/// From which end rows are read.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    Up,
+    Down,
+}
+
+/// A part that is being read.
+struct Reading<'a, 's> {
+    rows: &'a Rows<'a>,
+    /// What has not been told.
+    left: Part,
+    /// A row came that had been told: the pages of a damaged table can form a ring.
+    repeated: bool,
+    lost: Lost,
+    gather: Gather,
+    sink: &'s mut dyn Sink,
+}
+
+/// So many payloads that cannot be read are passed over, one by one.
+const MOST_RETRIES: u64 = 1000;
+
+impl Reading<'_, '_> {
+    /// Tells the rows that are left, from one end on. Of a row whose payload is damaged the time is told.
+    fn on(&mut self, way: Way) -> Result<(), String> {
+        let order = match way {
+            // SQLite goes through the rows in their order unless there is a range, which has an index.
+            Way::Up if !self.rows.bag.ready.damaged => "",
+            Way::Up => " ORDER BY rowid",
+            Way::Down => " ORDER BY rowid DESC",
+        };
+        let db = Db::open(&self.rows.bag.ready).map_err(|e| e.to_string())?;
+        loop {
+            let told = self.some(&db, &format!("{}{order}", self.rows.sql), way);
+            let refusal = match told {
+                Ok(()) if self.repeated => return Err("they come again and again".to_owned()),
+                Ok(()) => return Ok(()),
+                Err(refusal) => refusal,
+            };
+            let before = self.left;
+            let bare = format!(
+                "{} ORDER BY rowid{} LIMIT 1",
+                self.rows.bare,
+                if way == Way::Up { "" } else { " DESC" }
+            );
+            let again = self.lost.payloads < MOST_RETRIES && self.some(&db, &bare, way).is_ok();
+            if !again || self.left == before {
+                return Err(refusal.to_string());
+            }
+            self.lost.payloads += 1;
+        }
+    }
+
+    /// Tells the rows of a query, and narrows what is left.
+    fn some(&mut self, db: &Db, sql: &str, way: Way) -> Result<(), Refusal> {
+        let in_order = self.rows.in_order;
+        self.repeated = false;
+        db.each(sql, &[self.left.0, self.left.1], |row| {
+            let id = row.integer(0);
+            if in_order && id.is_some_and(|id| !(self.left.0..=self.left.1).contains(&id)) {
+                self.repeated = true;
+                return ControlFlow::Break(());
+            }
+            match (id, way) {
+                (Some(id), Way::Up) => self.left.0 = id.saturating_add(1),
+                (Some(id), Way::Down) => self.left.1 = id.saturating_sub(1),
+                (None, _) => {}
+            }
+            match (row.integer(1), row.integer(2)) {
+                (Some(topic), Some(time)) => match self.rows.bag.ids.get(&topic) {
+                    Some(id) => {
+                        let time = Stamp(time).min(Stamp::LAST);
+                        self.rows.row(row, *id, time, &mut self.gather, self.sink);
+                    }
+                    None => self.lost.orphans += 1,
+                },
+                _ => self.lost.odd += 1,
+            }
+            ControlFlow::Continue(())
+        })
+    }
 }
 
 impl<'a> Rows<'a> {
     /// The rows of `bag` inside `range`.
     pub(super) fn new(bag: &'a Bag, wants: &'a [Want], range: Option<Span>) -> Self {
         let sized = !bag.packed || wants.iter().all(|w| *w >= Want::Sizes);
-        let sql = sql(bag, wants, range);
         Self {
             bag,
-            sql,
+            sql: sql(bag, &wanted(bag, wants), range),
+            bare: sql(bag, "0", range),
             wants,
             sized,
+            in_order: range.is_none() || bag.ready.damaged,
+            allowance: Arc::default(),
         }
     }
 
@@ -49,53 +142,24 @@ impl<'a> Rows<'a> {
     pub(super) fn read(&self, part: Part, sink: &mut dyn Sink) {
         let mut gather = Gather::default();
         gather.sizeless = !self.sized;
-        let mut left = part;
-        let mut lost = Lost::default();
-        let mut told = self.some(&mut left, "", &mut lost, &mut gather, sink);
-        if told.is_err() && left.0 <= left.1 {
-            let back = self.some(
-                &mut left,
-                " ORDER BY rowid DESC",
-                &mut lost,
-                &mut gather,
-                sink,
-            );
-            told = told.and(back);
+        let mut reading = Reading {
+            rows: self,
+            left: part,
+            repeated: false,
+            lost: Lost::default(),
+            gather,
+            sink,
+        };
+        let mut told = reading.on(Way::Up);
+        if told.is_err() && reading.left.0 <= reading.left.1 {
+            told = told.and(reading.on(Way::Down));
         }
-        gather.flush(sink);
-        lost.tell(sink);
+        reading.gather.flush(reading.sink);
+        reading.lost.tell(reading.sink);
         if let Err(e) = told {
             let text = format!("rows could not be read: {e}");
             sink.notice(Notice::new(NoticeKind::Damaged, text));
         }
-    }
-
-    /// Tells the rows of `left` in an order, and narrows it to those that have not been told.
-    fn some(
-        &self,
-        left: &mut Part,
-        order: &str,
-        lost: &mut Lost,
-        gather: &mut Gather,
-        sink: &mut dyn Sink,
-    ) -> Result<(), Refusal> {
-        let db = Db::open(&self.bag.ready)?;
-        let args = [left.0, left.1];
-        db.each(&format!("{}{order}", self.sql), &args, |row| {
-            match row.integer(0) {
-                Some(id) if order.is_empty() => left.0 = id.saturating_add(1),
-                Some(id) => left.1 = id.saturating_sub(1),
-                None => {}
-            }
-            match (row.integer(1), row.integer(2)) {
-                (Some(topic), Some(time)) => match self.bag.ids.get(&topic) {
-                    Some(id) => self.row(row, *id, Stamp(time), gather, sink),
-                    None => lost.orphans += 1,
-                },
-                _ => lost.odd += 1,
-            }
-            ControlFlow::Continue(())
-        })
     }
 
     fn row(
@@ -115,7 +179,8 @@ impl<'a> Rows<'a> {
             return gather.add(id, time, stored, sink);
         }
         let data = row.bytes(4);
-        let size = data.and_then(|data| tell_payload(data, (id, time), want, sink));
+        let size =
+            data.and_then(|data| tell_payload(data, (id, time), want, &self.allowance, sink));
         if size.is_none() {
             let text =
                 "payloads larger than 16 MiB or badly compressed were counted and not looked into";
@@ -125,9 +190,8 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The query for a part's rows: id, topic, time, length, and the payload where it is wanted. SQLite leaves payloads
-/// that nobody asks for on the disk.
-fn sql(bag: &Bag, wants: &[Want], range: Option<Span>) -> String {
+/// Which rows' payloads are wanted, in SQL.
+fn wanted(bag: &Bag, wants: &[Want]) -> String {
     let wanted = |want: Want| want > Want::Sizes || bag.packed && want == Want::Sizes;
     let ids = bag
         .ids
@@ -135,21 +199,29 @@ fn sql(bag: &Bag, wants: &[Want], range: Option<Span>) -> String {
         .filter(|(_, id)| wanted(wants[id.0 as usize]));
     let mut ids: Vec<String> = ids.map(|(raw, _)| raw.to_string()).collect();
     ids.sort_unstable();
-    let which = match (bag.verify, ids.is_empty()) {
+    match (bag.verify, ids.is_empty()) {
         (true, _) => "1".to_owned(),
         (false, true) => "0".to_owned(),
         (false, false) => format!("topic_id IN ({})", ids.join(",")),
+    }
+}
+
+/// The query for a part's rows: id, topic, time, length, and the payload where `which` says so. SQLite leaves payloads
+/// that nobody asks for on the disk.
+fn sql(bag: &Bag, which: &str, range: Option<Span>) -> String {
+    // The index of times may be damaged where the rows are not; the sign keeps SQLite from it.
+    let time = if bag.ready.damaged {
+        "+timestamp"
+    } else {
+        "timestamp"
     };
-    let time = range.map_or(String::new(), |r| {
-        format!(
-            " AND timestamp >= {} AND timestamp < {}",
-            r.start.0, r.end.0
-        )
+    let inside = range.map_or(String::new(), |r| {
+        format!(" AND {time} >= {} AND {time} < {}", r.start.0, r.end.0)
     });
     format!(
         "SELECT rowid, topic_id, timestamp, octet_length(data), \
          CASE WHEN {which} AND octet_length(data) <= {MOST_PAYLOAD} THEN data END \
-         FROM messages WHERE rowid BETWEEN ?1 AND ?2{time}"
+         FROM messages WHERE rowid BETWEEN ?1 AND ?2{inside}"
     )
 }
 
@@ -158,11 +230,12 @@ fn tell_payload(
     data: &[u8],
     (connection, time): (ConnectionId, Stamp),
     want: Want,
+    allowance: &Arc<Allowance>,
     sink: &mut dyn Sink,
 ) -> Option<u32> {
     let unpacked;
     let data = if data.starts_with(ZSTD) {
-        unpacked = zstd_payload(data, MOST_PAYLOAD)?;
+        unpacked = zstd_payload(data, MOST_PAYLOAD, allowance)?;
         &unpacked
     } else {
         data
@@ -187,6 +260,7 @@ impl Lost {
                 "rows belong to a topic that the bag does not name",
             ),
             (self.odd, "rows hold no topic or no time"),
+            (self.payloads, "rows could be counted and not looked into"),
         ];
         for (count, text) in kinds.into_iter().filter(|(count, _)| *count > 0) {
             let text = text.to_owned();

@@ -94,7 +94,7 @@ impl Boxes<'_> {
             self.latch(&mut group, inner, body);
         }
         let second = second_line(shown, card.tells);
-        let second = second.unwrap_or_else(|| card.label.fixed.clone());
+        let second = second.unwrap_or_else(|| card.label.silence(shown, card.tells));
         self.lines(&mut group, &card.label, &second, inner, body, &look);
         if let Some(text) = pendant(shown, card.tells) {
             let (below, size) = self.below(place);

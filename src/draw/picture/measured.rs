@@ -5,7 +5,7 @@ use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::graph::Element;
+use crate::graph::{Element, State};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
 
@@ -29,6 +29,23 @@ pub(crate) struct Label {
     /// The smaller line where it is the same in all windows.
     pub(crate) fixed: String,
 }
+
+impl Label {
+    /// The smaller line in a window of which there is nothing to say but what is said of all windows, or that no message
+    /// came.
+    pub(crate) fn silence(&self, shown: &Shown, tells: Tells) -> String {
+        let speaks = self.second && self.fixed.is_empty() && tells == Tells::Rates;
+        match (shown.mark, shown.state) {
+            (Some(Mark::Removed), _) => self.fixed.clone(),
+            (_, State::Latched) if speaks => "latched".to_owned(),
+            _ if speaks => NO_MESSAGE.to_owned(),
+            _ => self.fixed.clone(),
+        }
+    }
+}
+
+/// What stands in the place of a rate where no message came.
+const NO_MESSAGE: &str = "no msg";
 
 /// A namespace with a box around its members.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,7 +144,7 @@ impl Measurer<'_> {
         let body = self.body(item);
         let mut name = self
             .fonts
-            .shown(short_name(&item.name, inside))
+            .shown(short_name(&item.label, inside))
             .into_owned();
         let mut fixed = String::new();
         if item.kind == ItemKind::Namespace {
@@ -176,7 +193,10 @@ impl Measurer<'_> {
                 let width = self
                     .fonts
                     .width(&line, self.body(item).small, Weight::SemiBold);
-                widen(&mut widest[at], width);
+                let silence = self
+                    .fonts
+                    .width(NO_MESSAGE, self.body(item).small, Weight::SemiBold);
+                widen(&mut widest[at], width.max(silence));
             }
         }
         widest

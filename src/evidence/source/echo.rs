@@ -29,8 +29,10 @@ const LONGEST: usize = 1024;
 const MOST_VALUES: usize = 4;
 /// Forms of texts that are looked at more closely.
 const MOST_FORMS: usize = 4096;
+/// Forms of texts that are kept at all.
+const MOST_KEPT: usize = 1 << 14;
 /// Messages compared with one text.
-const MOST_NEAR: usize = 256;
+const MOST_NEAR: usize = 64;
 
 /// Keeps the text of a log record.
 pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
@@ -171,6 +173,9 @@ fn echoes(known: &Findings<'_>, said: &[Said], shown: &[Shown]) -> BTreeMap<Form
                 text.text[place.end..].to_owned(),
                 topic,
             );
+            if echoes.len() >= MOST_KEPT && !echoes.contains_key(&form) {
+                continue;
+            }
             let echo = echoes.entry(form).or_default();
             echo.values.insert(message.value.clone());
             if echo.texts.insert((text.time, text.text.clone())) {

@@ -115,6 +115,7 @@ struct Flow {
 /// All flows with what their stamps have in common.
 struct Flows {
     all: Vec<Flow>,
+    /// By output, then input.
     pairs: BTreeMap<(usize, usize), Pair>,
 }
 
@@ -131,7 +132,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         let Some(input) = input(known, &flows, output) else {
             continue;
         };
-        let (topic, matches) = (flows.all[input].topic, flows.pairs[&(input, output)].before);
+        let (topic, matches) = (flows.all[input].topic, flows.pairs[&(output, input)].before);
         for node in &flow.nodes {
             let basis = Key::Publish(*node, flow.topic);
             known.infer(source, Key::Subscribe(topic, *node), basis, |known| {
@@ -148,9 +149,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 /// The flow that an output answers, if only one can be meant.
 fn input(known: &Findings<'_>, flows: &Flows, output: usize) -> Option<usize> {
     let flow = &flows.all[output];
-    let good = flows.pairs.iter().filter(|((input, to), pair)| {
-        *to == output
-            && flows.all[*input].topic != flow.topic
+    let own = flows.pairs.range((output, 0)..=(output, usize::MAX));
+    let good = own.filter(|((_, input), pair)| {
+        flows.all[*input].topic != flow.topic
             && pair.before >= FEWEST
             && pair.before * 100 >= flow.messages * SHARE
             && pair.before * 100 >= pair.equal * ORDERED
@@ -159,7 +160,7 @@ fn input(known: &Findings<'_>, flows: &Flows, output: usize) -> Option<usize> {
                 .iter()
                 .any(|n| known.knows(Key::Publish(*n, flows.all[*input].topic)))
     });
-    let good: Vec<(usize, Pair)> = good.map(|((input, _), pair)| (*input, *pair)).collect();
+    let good: Vec<(usize, Pair)> = good.map(|((_, input), pair)| (*input, *pair)).collect();
     let most = good.iter().map(|(_, pair)| pair.before).max()?;
     let best: Vec<_> = good
         .into_iter()
@@ -284,7 +285,7 @@ fn compare(group: &[(Timed, usize)], all: &[Flow], pairs: &mut BTreeMap<(usize, 
             if !counted.insert((from, to)) {
                 continue;
             }
-            let pair = pairs.entry((*from, *to)).or_default();
+            let pair = pairs.entry((*to, *from)).or_default();
             let ahead = output.size.wrapping_sub(input.size).cast_signed();
             pair.equal += 1;
             if (0..=ANSWER).contains(&ahead) {

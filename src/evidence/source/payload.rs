@@ -5,7 +5,7 @@
 //! constant) says nothing and is counted once.
 
 use std::collections::hash_map::DefaultHasher;
-use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::hash::Hasher as _;
 
 use super::SourceContext;
@@ -20,6 +20,8 @@ const FEWEST: u64 = 10;
 const SHARE: u64 = 90;
 /// How many times as often the input must come first as the output.
 const FIRST: u64 = 3;
+/// A content that more flows have at once is a constant.
+const MOST_AT_ONCE: usize = 32;
 /// The longest that a message takes to be passed on.
 const RECENT_NS: i64 = 2_000_000_000;
 /// Log records are passed on by a node that is known anyway.
@@ -117,8 +119,8 @@ fn matches(known: &mut Findings<'_>) -> (Vec<Flow>, Matches) {
         })
         .collect();
     let flows: Vec<Flow> = named.into_values().collect();
-    let place = |flow: Flow| flows.iter().position(|f| *f == flow).unwrap_or(0);
-    let flow_at: Vec<usize> = places.iter().map(|at| place(flow_of(at))).collect();
+    let rank: BTreeMap<Flow, usize> = flows.iter().copied().zip(0..).collect();
+    let flow_at: Vec<usize> = places.iter().map(|at| rank[&flow_of(at)]).collect();
     let mut walk = Walk::default();
     let merged = known.facts.times.merge(&series, |timed| {
         walk.take(timed.time, flow_at[timed.series], timed.size);
@@ -158,6 +160,9 @@ impl Walk {
         }
         *self.found.distinct.entry(flow).or_default() += 1;
         let owners = self.recent.entry(hash).or_default();
+        if owners.len() >= MOST_AT_ONCE {
+            return;
+        }
         let mut origins = Vec::new();
         for (before, input) in owners.iter().filter(|(t, f)| *t < time && *f != flow) {
             let pair = self.found.pairs.entry((*input, flow)).or_default();
@@ -199,7 +204,9 @@ fn inputs(
             && often >= FIRST * before(output, *input)
             && !known.knows(Key::Publish(node, topic))
     };
-    (0..flows.len()).filter(is_input).collect()
+    let own = matches.origins.get(&output).into_iter().flatten();
+    let from: BTreeSet<usize> = own.flat_map(|(from, _)| from).copied().collect();
+    from.into_iter().filter(is_input).collect()
 }
 
 /// How many different messages of an output one of these inputs had before.

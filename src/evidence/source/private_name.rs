@@ -1,5 +1,6 @@
 //! Private names: a topic below a node's own full name is that node's, so it publishes it where nobody else is known to.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::evidence::claim::{Name, SourceId};
@@ -26,7 +27,8 @@ const TAKEN: [&str; 16] = [
 ];
 
 pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
-    let nodes: Vec<(Name, Arc<str>)> = known.nodes().iter().map(|n| (*n, known.text(*n))).collect();
+    let nodes: Nodes = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
+    let spaces = spaces(&nodes);
     for topic in known.topics_of(|_| true) {
         let name = known.text(topic);
         let last = name.rsplit('/').next().unwrap_or_default();
@@ -34,7 +36,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         if known.publishers(topic).next().is_some() || is_taken || is_hidden(&name) {
             continue;
         }
-        if let Some(node) = owner(&name, &nodes) {
+        if let Some(node) = owner(&name, &nodes, &spaces) {
             known.infer_publisher(source, node, topic, |known| {
                 format!(
                     "{} lies below the name of {}",
@@ -51,16 +53,26 @@ fn is_hidden(topic: &str) -> bool {
     topic.split('/').any(|part| part.starts_with('_'))
 }
 
+/// Nodes by name.
+type Nodes = BTreeMap<Arc<str>, Name>;
+
+/// The names that other nodes lie below.
+fn spaces(nodes: &Nodes) -> BTreeSet<&str> {
+    nodes.keys().flat_map(|node| above(node)).collect()
+}
+
+/// All that a name lies below, the nearest first, without the root.
+fn above(name: &str) -> impl Iterator<Item = &str> {
+    let slashes = name.rmatch_indices('/');
+    slashes
+        .map(|(at, _)| &name[..at])
+        .filter(|space| !space.is_empty())
+}
+
 /// The node with the longest name that a topic lies below, unless that name is a namespace of other nodes too.
-fn owner(topic: &str, nodes: &[(Name, Arc<str>)]) -> Option<Name> {
-    let below = |name: &str, above: &str| {
-        name.strip_prefix(above)
-            .is_some_and(|rest| above.len() > 1 && rest.starts_with('/'))
-    };
-    let above = nodes.iter().filter(|(_, node)| below(topic, node));
-    let (node, name) = above.max_by_key(|(_, node)| node.len())?;
-    let is_space = nodes.iter().any(|(_, other)| below(other, name));
-    (!is_space).then_some(*node)
+fn owner(topic: &str, nodes: &Nodes, spaces: &BTreeSet<&str>) -> Option<Name> {
+    let name = above(topic).find(|name| nodes.contains_key(*name))?;
+    nodes.get(name).copied().filter(|_| !spaces.contains(name))
 }
 
 #[cfg(test)]
@@ -69,15 +81,13 @@ mod tests {
 
     #[test]
     fn a_topic_belongs_to_the_node_it_lies_below() {
-        let nodes: Vec<(Name, Arc<str>)> = ["/amcl", "/r1", "/r1/nav"]
-            .iter()
-            .zip(0..)
-            .map(|(name, at)| (Name(at), (*name).into()))
-            .collect();
-        assert_eq!(owner("/amcl/pose", &nodes), Some(Name(0)));
-        assert_eq!(owner("/r1/nav/plan", &nodes), Some(Name(2)));
-        assert_eq!(owner("/r1/scan", &nodes), None);
-        assert_eq!(owner("/amcl_pose", &nodes), None);
-        assert_eq!(owner("/amcl", &nodes), None);
+        let names = ["/amcl", "/r1", "/r1/nav"].into_iter().map(Arc::from);
+        let nodes: Nodes = names.zip((0..).map(Name)).collect();
+        let owner = |topic| owner(topic, &nodes, &spaces(&nodes));
+        assert_eq!(owner("/amcl/pose"), Some(Name(0)));
+        assert_eq!(owner("/r1/nav/plan"), Some(Name(2)));
+        assert_eq!(owner("/r1/scan"), None);
+        assert_eq!(owner("/amcl_pose"), None);
+        assert_eq!(owner("/amcl"), None);
     }
 }

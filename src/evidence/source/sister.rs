@@ -8,6 +8,8 @@ use crate::evidence::proof::{Findings, Key};
 
 /// Twins publish at least so many topics of their namespace: one alone may be chance.
 const FEWEST: usize = 2;
+/// More twins than this are not compared one by one.
+const MOST: usize = 200;
 
 /// A node with its namespace, and the topics it publishes inside it.
 struct Twin {
@@ -17,7 +19,10 @@ struct Twin {
 }
 
 pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
-    for twins in families(known).into_values() {
+    for twins in families(known)
+        .into_values()
+        .filter(|twins| twins.len() <= MOST)
+    {
         for one in &twins {
             let alike = twins
                 .iter()

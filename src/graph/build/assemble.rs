@@ -11,7 +11,7 @@ use super::windows::Windows;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
 use crate::evidence::collector::Collected;
-use crate::evidence::proof::{Key, Reliability, offered};
+use crate::evidence::proof::{Key, Reliability, offers};
 use crate::graph::lives::{Known, Life, Stretch, Transition, Voice, all_silent, silences};
 use crate::graph::{
     Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, State, Topic, TopicState,
@@ -55,6 +55,7 @@ pub(crate) fn assemble(
         nodes: BTreeMap::new(),
         topics: BTreeMap::new(),
         publishers: BTreeMap::new(),
+        offers: offers(&collected.facts.offers, &collected.streams),
         sent: BTreeMap::new(),
     };
     all.count_sent();
@@ -85,6 +86,8 @@ struct Assembly<'a> {
     topics: BTreeMap<Name, u32>,
     /// How many nodes are known to publish each topic.
     publishers: BTreeMap<Name, u32>,
+    /// How many publishers the bags count on each topic.
+    offers: BTreeMap<Name, u32>,
     /// Messages of each known publisher: per topic, then per window.
     sent: BTreeMap<Name, BTreeMap<Name, BTreeMap<usize, u64>>>,
 }
@@ -261,7 +264,7 @@ impl Assembly<'_> {
 
     /// How many publishers of a topic the bag counts beyond those that are known.
     fn unknown_publishers(&self, topic: Name) -> Option<u32> {
-        let counted = offered(&self.collected.facts.offers, &self.collected.streams, topic)?;
+        let counted = *self.offers.get(&topic)?;
         let known = self.publishers.get(&topic).copied().unwrap_or(0);
         Some(counted.saturating_sub(known))
     }

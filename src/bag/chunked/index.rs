@@ -1,15 +1,19 @@
-//! What an index says of one chunk, told to a sink; and wanted messages, picked out of the chunk's bytes.
+//! What the index behind a chunk says, told to a sink; and wanted messages, picked out of the chunk's bytes.
 
 use std::io;
+use std::marker::PhantomData;
 use std::ops::Range;
+use std::sync::Arc;
 
-use crate::bag::decompress::Compression;
+use super::Grammar;
+use super::record::{Connections, Record};
+use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
 use crate::bag::source::{FAR, NEAR, Source, Stream};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
-/// What index records of a chunk should add up to, in any order.
+/// What the index of a chunk should add up to, in any order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct IndexSum {
     pub(crate) connections: u32,
@@ -32,15 +36,6 @@ impl IndexSum {
 /// A longer index, in bytes, is not held in memory; its chunk is walked instead.
 pub(crate) const LONGEST_INDEX: u64 = 16 << 20;
 
-/// How many threads pay for `chunks` chunks of which the longest index takes `index` bytes: the reads wait for the
-/// disk, and a long index takes memory.
-pub(crate) fn threads(chunks: usize, index: u64) -> usize {
-    if index > LONGEST_INDEX / 16 {
-        return 1;
-    }
-    (chunks / 256).clamp(1, 8)
-}
-
 /// The entries of a chunk's index.
 #[derive(Default)]
 pub(crate) struct Index {
@@ -61,6 +56,16 @@ impl Index {
         }
         self.runs.push((raw, start..self.stamps.len()));
     }
+
+    /// Whether its first and last times are these.
+    pub(super) fn spans(&self, first: Stamp, last: Stamp) -> bool {
+        let (mut low, mut high) = (Stamp::MAX, Stamp::MIN);
+        for at in &self.stamps {
+            low = low.min(*at);
+            high = high.max(*at);
+        }
+        self.stamps.is_empty() || (low, high) == (first, last)
+    }
 }
 
 /// Where a chunk's records lie.
@@ -76,35 +81,33 @@ impl Body {
         &self,
         source: &'a Source,
         step: usize,
+        allowance: &Arc<Allowance>,
     ) -> io::Result<(Stream<'a>, u64)> {
         if self.how == Compression::None {
             let stream = Stream::of_file(source, self.range.start, self.range.end, step);
             return Ok((stream, self.range.start));
         }
         let packed = Stream::of_file(source, self.range.start, self.range.end, FAR);
-        Ok((Stream::of_reader(self.how.reader(packed)?), 0))
+        Ok((Stream::of_reader(allowance.open(self.how, packed)?), 0))
     }
 }
 
 /// What is asked for of a bag: the same for all of its chunks.
-#[derive(Clone, Copy)]
-pub(crate) struct Query<'a> {
-    /// The connection that the bag calls so.
-    pub(crate) resolve: &'a (dyn Fn(u32) -> Option<ConnectionId> + Sync),
+pub(super) struct Query<'a, G> {
+    pub(super) source: &'a Source,
+    pub(super) allowance: Arc<Allowance>,
+    pub(super) connections: &'a Connections,
     /// What is wanted, by connection.
-    pub(crate) wants: &'a [Want],
-    pub(crate) range: Option<Span>,
-    /// Takes the head of a message record: the bag's number of its connection, and the length of the payload, which
-    /// the stream then stands at.
-    pub(crate) head: fn(&mut Stream<'_>) -> Option<(u32, u32)>,
+    pub(super) wants: &'a [Want],
+    pub(super) range: Option<Span>,
+    pub(super) grammar: PhantomData<fn() -> G>,
 }
 
-impl Query<'_> {
+impl<G: Grammar> Query<'_, G> {
     /// Tells `sink` the stamps of `index`, and the wanted messages from `body`.
-    pub(crate) fn tell(
+    pub(super) fn tell(
         &self,
         index: &Index,
-        source: &Source,
         body: impl FnOnce() -> Option<Body>,
         sink: &mut dyn Sink,
     ) {
@@ -112,10 +115,10 @@ impl Query<'_> {
         let sizes = if wanted.is_empty() {
             None
         } else {
-            self.fetch(&wanted, index.stamps.len(), source, body(), sink)
+            self.fetch(&wanted, index.stamps.len(), body(), sink)
         };
         for (raw, entries) in &index.runs {
-            let Some(id) = (self.resolve)(*raw) else {
+            let Some(id) = self.connections.get(*raw) else {
                 nameless(sink, entries.len() as u64);
                 continue;
             };
@@ -132,7 +135,7 @@ impl Query<'_> {
     fn wanted(&self, index: &Index) -> Vec<Wanted> {
         let mut all = Vec::new();
         for (raw, entries) in &index.runs {
-            let Some(id) = (self.resolve)(*raw) else {
+            let Some(id) = self.connections.get(*raw) else {
                 continue;
             };
             let want = self.wants[id.0 as usize];
@@ -162,18 +165,17 @@ impl Query<'_> {
         &self,
         wanted: &[Wanted],
         entries: usize,
-        source: &Source,
         body: Option<Body>,
         sink: &mut dyn Sink,
     ) -> Option<Vec<u32>> {
         let mut sizes = vec![0; entries];
         let mut missing = 0;
-        let plain = body.and_then(|b| b.plain(source, NEAR).ok());
+        let plain = body.and_then(|b| b.plain(self.source, NEAR, &self.allowance).ok());
         match plain {
             None => missing = wanted.len(),
             Some((mut stream, base)) => {
                 for one in wanted {
-                    match self.pick(&mut stream, base, one, sink) {
+                    match pick::<G>(&mut stream, base, one, sink) {
                         Some(size) => sizes[one.entry] = size,
                         None => missing += 1,
                     }
@@ -183,39 +185,37 @@ impl Query<'_> {
         if missing == 0 {
             return Some(sizes);
         }
-        sink.notice(Notice {
-            kind: NoticeKind::Damaged,
-            count: missing as u64,
-            text: "messages are in the index but not in their chunk".to_owned(),
-        });
+        absent(sink, missing as u64);
         None
     }
+}
 
-    fn pick(
-        &self,
-        stream: &mut Stream<'_>,
-        base: u64,
-        one: &Wanted,
-        sink: &mut dyn Sink,
-    ) -> Option<u32> {
-        let ahead = base
-            .checked_add(one.offset)?
-            .checked_sub(stream.position())?;
-        if stream.skip(ahead).ok()? < ahead {
-            return None;
-        }
-        let (_, size) = (self.head)(stream).filter(|(raw, _)| *raw == one.raw)?;
-        let data = wanted_part(stream, size, one.want, sink).ok()?;
-        if let Some(data) = data {
-            sink.message(Message {
-                connection: one.id,
-                time: one.time,
-                data,
-                size,
-            });
-        }
-        Some(size)
+/// Tells `sink` one wanted message; answers its size, or nothing if it is not there.
+fn pick<G: Grammar>(
+    stream: &mut Stream<'_>,
+    base: u64,
+    one: &Wanted,
+    sink: &mut dyn Sink,
+) -> Option<u32> {
+    let ahead = base
+        .checked_add(one.offset)?
+        .checked_sub(stream.position())?;
+    if stream.skip(ahead).ok()? < ahead {
+        return None;
     }
+    let size = match G::next(stream).ok()? {
+        Record::Message { raw, size, .. } if raw == one.raw => size,
+        _ => return None,
+    };
+    if let Some(data) = wanted_part(stream, size, one.want, sink).ok()? {
+        sink.message(Message {
+            connection: one.id,
+            time: one.time,
+            data,
+            size,
+        });
+    }
+    Some(size)
 }
 
 /// A message to be fetched.
@@ -237,13 +237,22 @@ pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
     });
 }
 
+/// Messages that only the index knows of.
+pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
+    sink.notice(Notice {
+        kind: NoticeKind::Damaged,
+        count,
+        text: "messages are in the index but not in their chunk".to_owned(),
+    });
+}
+
 /// Hands over what is wanted of the message that `stream` stands at, and passes over it.
-pub(crate) fn hand_over(
+pub(super) fn hand_over(
     stream: &mut Stream<'_>,
     (connection, time, size): (ConnectionId, Stamp, u32),
     want: Want,
     sink: &mut dyn Sink,
-) -> io::Result<()> {
+) -> Result<(), super::record::Stop> {
     if let Some(data) = wanted_part(stream, size, want, sink)? {
         sink.message(Message {
             connection,
@@ -252,7 +261,7 @@ pub(crate) fn hand_over(
             size,
         });
     }
-    pass(stream, u64::from(size))
+    super::record::pass(stream, u64::from(size))
 }
 
 /// Hands over what is wanted of a message that another reader holds.
@@ -274,14 +283,6 @@ pub(crate) fn hand_over_slice(
         data,
         size,
     });
-}
-
-/// Passes over `len` bytes, which must be there.
-pub(crate) fn pass(stream: &mut Stream<'_>, len: u64) -> io::Result<()> {
-    match stream.skip(len)? {
-        n if n < len => Err(io::ErrorKind::UnexpectedEof.into()),
-        _ => Ok(()),
-    }
 }
 
 /// The bytes that are wanted of the message that `stream` stands at; `None` if none are, or too many.
@@ -309,56 +310,3 @@ fn wanted_part<'s>(
 
 /// What is said of a payload past [`MOST_PAYLOAD`].
 const TOO_LARGE: &str = "messages larger than 16 MiB were counted and not looked into";
-
-/// A way to find the first and the last stamp: all the rest is forgotten.
-#[derive(Default)]
-pub(crate) struct Extremes(Option<(Stamp, Stamp)>);
-
-impl Extremes {
-    /// The span of the stamps.
-    pub(crate) fn span(&self) -> Option<Span> {
-        let (start, last) = self.0?;
-        Some(Span {
-            start,
-            end: last.plus(1),
-        })
-    }
-}
-
-impl Sink for Extremes {
-    fn connection(&mut self, _: &super::Connection) -> Want {
-        Want::Stamps
-    }
-
-    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
-        for at in stamps {
-            let (first, last) = self.0.unwrap_or((*at, *at));
-            self.0 = Some((first.min(*at), last.max(*at)));
-        }
-    }
-
-    fn message(&mut self, _: Message<'_>) {}
-
-    fn notice(&mut self, _: Notice) {}
-}
-
-/// The span of a bag from the claimed spans of its chunks: `read` looks into the chunks that are said to be first and
-/// last, or into all if they are few.
-pub(crate) fn span_of(
-    claims: impl Iterator<Item = (usize, Stamp, Stamp)>,
-    read: impl Fn(usize, &mut dyn Sink),
-) -> Option<Span> {
-    let claims: Vec<_> = claims.collect();
-    let mut seen = Extremes::default();
-    if claims.len() <= 512 {
-        for (at, ..) in &claims {
-            read(*at, &mut seen);
-        }
-    } else {
-        let first = claims.iter().min_by_key(|c| c.1)?;
-        let last = claims.iter().max_by_key(|c| c.2)?;
-        read(first.0, &mut seen);
-        read(last.0, &mut seen);
-    }
-    seen.span()
-}

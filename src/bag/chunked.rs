@@ -1,0 +1,306 @@
+//! Bags made of chunks, ROS 1 and MCAP alike: one driver over two grammars of records.
+//!
+//! A [`Grammar`] says what stands in a bag and what its tail promises. The driver reads a file by the index behind each
+//! chunk, or record by record from the front where that is missing; a pipe only so.
+
+mod check;
+mod chunk;
+mod forward;
+mod index;
+mod plan;
+mod record;
+mod unpack;
+
+use std::collections::BTreeSet;
+use std::marker::PhantomData;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::bag::adapters::{Clip, GROUP, in_order};
+use crate::bag::decompress::Compression;
+use crate::bag::input::{Place, file_name};
+use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
+use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::{Span, Stamp};
+
+use index::Query;
+pub(crate) use index::{Body, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
+pub(crate) use plan::{Chunk, MOST_CHUNKS, Plan, Unindexed, Used};
+pub(crate) use record::{ChunkHead, Connections, Record, Stop, pass};
+
+/// What tells one format of chunked bags from another. Its values remember what one description says of the next.
+pub(crate) trait Grammar: Default + Send + 'static {
+    /// The format's word in JSON.
+    const NAME: &'static str;
+    /// Whether the tail does not say where the index of a chunk lies.
+    const INDEX_IS_GUESSED: bool;
+    /// Whether a bag ends in a record of its own.
+    const HAS_END: bool;
+    /// What stands behind that record.
+    const CLOSING: &'static [u8];
+    /// What the head of a description says.
+    type Description;
+
+    /// Refuses what is not of this format after all, from its first bytes.
+    fn accept(path: &Path, head: &[u8]) -> Result<()>;
+
+    /// Goes to the first record.
+    fn begin(stream: &mut Stream<'_>);
+
+    /// Takes the head of the next record.
+    fn next(stream: &mut Stream<'_>) -> Result<Record<Self::Description>, Stop>;
+
+    /// The connection that a description announces, with the bag's number for it; `None` if it announces none, or one
+    /// that is known.
+    fn describe(
+        &mut self,
+        what: &Self::Description,
+        data: &[u8],
+        known: &Connections,
+    ) -> Option<(u32, Connection)>;
+
+    /// Whether a chunk begins here. Asked at every byte where records broke off.
+    fn is_chunk(bytes: &[u8]) -> bool;
+
+    /// The index records in `bytes`, if they add up to `promised`.
+    fn index(bytes: &[u8], promised: &IndexSum) -> Option<Index>;
+
+    /// The times in the data of one index record.
+    fn index_stamps(data: &[u8]) -> Vec<Stamp>;
+
+    /// Reads the tail.
+    fn plan(source: &Source) -> std::io::Result<Result<Plan, Unindexed>>;
+
+    /// Stored facts worth telling, from the first bytes.
+    fn facts(head: &[u8]) -> Vec<(String, String)>;
+
+    /// Tells `sink` all that somebody else's reader finds.
+    fn verify(source: &Source, plan: &Result<Plan, Unindexed>, sink: &mut dyn Sink) -> Verified;
+}
+
+/// What a second reader did.
+#[derive(Default)]
+pub(crate) struct Verified {
+    pub(crate) compression: BTreeSet<Compression>,
+    /// Why it did not get to the end.
+    pub(crate) stopped: Option<String>,
+    /// It told nothing at all.
+    pub(crate) refused: bool,
+}
+
+/// A bag in a file, with its tail if that can be relied on.
+struct Indexed<G> {
+    source: Source,
+    plan: Result<Plan, Unindexed>,
+    facts: Vec<(String, String)>,
+    verify: bool,
+    grammar: PhantomData<fn() -> G>,
+}
+
+/// A bag from a pipe.
+struct Piped<G> {
+    name: String,
+    stream: Stream<'static>,
+    grammar: PhantomData<fn() -> G>,
+}
+
+/// How many first bytes say whether a bag is of this format after all.
+const HEAD: usize = 32;
+
+/// Opens a bag of this grammar.
+pub(crate) fn open<G: Grammar>(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+    let grammar = PhantomData;
+    match place {
+        Place::File(source) => {
+            let path = source.path().to_owned();
+            let mut head = vec![0; NEAR];
+            let got = source
+                .read_at(0, &mut head)
+                .map_err(Error::io("read", &path))?;
+            G::accept(&path, &head[..got])?;
+            let facts = G::facts(&head[..got]);
+            let plan = G::plan(&source).map_err(Error::io("read", &path))?;
+            Ok(Box::new(Indexed::<G> {
+                source,
+                plan,
+                facts,
+                verify: options.verify,
+                grammar,
+            }))
+        }
+        Place::Pipe(name, mut stream) => {
+            let path = Path::new(&name);
+            let head = stream.peek(HEAD).map_err(Error::io("read", path))?;
+            G::accept(path, head)?;
+            Ok(Box::new(Piped::<G> {
+                name,
+                stream,
+                grammar,
+            }))
+        }
+        Place::Folder(path) => Err(super::explain(&path, &[], true)),
+    }
+}
+
+impl<G: Grammar> Reader for Indexed<G> {
+    fn span(&mut self) -> Result<Option<Span>> {
+        let Ok(plan) = &self.plan else {
+            return Ok(None);
+        };
+        let wants = vec![Want::Stamps; plan.connections.list().len()];
+        let query = self.query(plan, &wants, None);
+        Ok(plan.span(|chunk, sink| query.read(chunk, sink)))
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        let mut sink = Clip::new(range, sink);
+        let report = match &self.plan {
+            _ if self.verify => self.by_the_second_reader(&mut sink),
+            Ok(plan) => self.by_index(plan, range, &mut sink),
+            Err(reason) => self.front_to_back(reason, &mut sink),
+        };
+        Ok(Report {
+            bytes_read: self.source.bytes_read(),
+            file_bytes: self.source.len(),
+            facts: self.facts.clone(),
+            ..report
+        })
+    }
+}
+
+impl<G: Grammar> Indexed<G> {
+    fn query<'a>(&'a self, plan: &'a Plan, wants: &'a [Want], range: Option<Span>) -> Query<'a, G> {
+        Query {
+            source: &self.source,
+            allowance: Arc::default(),
+            connections: &plan.connections,
+            wants,
+            range,
+            grammar: PhantomData,
+        }
+    }
+
+    fn by_index(&self, plan: &Plan, range: Option<Span>, sink: &mut Clip<'_>) -> Report {
+        let connections = plan.connections.list().iter();
+        let wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
+        plan.notices.iter().for_each(|n| sink.notice(n.clone()));
+        let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
+        let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();
+        let query = self.query(plan, &wants, range);
+        let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
+        let work = |at: usize, sink: &mut dyn Sink| {
+            groups[at].iter().for_each(|chunk| query.read(chunk, sink));
+        };
+        let total = groups.len() as u64;
+        let threads = threads(chunks.len(), plan.longest_index());
+        in_order(groups.len(), threads, &work, sink, |at, sink| {
+            sink.progress(at as u64 + 1, total);
+        });
+        let samples = [chunks.first(), chunks.get(chunks.len() / 2), chunks.last()];
+        let samples = samples.into_iter().flatten();
+        let compression = samples
+            .filter_map(|c| Some(query.body(c).ok()??.how))
+            .collect();
+        Report {
+            complete: !sink.lost,
+            ..self.report(Tier::Index, &compression)
+        }
+    }
+
+    fn front_to_back(&self, reason: &Unindexed, sink: &mut dyn Sink) -> Report {
+        let text = format!("read from the front, since {}", reason.why);
+        sink.notice(Notice::new(NoticeKind::Downgraded, text));
+        let mut found = self.forward(sink);
+        if reason.cut && found.complete {
+            // Cut where a record ends, so that only the head knows.
+            found.complete = false;
+            let text = "the end of the bag is missing";
+            sink.notice(Notice::new(NoticeKind::Truncated, text));
+        }
+        Report {
+            complete: found.complete,
+            tier_reason: Some(reason.why.clone()),
+            ..self.report(Tier::Forward, &found.compression)
+        }
+    }
+
+    /// Everything, by somebody else's reader; where that refuses, our own way from the front is the next best: it looks
+    /// at no index.
+    fn by_the_second_reader(&self, sink: &mut Clip<'_>) -> Report {
+        let verified = G::verify(&self.source, &self.plan, sink);
+        let Some(why) = verified.stopped else {
+            return Report {
+                complete: !sink.lost,
+                ..self.report(Tier::Verify, &verified.compression)
+            };
+        };
+        if !verified.refused {
+            return Report {
+                complete: false,
+                tier_reason: Some(format!("the second reader stopped: {why}")),
+                ..self.report(Tier::Verify, &verified.compression)
+            };
+        }
+        let found = self.forward(sink);
+        Report {
+            complete: found.complete,
+            tier_reason: Some(format!(
+                "the second reader refuses ({why}); read from the front instead"
+            )),
+            ..self.report(Tier::Verify, &found.compression)
+        }
+    }
+
+    fn forward(&self, sink: &mut dyn Sink) -> forward::Found {
+        let mut stream = Stream::of_file(&self.source, 0, self.source.len(), FAR);
+        G::begin(&mut stream);
+        forward::read::<G>(&mut stream, self.source.len(), sink)
+    }
+
+    fn report(&self, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
+        report::<G>(file_name(self.source.path()), tier, compression)
+    }
+}
+
+/// What every report begins with.
+fn report<G: Grammar>(name: String, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
+    Report {
+        name,
+        format: G::NAME.to_owned(),
+        compression: compression.iter().map(|c| c.word().to_owned()).collect(),
+        tier,
+        tier_reason: None,
+        complete: true,
+        bytes_read: 0,
+        file_bytes: 0,
+        facts: Vec::new(),
+    }
+}
+
+impl<G: Grammar> Reader for Piped<G> {
+    fn span(&mut self) -> Result<Option<Span>> {
+        Ok(None)
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        G::begin(&mut self.stream);
+        let found = forward::read::<G>(&mut self.stream, 0, &mut Clip::new(range, sink));
+        Ok(Report {
+            complete: found.complete,
+            tier_reason: Some("a pipe has no index".to_owned()),
+            bytes_read: self.stream.position(),
+            ..report::<G>(self.name.clone(), Tier::Forward, &found.compression)
+        })
+    }
+}
+
+/// How many threads pay for `chunks` chunks of which the longest index takes `index` bytes: the reads wait for the
+/// disk, and a long index takes memory.
+fn threads(chunks: usize, index: u64) -> usize {
+    if index > LONGEST_INDEX / 16 {
+        return 1;
+    }
+    (chunks / 256).clamp(1, 8)
+}

@@ -1,0 +1,96 @@
+//! What was found in a chunk, held until the index behind it has said how much there was.
+
+use crate::bag::adapters::Gather;
+use crate::bag::model::{ConnectionId, Sink};
+use crate::base::time::Stamp;
+
+/// What an index record behind a chunk says.
+pub(super) struct Behind {
+    pub(super) id: ConnectionId,
+    pub(super) count: u32,
+    /// The times of the messages, if they were asked for.
+    pub(super) stamps: Vec<Stamp>,
+}
+
+/// The messages found since the last chunk began.
+#[derive(Default)]
+pub(super) struct Told {
+    gather: Gather,
+    /// How many messages of the bag have been told, or will be.
+    pub(super) messages: u64,
+    /// The chunk is damaged, so that its index is believed instead.
+    doubtful: bool,
+    /// Another record stood behind the chunk: it may have been a chunk, and what follows its index.
+    interrupted: bool,
+    /// Index records that disagree with the chunk.
+    behind: Vec<Behind>,
+    /// How many messages the index has that the chunk has not, and the other way round.
+    missing: u64,
+    surplus: u64,
+}
+
+impl Told {
+    /// Adds one message.
+    pub(super) fn add(&mut self, id: ConnectionId, time: Stamp, size: u32, sink: &mut dyn Sink) {
+        self.messages += 1;
+        self.gather.add(id, time, size, sink);
+    }
+
+    /// Of a chunk that is damaged only what can be true is kept: times inside `times`, none twice.
+    pub(super) fn doubt(&mut self, times: Option<(Stamp, Stamp)>) {
+        self.doubtful = true;
+        if let Some((first, last)) = times {
+            self.messages -= self.gather.retain(|at| first <= at && at <= last);
+        }
+    }
+
+    /// Takes note that a record stands behind the chunk that is none of its index.
+    pub(super) fn interrupt(&mut self) {
+        self.interrupted = true;
+    }
+
+    /// Whether the times of an index record of `count` messages are worth reading.
+    pub(super) fn wants_stamps(&self, id: ConnectionId, count: u32) -> bool {
+        let found = self.gather.count(id);
+        let differs = self.doubtful && found != u64::from(count);
+        self.interrupted || differs || found < u64::from(count)
+    }
+
+    /// Whether an index record belongs to another chunk than the last, one that was not seen.
+    pub(super) fn is_of_another(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
+        self.interrupted && !self.gather.holds(id, stamps)
+    }
+
+    /// Takes note of an index record.
+    pub(super) fn behind(&mut self, record: Behind) {
+        let (found, count) = (self.gather.count(record.id), u64::from(record.count));
+        self.missing += count.saturating_sub(found);
+        self.surplus += found.saturating_sub(count);
+        if !record.stamps.is_empty() || count == 0 {
+            self.behind.push(record);
+        }
+    }
+
+    /// Tells all of it; answers for how many messages the index is the only witness. Where chunk and index disagree,
+    /// the index is believed if the chunk is damaged or has lost more than it has too much.
+    pub(super) fn settle(&mut self, sink: &mut dyn Sink) -> u64 {
+        let believed = self.doubtful || self.missing > self.surplus;
+        let mut witnessed = 0;
+        for record in self.behind.drain(..).filter(|_| believed) {
+            // What has been handed over already cannot be taken back.
+            let Some(found) = self.gather.take(record.id) else {
+                continue;
+            };
+            let known = record.stamps.len() as u64;
+            witnessed += known.saturating_sub(found);
+            self.messages = self.messages - found + known;
+            if known > 0 {
+                sink.stamps(record.id, &record.stamps, None);
+            }
+        }
+        self.gather.flush(sink);
+        (self.missing, self.surplus) = (0, 0);
+        (self.doubtful, self.interrupted) = (false, false);
+        witnessed
+    }
+}

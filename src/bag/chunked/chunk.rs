@@ -1,0 +1,147 @@
+//! One chunk of an indexed bag: by the index behind it, or record by record if that is missing or wrong.
+
+use std::io;
+
+use super::Grammar;
+use super::forward::next_chunk;
+use super::index::{Body, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless};
+use super::plan::Chunk;
+use super::record::{Record, Stop};
+use super::unpack::{Visitor, unpack};
+use crate::bag::adapters::Gather;
+use crate::bag::model::{Sink, Want, lost};
+use crate::bag::source::{FAR, NEAR, Stream};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::Stamp;
+
+impl<G: Grammar> Query<'_, G> {
+    /// Tells `sink` all stamps of `chunk` and what is wanted of its messages.
+    pub(super) fn read(&self, chunk: &Chunk, sink: &mut dyn Sink) {
+        // Without an index here the bag has said elsewhere that the chunk is empty.
+        let Some(promised) = &chunk.promised else {
+            return;
+        };
+        let index = match self.index(chunk, promised) {
+            Ok(index) => index,
+            Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
+        };
+        if let Some((index, where_expected)) = index {
+            let body = || self.body(chunk).ok().flatten();
+            self.tell(&index, body, sink);
+            if !where_expected {
+                self.unnamed(chunk, sink);
+            }
+            return;
+        }
+        let text = "chunks were read whole, since their index is missing or wrong";
+        sink.notice(Notice::new(NoticeKind::Downgraded, text));
+        let mut stream = Stream::of_file(self.source, chunk.start, chunk.end, FAR);
+        if let Err(why) = self.walk(&mut stream, sink) {
+            let text = format!("a chunk is damaged inside: {why}");
+            sink.notice(Notice::new(NoticeKind::Damaged, text));
+        }
+        self.unnamed(chunk, sink);
+    }
+
+    /// Reads the chunks that stand behind `chunk` though the tail does not name them.
+    fn unnamed(&self, chunk: &Chunk, sink: &mut dyn Sink) {
+        let Ok(Some(body)) = self.body(chunk) else {
+            return;
+        };
+        let mut stream = Stream::of_file(self.source, body.range.end, chunk.end, FAR);
+        while next_chunk::<G>(&mut stream) {
+            let text = "chunks were read that the index does not name";
+            sink.notice(Notice::new(NoticeKind::Downgraded, text));
+            if let Err(why) = self.walk(&mut stream, sink) {
+                let text = format!("a chunk is damaged inside: {why}");
+                sink.notice(Notice::new(NoticeKind::Damaged, text));
+            }
+        }
+    }
+
+    /// The chunk's index, if it says exactly what the tail says, and whether it stands where it should.
+    fn index(&self, chunk: &Chunk, promised: &IndexSum) -> io::Result<Option<(Index, bool)>> {
+        let len = chunk.index.end - chunk.index.start;
+        if len > LONGEST_INDEX {
+            return Ok(None);
+        }
+        if len > 0
+            && let Some(found) = self.index_at(chunk.index.start, len, promised)?
+            && (!G::INDEX_IS_GUESSED || found.spans(chunk.first, chunk.last))
+        {
+            return Ok(Some((found, true)));
+        }
+        let Some(body) = self.body(chunk)? else {
+            return Ok(None);
+        };
+        // Behind a chunk there may be a gap, and headers may be longer than usual.
+        let most = (len * 2 + 4096).min(LONGEST_INDEX);
+        let len = chunk.end.saturating_sub(body.range.end).min(most);
+        let found = self.index_at(body.range.end, len, promised)?;
+        Ok(found.map(|index| (index, false)))
+    }
+
+    fn index_at(&self, start: u64, len: u64, promised: &IndexSum) -> io::Result<Option<Index>> {
+        let len = len.min(self.source.len());
+        let mut bytes = vec![0; usize::try_from(len).unwrap_or(0)];
+        let got = self.source.read_at(start, &mut bytes)?;
+        Ok(G::index(&bytes[..got], promised))
+    }
+
+    /// The chunk's compression and where its body stands.
+    pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<Body>> {
+        let mut stream = Stream::of_file(self.source, chunk.start, chunk.end, NEAR);
+        let head = match G::next(&mut stream) {
+            Ok(Record::Chunk(head)) => head,
+            Err(Stop::Io(e)) => return Err(e),
+            _ => return Ok(None),
+        };
+        let start = stream.position();
+        let range = start..start.saturating_add(head.packed);
+        let how = head.how.filter(|_| range.end <= chunk.end);
+        Ok(how.map(|how| Body { how, range }))
+    }
+
+    /// Reads the chunk that `stream` stands at record by record.
+    fn walk(&self, stream: &mut Stream<'_>, sink: &mut dyn Sink) -> Result<(), String> {
+        let Ok(Record::Chunk(head)) = G::next(stream) else {
+            return Err("it has no readable head".to_owned());
+        };
+        let mut walk = Walk {
+            query: self,
+            gather: Gather::default(),
+            sink,
+        };
+        let told = unpack(stream, &head, &self.allowance, &mut walk);
+        walk.gather.flush(walk.sink);
+        match told {
+            Ok(None) => Ok(()),
+            Ok(Some(why)) => Err(why),
+            Err(stop) => Err(stop.to_string()),
+        }
+    }
+}
+
+/// The messages of a chunk on their way to a sink.
+struct Walk<'a, 's, G> {
+    query: &'a Query<'a, G>,
+    gather: Gather,
+    sink: &'s mut dyn Sink,
+}
+
+impl<G: Grammar> Visitor<G> for Walk<'_, '_, G> {
+    fn message(
+        &mut self,
+        stream: &mut Stream<'_>,
+        (raw, time, size): (u32, Stamp, u32),
+    ) -> Result<(), Stop> {
+        let Some(id) = self.query.connections.get(raw) else {
+            nameless(self.sink, 1);
+            return super::record::pass(stream, u64::from(size));
+        };
+        let want: Want = self.query.wants[id.0 as usize];
+        hand_over(stream, (id, time, size), want, self.sink)?;
+        self.gather.add(id, time, size, self.sink);
+        Ok(())
+    }
+}

@@ -1,0 +1,347 @@
+//! A chunked bag record by record from the front: without an index, cut, still open, or from a pipe.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::Grammar;
+use super::check::{Behind, Told};
+use super::index::{hand_over, nameless};
+use super::record::{ChunkHead, Connections, Record, Stop, pass};
+use super::unpack::{Visitor, records, unpack};
+use crate::bag::decompress::{Allowance, Compression};
+use crate::bag::model::{MOST_PAYLOAD, Sink, Want};
+use crate::bag::source::Stream;
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::Stamp;
+
+/// How far is looked at a time for where records go on, in bytes.
+const STRIDE: usize = 64 * 1024;
+
+/// What was found on the way.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    pub(super) compression: BTreeSet<Compression>,
+    /// The bag has its end, and nothing was skipped.
+    pub(super) complete: bool,
+}
+
+/// Messages that came before the connection that they belong to.
+#[derive(Default)]
+struct Early {
+    runs: BTreeMap<u32, (Vec<Stamp>, Vec<u32>)>,
+    held: usize,
+    dropped: u64,
+}
+
+/// How many early messages are held: 3 MB.
+const MOST_EARLY: usize = 1 << 18;
+
+/// Walks the records of a bag.
+struct Forward<'s, G> {
+    sink: &'s mut dyn Sink,
+    grammar: G,
+    connections: Connections,
+    wants: Vec<Want>,
+    told: Told,
+    early: Early,
+    found: Found,
+    allowance: Arc<Allowance>,
+    /// How many messages the bag says it holds.
+    total: Option<u64>,
+    /// The end of the data was met.
+    ended: bool,
+}
+
+/// Reads all that `stream` holds from the first record on; `size` is the length of the bag, 0 if it is not known.
+pub(super) fn read<G: Grammar>(stream: &mut Stream<'_>, size: u64, sink: &mut dyn Sink) -> Found {
+    let mut forward = Forward {
+        sink,
+        grammar: G::default(),
+        connections: Connections::default(),
+        wants: Vec::new(),
+        told: Told::default(),
+        early: Early::default(),
+        found: Found {
+            complete: true,
+            ..Found::default()
+        },
+        allowance: Arc::default(),
+        total: None,
+        ended: false,
+    };
+    let (stop, at) = forward.outside(stream, size);
+    forward.finish(stop, at)
+}
+
+impl<G: Grammar> Forward<'_, G> {
+    /// The records of the file itself; answers why and where they end.
+    fn outside(&mut self, stream: &mut Stream<'_>, size: u64) -> (Stop, u64) {
+        loop {
+            let done = match G::next(stream) {
+                Ok(Record::FileEnd { len }) => {
+                    return (self.file_end(stream, len), stream.position());
+                }
+                Ok(record) => self.record(stream, record),
+                Err(stop) => Err(stop),
+            };
+            let at = stream.position();
+            match done {
+                Ok(()) => {}
+                Err(Stop::Broken | Stop::Cut) if self.resume(stream) => {}
+                Err(stop) => return (stop, at),
+            }
+            self.sink.progress(at, size);
+        }
+    }
+
+    fn record(
+        &mut self,
+        stream: &mut Stream<'_>,
+        record: Record<G::Description>,
+    ) -> Result<(), Stop> {
+        if self.ended && matches!(record, Record::Chunk(_) | Record::Message { .. }) {
+            self.ended = false;
+            self.damage("messages stand behind what should be the end of the data");
+        }
+        if matches!(record, Record::Other { .. }) {
+            self.told.interrupt();
+        }
+        match record {
+            Record::Chunk(head) => self.chunk(stream, &head),
+            Record::Message { raw, time, size } => {
+                self.found.compression.insert(Compression::None);
+                self.message(stream, (raw, time, size))
+            }
+            Record::Description { what, len } => self.description(stream, &what, len),
+            Record::Index { raw, count, len } => self.index(stream, (raw, count), len),
+            Record::Total { messages, len } => {
+                self.total = Some(messages);
+                pass(stream, len)
+            }
+            Record::DataEnd { len } => {
+                self.ended = true;
+                pass(stream, len)
+            }
+            Record::FileEnd { len } | Record::Other { len } => pass(stream, len),
+        }
+    }
+
+    /// Whether the bag ends here, as it should.
+    fn file_end(&mut self, stream: &mut Stream<'_>, len: u64) -> Stop {
+        self.ended = true;
+        if let Err(stop) = pass(stream, len) {
+            return stop;
+        }
+        match stream.peek(G::CLOSING.len() + 1) {
+            Ok(rest) if rest != G::CLOSING => {
+                let at = stream.position();
+                self.damage(&format!(
+                    "what stands from byte {at} on is not the end of the bag"
+                ));
+                Stop::End
+            }
+            Ok(_) => Stop::End,
+            Err(e) => Stop::Io(e),
+        }
+    }
+
+    /// Passes over what is no record, up to the next chunk; answers whether there is one.
+    fn resume(&mut self, stream: &mut Stream<'_>) -> bool {
+        let from = stream.position();
+        let found = next_chunk::<G>(stream);
+        if found {
+            let lost = stream.position() - from;
+            self.damage(&format!("{lost} bytes from byte {from} on are no records"));
+        }
+        found
+    }
+
+    fn chunk(&mut self, stream: &mut Stream<'_>, head: &ChunkHead) -> Result<(), Stop> {
+        self.settle();
+        self.found.compression.extend(head.how);
+        if head.misnamed {
+            self.damage("a chunk is marked as a record of another kind, and was read all the same");
+        }
+        if head.unclosed {
+            return Err(self.tail(stream, head.how.unwrap_or(Compression::None)));
+        }
+        let allowance = Arc::clone(&self.allowance);
+        let wrong = unpack(stream, head, &allowance, self)?;
+        if let Some(why) = wrong {
+            self.told.doubt(head.times);
+            self.damage(&format!("a chunk is damaged inside: {why}"));
+        }
+        Ok(())
+    }
+
+    /// The rest of the file as one compressed chunk that was never closed.
+    fn tail(&mut self, stream: &mut Stream<'_>, how: Compression) -> Stop {
+        let mut plain = match self.allowance.open(how, &mut *stream) {
+            Ok(reader) => Stream::of_reader(reader),
+            Err(e) => return Stop::Io(e),
+        };
+        match records(&mut plain, u64::MAX, self) {
+            Stop::Broken => Stop::Cut,
+            stop => stop,
+        }
+    }
+
+    /// Compares what an index record says with what was found in the chunk before it.
+    fn index(
+        &mut self,
+        stream: &mut Stream<'_>,
+        (raw, count): (u32, u32),
+        len: u64,
+    ) -> Result<(), Stop> {
+        let Some(id) = self.connections.get(raw) else {
+            return pass(stream, len);
+        };
+        let stamps = if self.told.wants_stamps(id, count) {
+            let bytes = peek_whole(stream, len)?;
+            G::index_stamps(bytes)
+        } else {
+            Vec::new()
+        };
+        if self.told.is_of_another(id, &stamps) {
+            self.settle();
+        }
+        self.told.behind(Behind { id, count, stamps });
+        pass(stream, len)
+    }
+
+    /// Tells what was found in the last chunk, once all that stands behind it has been read.
+    fn settle(&mut self) {
+        let mended = self.told.settle(self.sink);
+        if mended > 0 {
+            self.found.complete = false;
+            super::index::absent(self.sink, mended);
+        }
+    }
+
+    fn damage(&mut self, text: &str) {
+        self.found.complete = false;
+        self.sink.notice(Notice::new(NoticeKind::Damaged, text));
+    }
+
+    fn finish(mut self, stop: Stop, at: u64) -> Found {
+        self.settle();
+        let early = self.early.runs.values();
+        let homeless =
+            early.map(|(stamps, _)| stamps.len() as u64).sum::<u64>() + self.early.dropped;
+        if homeless > 0 {
+            self.found.complete = false;
+            nameless(self.sink, homeless);
+        }
+        let found = self.told.messages + homeless;
+        if let Some(total) = self.total.filter(|total| *total > found) {
+            self.damage(&format!(
+                "the bag says that it holds {total} messages; {found} were found"
+            ));
+        }
+        let (kind, text) = match stop {
+            Stop::End if self.ended || !G::HAS_END => return self.found,
+            // What is cut is the index, of which nothing was asked.
+            Stop::End | Stop::Cut | Stop::Broken if self.ended => return self.found,
+            Stop::End => (
+                NoticeKind::Truncated,
+                format!("the bag was never finished; it ends at byte {at}"),
+            ),
+            Stop::Cut => (
+                NoticeKind::Truncated,
+                format!("the bag is cut at byte {at}"),
+            ),
+            Stop::Broken => (
+                NoticeKind::Damaged,
+                format!("what stands from byte {at} on is no record"),
+            ),
+            Stop::Io(e) => (
+                NoticeKind::Damaged,
+                format!("reading stopped at byte {at}: {e}"),
+            ),
+        };
+        self.found.complete = false;
+        self.sink.notice(Notice::new(kind, text));
+        self.found
+    }
+}
+
+impl<G: Grammar> Visitor<G> for Forward<'_, G> {
+    fn message(
+        &mut self,
+        stream: &mut Stream<'_>,
+        (raw, time, size): (u32, Stamp, u32),
+    ) -> Result<(), Stop> {
+        let Some(id) = self.connections.get(raw) else {
+            pass(stream, u64::from(size))?;
+            self.early.hold(raw, time, size);
+            return Ok(());
+        };
+        let want = self.wants[id.0 as usize];
+        hand_over(stream, (id, time, size), want, self.sink)?;
+        self.told.add(id, time, size, self.sink);
+        Ok(())
+    }
+
+    fn description(
+        &mut self,
+        stream: &mut Stream<'_>,
+        what: &G::Description,
+        len: u64,
+    ) -> Result<(), Stop> {
+        if len > MOST_PAYLOAD as u64 {
+            return pass(stream, len);
+        }
+        let data = peek_whole(stream, len)?;
+        let described = self.grammar.describe(what, data, &self.connections);
+        if let Some((raw, connection)) = described
+            && let Some(connection) = self.connections.add(raw, connection)
+        {
+            self.wants.push(self.sink.connection(connection));
+            if let Some((stamps, sizes)) = self.early.runs.remove(&raw) {
+                self.told.messages += stamps.len() as u64;
+                self.sink.stamps(connection.id, &stamps, Some(&sizes));
+            }
+        }
+        pass(stream, len)
+    }
+}
+
+/// The `len` bytes that `stream` stands at, without taking them.
+fn peek_whole<'s>(stream: &'s mut Stream<'_>, len: u64) -> Result<&'s [u8], Stop> {
+    let len = usize::try_from(len).unwrap_or(usize::MAX);
+    let bytes = stream.peek(len.min(MOST_PAYLOAD))?;
+    if bytes.len() < len {
+        return Err(Stop::Cut);
+    }
+    Ok(bytes)
+}
+
+/// Goes to where a chunk begins; at the end of the stream there is none.
+pub(super) fn next_chunk<G: Grammar>(stream: &mut Stream<'_>) -> bool {
+    while let Ok(window) = stream.peek(2 * STRIDE) {
+        let len = window.len();
+        let mut starts = 0..len.min(STRIDE);
+        if let Some(at) = starts.find(|at| G::is_chunk(&window[*at..])) {
+            stream.advance(at);
+            return true;
+        }
+        if len <= STRIDE {
+            break;
+        }
+        stream.advance(STRIDE);
+    }
+    false
+}
+
+impl Early {
+    fn hold(&mut self, raw: u32, time: Stamp, size: u32) {
+        if self.held >= MOST_EARLY {
+            self.dropped += 1;
+            return;
+        }
+        self.held += 1;
+        let run = self.runs.entry(raw).or_default();
+        run.0.push(time);
+        run.1.push(size);
+    }
+}

@@ -1,0 +1,155 @@
+//! What the tail of a bag promises: its connections and chunks, and whether they can be relied on.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use super::index::IndexSum;
+use super::record::Connections;
+use crate::bag::model::{ConnectionId, Message, Sink, Want};
+use crate::base::notice::Notice;
+use crate::base::time::{Span, Stamp};
+
+/// What the tail says about a chunk. Its sums do not overflow.
+#[derive(Clone, Debug)]
+pub(crate) struct Chunk {
+    /// Where its record begins.
+    pub(crate) start: u64,
+    /// Where its index should lie.
+    pub(crate) index: Range<u64>,
+    /// Where its index ends at the latest.
+    pub(crate) end: u64,
+    /// The times of its first and last message, if that is true.
+    pub(crate) first: Stamp,
+    pub(crate) last: Stamp,
+    /// What its index should add up to; `None` if it has none.
+    pub(crate) promised: Option<IndexSum>,
+}
+
+impl Chunk {
+    fn holds_messages(&self) -> bool {
+        self.promised.is_some_and(|sum| sum.messages > 0)
+    }
+}
+
+/// What the tail says.
+#[derive(Debug, Default)]
+pub(crate) struct Plan {
+    pub(crate) connections: Connections,
+    /// In the order of the file, none twice, none over another.
+    pub(crate) chunks: Vec<Chunk>,
+    /// Where the chunks lie.
+    pub(crate) body: Range<u64>,
+    /// What is worth saying of the bag as a whole.
+    pub(crate) notices: Vec<Notice>,
+}
+
+/// More chunks than this are not planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
+pub(crate) const MOST_CHUNKS: usize = 1 << 20;
+
+impl Plan {
+    /// How many bytes the longest index takes.
+    pub(super) fn longest_index(&self) -> u64 {
+        let len = |c: &Chunk| c.index.end - c.index.start;
+        self.chunks.iter().map(len).max().unwrap_or(0)
+    }
+
+    /// The time covered: `read` looks into the chunks that are said to be first and last, or into all if they are few.
+    pub(super) fn span(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Option<Span> {
+        let mut seen = Extremes::default();
+        let full: Vec<&Chunk> = self.chunks.iter().filter(|c| c.holds_messages()).collect();
+        if full.len() <= 512 {
+            for chunk in full {
+                read(chunk, &mut seen);
+            }
+        } else {
+            read(full.iter().min_by_key(|c| c.first)?, &mut seen);
+            read(full.iter().max_by_key(|c| c.last)?, &mut seen);
+        }
+        seen.span()
+    }
+}
+
+/// Why a bag cannot be read by its index.
+#[derive(Clone, Debug)]
+pub(crate) struct Unindexed {
+    pub(crate) why: String,
+    /// The head says that there was more.
+    pub(crate) cut: bool,
+}
+
+impl Unindexed {
+    /// For this reason.
+    pub(crate) fn because<T>(why: impl Into<String>) -> Result<T, Self> {
+        Err(Self {
+            why: why.into(),
+            cut: false,
+        })
+    }
+}
+
+/// The numbers of the connections that chunks are said to hold messages of.
+pub(crate) struct Used {
+    /// By number, for all that real bags use.
+    small: Vec<bool>,
+    large: BTreeSet<u32>,
+}
+
+impl Default for Used {
+    fn default() -> Self {
+        Self {
+            small: vec![false; 1 << 16],
+            large: BTreeSet::new(),
+        }
+    }
+}
+
+impl Used {
+    /// Adds one.
+    pub(crate) fn add(&mut self, raw: u32) {
+        match self.small.get_mut(raw as usize) {
+            Some(used) => *used = true,
+            None => drop(self.large.insert(raw)),
+        }
+    }
+
+    /// Whether all of them are described. If not, the chunks themselves may describe the others.
+    pub(crate) fn are_in(&self, connections: &Connections) -> Result<(), Unindexed> {
+        let small = (0..).zip(&self.small).filter(|(_, used)| **used);
+        let mut all = small.map(|(raw, _)| raw).chain(self.large.iter().copied());
+        if all.all(|raw| connections.get(raw).is_some()) {
+            return Ok(());
+        }
+        Unindexed::because("its index counts messages of connections that it does not describe")
+    }
+}
+
+/// A way to find the first and the last stamp: all the rest is forgotten.
+#[derive(Default)]
+struct Extremes(Option<(Stamp, Stamp)>);
+
+impl Extremes {
+    fn span(&self) -> Option<Span> {
+        let (start, last) = self.0?;
+        Some(Span {
+            start,
+            end: last.plus(1),
+        })
+    }
+}
+
+impl Sink for Extremes {
+    fn connection(&mut self, _: &crate::bag::Connection) -> Want {
+        Want::Stamps
+    }
+
+    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+        for at in stamps {
+            let (first, last) = self.0.unwrap_or((*at, *at));
+            self.0 = Some((first.min(*at), last.max(*at)));
+        }
+    }
+
+    fn message(&mut self, _: Message<'_>) {}
+
+    fn notice(&mut self, _: Notice) {}
+}

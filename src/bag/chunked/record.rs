@@ -1,0 +1,129 @@
+//! What a grammar makes of the bytes of a chunked bag: records, why none comes, and the connections they describe.
+
+use std::collections::HashMap;
+use std::{fmt, io};
+
+use crate::bag::decompress::Compression;
+use crate::bag::model::{Connection, ConnectionId};
+use crate::bag::source::Stream;
+use crate::base::time::Stamp;
+
+/// The head of a record; the stream stands behind it. `len` is what follows.
+#[derive(Debug)]
+pub(crate) enum Record<D> {
+    /// A chunk, whose body follows.
+    Chunk(ChunkHead),
+    /// A message of the connection that the bag calls `raw`; its payload follows.
+    Message { raw: u32, time: Stamp, size: u32 },
+    /// What describes connections.
+    Description { what: D, len: u64 },
+    /// How many messages of a connection the chunk before it holds; their entries follow.
+    Index { raw: u32, count: u32, len: u64 },
+    /// How many messages the bag says it holds.
+    Total { messages: u64, len: u64 },
+    /// No message follows.
+    DataEnd { len: u64 },
+    /// Nothing follows but what the bag closes with.
+    FileEnd { len: u64 },
+    /// A record that does not concern us.
+    Other { len: u64 },
+}
+
+/// What stands before a chunk's records.
+#[derive(Clone, Debug)]
+pub(crate) struct ChunkHead {
+    /// `None` for one that no reader knows.
+    pub(crate) how: Option<Compression>,
+    /// The bytes of its body in the file.
+    pub(crate) packed: u64,
+    /// The bytes behind the body that belong to the chunk.
+    pub(crate) padding: u64,
+    /// The bytes of its records, if that is true.
+    pub(crate) plain: u64,
+    /// The CRC-32 of its records, if it states one.
+    pub(crate) crc: Option<u32>,
+    /// The first and the last time in it, if it states them.
+    pub(crate) times: Option<(Stamp, Stamp)>,
+    /// It is marked as a record of another kind.
+    pub(crate) misnamed: bool,
+    /// The recorder was killed before it wrote the lengths; the body goes on to the end.
+    pub(crate) unclosed: bool,
+}
+
+/// Why no record comes.
+#[derive(Debug)]
+pub(crate) enum Stop {
+    /// The bytes end where a record could begin.
+    End,
+    /// They end inside a record.
+    Cut,
+    /// What stands here is no record.
+    Broken,
+    /// The system, or a decompressor, refuses.
+    Io(io::Error),
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::UnexpectedEof => Self::Cut,
+            _ => Self::Io(error),
+        }
+    }
+}
+
+impl fmt::Display for Stop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::End => f.write_str("it ends"),
+            Self::Cut => f.write_str("it ends inside a record"),
+            Self::Broken => f.write_str("what stands there is no record"),
+            Self::Io(e) => e.fmt(f),
+        }
+    }
+}
+
+/// Passes over `len` bytes, which must be there: a length that leaves the file is no length, and nothing is passed.
+pub(crate) fn pass(stream: &mut Stream<'_>, len: u64) -> Result<(), Stop> {
+    if stream.left().is_some_and(|left| left < len) {
+        return Err(Stop::Cut);
+    }
+    match stream.skip(len)? {
+        n if n < len => Err(Stop::Cut),
+        _ => Ok(()),
+    }
+}
+
+/// The connections of a bag by the numbers that it gives them.
+#[derive(Debug, Default)]
+pub(crate) struct Connections {
+    list: Vec<Connection>,
+    ids: HashMap<u32, ConnectionId>,
+}
+
+/// More connections than this are not kept; real bags stay below 1,000.
+const MOST_CONNECTIONS: usize = 100_000;
+
+impl Connections {
+    /// The connection that the bag calls `raw`.
+    pub(crate) fn get(&self, raw: u32) -> Option<ConnectionId> {
+        self.ids.get(&raw).copied()
+    }
+
+    /// All of them in the order of their announcement.
+    pub(crate) fn list(&self) -> &[Connection] {
+        &self.list
+    }
+
+    /// Adds one under the next free id; answers it if it is new. A second one of the same number is passed over, as
+    /// every reader does.
+    pub(crate) fn add(&mut self, raw: u32, connection: Connection) -> Option<&Connection> {
+        if self.ids.contains_key(&raw) || self.list.len() >= MOST_CONNECTIONS {
+            return None;
+        }
+        let id = ConnectionId(u32::try_from(self.list.len()).ok()?);
+        self.ids.insert(raw, id);
+        self.list.push(Connection { id, ..connection });
+        self.list.last()
+    }
+}

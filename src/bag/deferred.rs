@@ -1,0 +1,53 @@
+//! Many bags, of which only a few are open at a time: systems allow a process as little as 256 open files.
+
+use super::input::Input;
+use super::model::{OpenOptions, Reader, Report, Sink};
+use crate::base::error::Result;
+use crate::base::time::Span;
+
+/// So many of a list stay open until they have been read; each of them may be a folder that keeps as many.
+const STAY_OPEN: usize = 8;
+
+/// A bag that is opened when something is asked of it.
+struct Deferred {
+    input: Input,
+    options: OpenOptions,
+    /// If it has been opened already.
+    open: Option<Box<dyn Reader>>,
+}
+
+/// The readers of `inputs`, in order; each has been looked into, so that what is no bag is told at once.
+pub(crate) fn open_each(
+    inputs: impl IntoIterator<Item = Input>,
+    options: &OpenOptions,
+) -> impl Iterator<Item = Result<Box<dyn Reader>>> {
+    inputs.into_iter().enumerate().map(|(place, input)| {
+        let open = if place < STAY_OPEN {
+            Some(super::open(&input, options)?)
+        } else {
+            super::sniff(&input)?;
+            None
+        };
+        let options = options.clone();
+        Ok(Box::new(Deferred {
+            input,
+            options,
+            open,
+        }) as Box<dyn Reader>)
+    })
+}
+
+impl Reader for Deferred {
+    fn span(&mut self) -> Result<Option<Span>> {
+        match &mut self.open {
+            Some(reader) => reader.span(),
+            None => super::open(&self.input, &self.options)?.span(),
+        }
+    }
+
+    fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        let open = self.open.take();
+        let mut reader = open.map_or_else(|| super::open(&self.input, &self.options), Ok)?;
+        reader.read(range, sink)
+    }
+}

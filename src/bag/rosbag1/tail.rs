@@ -1,0 +1,203 @@
+//! The tail of a ROS 1 bag: which connections and chunks it has, and whether that can be relied on.
+
+use std::io;
+
+use super::records::{self, ENTRY, Header};
+use super::{Described, Rosbag1};
+use crate::bag::chunked::{
+    Chunk, Grammar as _, IndexSum, MOST_CHUNKS, Plan, Stop, Unindexed, Used,
+};
+use crate::bag::model::MOST_PAYLOAD;
+use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::base::notice::{Notice, NoticeKind};
+
+/// Reads the head and the tail of `source`.
+pub(super) fn read(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
+    let mut stream = Stream::of_file(source, 0, source.len(), NEAR);
+    Rosbag1::begin(&mut stream);
+    let (header, len) = match records::header(&mut stream) {
+        Ok(found) => found,
+        Err(Stop::Io(e)) => return Err(e),
+        Err(_) => return Ok(Unindexed::because("its head is damaged")),
+    };
+    let Header::Bag {
+        index_pos,
+        connections,
+        chunks,
+        encryptor,
+    } = header
+    else {
+        return Ok(Unindexed::because("it has no head"));
+    };
+    let body = stream.position() + u64::from(len);
+    if let Some(why) = misplaced(index_pos, body, source.len()) {
+        let cut = index_pos > source.len();
+        return Ok(Err(Unindexed { why, cut }));
+    }
+    let mut tail = Tail::default();
+    tail.plan.body = body..index_pos;
+    tail.plan.notices.extend(encrypted(&encryptor));
+    match tail.records(source, (connections, chunks)) {
+        Ok(()) => Ok(tail.settle()),
+        Err(Stop::Io(e)) => Err(e),
+        Err(_) => Ok(Unindexed::because("its index is cut or damaged")),
+    }
+}
+
+fn misplaced(index_pos: u64, body: u64, len: u64) -> Option<String> {
+    if index_pos == 0 {
+        Some("it was never closed and has no index".to_owned())
+    } else if index_pos > len {
+        Some(format!("its index at byte {index_pos} is cut off"))
+    } else if index_pos < body {
+        Some(format!("its index cannot be at byte {index_pos}"))
+    } else {
+        None
+    }
+}
+
+/// Says what names cannot be known.
+fn encrypted(encryptor: &str) -> Option<Notice> {
+    let text =
+        format!("the bag is encrypted by `{encryptor}`: counts are right, names are not known");
+    (!encryptor.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
+}
+
+/// What has been read of a tail.
+#[derive(Default)]
+struct Tail {
+    plan: Plan,
+    grammar: Rosbag1,
+    used: Used,
+}
+
+impl Tail {
+    /// The records of the tail: `expected` connections and chunks. What follows them does not matter.
+    fn records(&mut self, source: &Source, expected: (u32, u32)) -> Result<(), Stop> {
+        let mut stream = Stream::of_file(source, self.plan.body.end, source.len(), FAR);
+        let (mut connections, mut chunks) = (0, 0);
+        while (connections, chunks) != expected {
+            let (header, len) = records::header(&mut stream)?;
+            let end = stream.position() + u64::from(len);
+            match header {
+                Header::Connection { raw, topic } => {
+                    connections += 1;
+                    self.connection(&mut stream, &Described { raw, topic }, len)?;
+                }
+                Header::ChunkInfo { .. } => {
+                    chunks += 1;
+                    self.chunk(&mut stream, &header, len)?;
+                }
+                _ => {}
+            }
+            let too_many = self.plan.chunks.len() > MOST_CHUNKS;
+            if connections > expected.0 || chunks > expected.1 || too_many {
+                return Err(Stop::Broken);
+            }
+            let left = end.saturating_sub(stream.position());
+            if stream.skip(left)? < left {
+                return Err(Stop::Cut);
+            }
+        }
+        // The head may lie as well as the tail.
+        match records::header(&mut stream) {
+            Ok((Header::ChunkInfo { .. }, _)) => Err(Stop::Broken),
+            _ => Ok(()),
+        }
+    }
+
+    fn connection(
+        &mut self,
+        stream: &mut Stream<'_>,
+        what: &Described,
+        len: u32,
+    ) -> Result<(), Stop> {
+        if len as usize > MOST_PAYLOAD {
+            return Err(Stop::Broken);
+        }
+        let data = stream.peek(len as usize)?;
+        let connections = &mut self.plan.connections;
+        if let Some((raw, connection)) = self.grammar.describe(what, data, connections) {
+            connections.add(raw, connection);
+        }
+        Ok(())
+    }
+
+    fn chunk(&mut self, stream: &mut Stream<'_>, header: &Header, len: u32) -> Result<(), Stop> {
+        let Header::ChunkInfo {
+            pos,
+            start,
+            end,
+            count,
+        } = *header
+        else {
+            return Err(Stop::Broken);
+        };
+        let promised = self.promised(stream, count, len)?;
+        self.plan.chunks.push(Chunk {
+            start: pos,
+            index: 0..0,
+            end: 0,
+            first: start,
+            last: end,
+            promised: Some(promised),
+        });
+        Ok(())
+    }
+
+    /// The counts of a chunk info record.
+    fn promised(
+        &mut self,
+        stream: &mut Stream<'_>,
+        count: u32,
+        len: u32,
+    ) -> Result<IndexSum, Stop> {
+        let mut sum = IndexSum::default();
+        if u64::from(count) * 8 > u64::from(len) {
+            return Err(Stop::Broken);
+        }
+        for _ in 0..count {
+            let pair = stream.peek(8)?;
+            let raw = records::u32_at(pair, 0).ok_or(Stop::Cut)?;
+            let messages = records::u32_at(pair, 4).ok_or(Stop::Cut)?;
+            sum.add(raw, messages);
+            if messages > 0 {
+                self.used.add(raw);
+            }
+            stream.advance(8);
+        }
+        Ok(sum)
+    }
+
+    /// Orders the chunks and tells each where it ends.
+    fn settle(mut self) -> Result<Plan, Unindexed> {
+        let body = self.plan.body.clone();
+        let chunks = &mut self.plan.chunks;
+        if chunks.is_empty() && body.end > body.start {
+            return Unindexed::because("its index names no chunks");
+        }
+        chunks.sort_by_key(|c| c.start);
+        chunks.dedup_by_key(|c| c.start);
+        if chunks.iter().any(|c| !body.contains(&c.start)) {
+            return Unindexed::because("its index names chunks outside the bag");
+        }
+        let mut end = body.end;
+        for chunk in chunks.iter_mut().rev() {
+            chunk.end = end;
+            let len = chunk.promised.as_ref().map_or(0, index_len);
+            chunk.index = end.saturating_sub(len).max(chunk.start)..end;
+            end = chunk.start;
+        }
+        // An encrypted bag describes none of its connections.
+        if self.plan.notices.is_empty() {
+            self.used.are_in(&self.plan.connections)?;
+        }
+        Ok(self.plan)
+    }
+}
+
+/// How long the index records are if their headers are as every writer makes them: 47 bytes.
+fn index_len(promised: &IndexSum) -> u64 {
+    let entries = promised.messages.saturating_mul(u64::from(ENTRY));
+    entries.saturating_add(u64::from(promised.connections) * (4 + 47 + 4))
+}

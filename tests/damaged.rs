@@ -1,0 +1,576 @@
+//! Damage and deceit: what is left is read, nothing is invented, and what is missing is said.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use bagreel::bag::{Report, Tier, Want};
+use bagreel::base::notice::NoticeKind;
+use bagreel::base::time::Stamp;
+use tempfile::TempDir;
+
+use crate::support::rosbag1::Pack;
+use crate::support::{self, Kept, ORIGIN, Recording, mcap, read, rosbag1, sqlite3};
+
+/// A folder with one file in it.
+fn placed(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    (dir, path)
+}
+
+fn read_bytes(name: &str, bytes: &[u8]) -> (Report, Kept) {
+    let (_dir, path) = placed(name, bytes);
+    read(&path, Want::Payload).unwrap()
+}
+
+/// Runs the command; answers its exit code and what it said, results first.
+fn bagreel(args: &[&str]) -> (Option<i32>, String) {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    said(&run.args(args).output().unwrap())
+}
+
+fn said(output: &Output) -> (Option<i32>, String) {
+    let text = [&output.stdout[..], &output.stderr].concat();
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&text).into_owned(),
+    )
+}
+
+/// A small recording in a few chunks.
+fn short() -> Recording {
+    let mut recording = support::small();
+    recording.messages.retain(|m| m.1 % 7 < 3 || m.0 == 0);
+    recording.messages.truncate(120);
+    recording
+}
+
+/// A MCAP file of a few chunks, with and without a summary.
+fn unsummed(compression: Option<::mcap::Compression>) -> Vec<u8> {
+    let options = mcap::Options {
+        summary: false,
+        compression,
+        chunk: 4000,
+        ..mcap::Options::default()
+    };
+    mcap::write(&short(), &options)
+}
+
+/// Numbers that look random and are the same everywhere.
+fn places(seed: u64, below: usize) -> impl Iterator<Item = (usize, u8)> {
+    let mut state = seed;
+    std::iter::repeat_with(move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let at = usize::try_from((state >> 33) % below as u64).unwrap();
+        (at, 1 << (state >> 60 & 7))
+    })
+}
+
+/// Bags that are read from the front, and by their index.
+fn chunked() -> Vec<(&'static str, Vec<u8>)> {
+    let recording = short();
+    let bag = |how| rosbag1::write(&recording, how, 4000);
+    let options = |compression| mcap::Options {
+        compression,
+        chunk: 4000,
+        ..mcap::Options::default()
+    };
+    vec![
+        ("none.bag", bag(Pack::None)),
+        ("lz4.bag", bag(Pack::Lz4)),
+        ("front_none.bag", rosbag1::unindexed(&bag(Pack::None))),
+        ("front_lz4.bag", rosbag1::unindexed(&bag(Pack::Lz4))),
+        ("front_bz2.bag", rosbag1::unindexed(&bag(Pack::Bz2))),
+        ("none.mcap", mcap::write(&recording, &options(None))),
+        (
+            "zstd.mcap",
+            mcap::write(&recording, &options(Some(::mcap::Compression::Zstd))),
+        ),
+        ("front_none.mcap", unsummed(None)),
+        ("front_zstd.mcap", unsummed(Some(::mcap::Compression::Zstd))),
+        ("front_lz4.mcap", unsummed(Some(::mcap::Compression::Lz4))),
+    ]
+}
+
+#[test]
+fn a_flipped_bit_costs_no_message_in_silence_and_makes_none() {
+    let truth = short().messages.len();
+    for (name, bytes) in chunked() {
+        let mut whole = 0;
+        for (at, bit) in places(19, bytes.len()).take(150) {
+            let mut bytes = bytes.clone();
+            bytes[at] ^= bit;
+            let (_dir, path) = placed(name, &bytes);
+            let Ok((report, kept)) = read(&path, Want::Payload) else {
+                // The first bytes say what it is, and there is no second copy of them.
+                assert!(at < 16, "{name}: bit {bit} of byte {at}");
+                continue;
+            };
+            let found = kept.stamps.len();
+            assert!(
+                found <= truth,
+                "{name}: bit {bit} of byte {at}: {found} of {truth}"
+            );
+            assert!(
+                found == truth || !report.complete,
+                "{name}: bit {bit} of byte {at}: {found} of {truth} and no word"
+            );
+            whole += u32::from(found == truth);
+        }
+        assert!(
+            whole > 100,
+            "{name}: only {whole} of 150 flips cost nothing"
+        );
+    }
+}
+
+#[test]
+fn the_index_behind_a_chunk_answers_for_what_the_chunk_has_lost() {
+    let bytes = unsummed(Some(::mcap::Compression::Zstd));
+    let truth = short().messages.len();
+    // The first one describes the connections.
+    let mut chunks = bytes.windows(4).enumerate().filter(|(_, w)| w == b"zstd");
+    let chunk = chunks.nth(1).unwrap().0;
+    let mut lost = 0;
+    let (_, whole) = read_bytes("x.mcap", &bytes);
+    let body = chunk + 12;
+    let len = u64::from_le_bytes(bytes[chunk + 4..body].try_into().unwrap());
+    let end = body + usize::try_from(len).unwrap();
+    for at in body..end {
+        let mut bytes = bytes.clone();
+        bytes[at] ^= 0x10;
+        let (report, kept) = read_bytes("x.mcap", &bytes);
+        assert_eq!(kept.stamps.len(), truth, "byte {at}: {:?}", kept.notices);
+        // Some bits of a Zstandard frame mean nothing.
+        let harmless = kept.payloads() == whole.payloads();
+        assert!(
+            harmless || !report.complete,
+            "byte {at}: a wrong checksum and no word"
+        );
+        lost += usize::from(kept.messages.len() < truth);
+    }
+    assert!(
+        lost > 0,
+        "none of the flips cost a payload: the test is blind"
+    );
+}
+
+#[test]
+fn a_record_of_a_false_kind_does_not_end_the_file() {
+    let bytes = unsummed(None);
+    let truth = short().messages.len();
+    let mut seen = 0;
+    for (at, byte) in bytes.iter().enumerate() {
+        let len = bytes.get(at + 1..at + 9);
+        let len = len.map_or(0, |b| u64::from_le_bytes(b.try_into().unwrap()));
+        // Message indexes: two bytes of channel, four of length, sixteen for each message.
+        if *byte != 7 || len < 22 || len > 6 + 16 * truth as u64 || (len - 6) % 16 != 0 {
+            continue;
+        }
+        for kind in [0, 2, 6, 12, 0x0f] {
+            let mut bytes = bytes.clone();
+            bytes[at] = kind;
+            let (_, kept) = read_bytes("x.mcap", &bytes);
+            assert_eq!(kept.stamps.len(), truth, "kind {kind} at byte {at}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 8, "{seen}");
+}
+
+#[test]
+fn the_index_of_a_chunk_that_is_none_any_more_answers_for_it() {
+    let truth = short().messages.len();
+    for bytes in [unsummed(None), unsummed(Some(::mcap::Compression::Zstd))] {
+        let bytes = &bytes;
+        let is_chunk = |at: &usize| {
+            let number =
+                |at: usize| Some(u64::from_le_bytes(bytes.get(at..at + 8)?.try_into().ok()?));
+            let name = bytes.get(at + 37).map_or(0, |n| usize::from(*n));
+            let head = 40 + name as u64;
+            bytes[*at] == 6 && number(at + 1) == number(at + 41 + name).map(|n| n + head)
+        };
+        let chunks: Vec<usize> = (0..bytes.len()).filter(is_chunk).collect();
+        assert!(chunks.len() > 2, "{chunks:?}");
+        // The first one describes the connections.
+        for at in &chunks[1..] {
+            let mut bytes = bytes.clone();
+            bytes[*at] = 12;
+            let (report, kept) = read_bytes("x.mcap", &bytes);
+            assert_eq!(kept.stamps.len(), truth, "{:?}", kept.notices);
+            assert!(!report.complete);
+        }
+    }
+}
+
+#[test]
+fn reading_an_mcap_file_goes_on_behind_damage() {
+    let bytes = unsummed(Some(::mcap::Compression::Lz4));
+    let truth = short().messages.len();
+    let second = bytes
+        .windows(3)
+        .enumerate()
+        .filter(|(_, w)| w == b"lz4")
+        .nth(1);
+    let mut bytes = bytes.clone();
+    let at = second.unwrap().0;
+    bytes[at - 40..at].fill(0);
+    let (report, kept) = read_bytes("x.mcap", &bytes);
+    let found = kept.stamps.len();
+    assert!(
+        !report.complete && found < truth && found > truth / 2,
+        "{found} of {truth}"
+    );
+}
+
+#[test]
+fn connections_that_only_the_chunks_describe_are_found_there() {
+    let recording = short();
+    let bytes = rosbag1::write(&recording, Pack::Lz4, 4000);
+    let field = b"conn=";
+    let last = bytes.windows(5).rposition(|w| w == field).unwrap();
+    let mut bytes = bytes.clone();
+    bytes[last + 5] ^= 0x40;
+    let (report, kept) = read_bytes("x.bag", &bytes);
+    assert_eq!(kept.counts(), recording.counts(), "{:?}", kept.notices);
+    assert_eq!((report.tier, report.complete), (Tier::Forward, true));
+    let options = mcap::Options::default();
+    let mut bytes = mcap::write(&recording, &options);
+    let topic = bytes.windows(5).rposition(|w| w == b"/scan").unwrap();
+    // Before a topic stand its length, the schema, the channel.
+    bytes[topic - 8] ^= 0x40;
+    let (_, kept) = read_bytes("x.mcap", &bytes);
+    assert_eq!(kept.counts(), recording.counts(), "{:?}", kept.notices);
+}
+
+/// The recording in two halves.
+fn halves() -> [Recording; 2] {
+    let whole = short();
+    let (first, second) = whole.messages.split_at(whole.messages.len() / 2);
+    [first, second].map(|messages| Recording {
+        messages: messages.to_vec(),
+        ..whole.clone()
+    })
+}
+
+#[test]
+fn chunks_that_a_lying_summary_does_not_name_are_read() {
+    let truth = short().counts();
+    let [first, second] = halves().map(|half| mcap::write(&half, &mcap::Options::default()));
+    let number =
+        |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+    let start = |bytes: &[u8]| usize::try_from(number(bytes, bytes.len() - 28)).unwrap();
+    // The chunks of the second half, put before the end of the data of the first.
+    let end = start(&first) - 13;
+    let chunk = second.windows(4).position(|w| w == b"zstd").unwrap() - 41;
+    let hidden = second[chunk..start(&second) - 13].to_vec();
+    let mut bytes = [&first[..end], &hidden, &first[end..]].concat();
+    let footer = bytes.len() - 28;
+    for at in [footer, footer + 8] {
+        let moved = number(&bytes, at) + hidden.len() as u64;
+        bytes[at..at + 8].copy_from_slice(&moved.to_le_bytes());
+    }
+    let (report, kept) = read_bytes("x.mcap", &bytes);
+    assert_eq!(kept.counts(), truth, "{:?}", kept.notices);
+    assert!(report.tier_reason.unwrap().contains("does not name"));
+}
+
+#[test]
+fn chunks_that_a_lying_tail_does_not_name_are_read() {
+    let truth = short().counts();
+    let [first, second] = halves().map(|half| rosbag1::write(&half, Pack::None, 1_000_000));
+    let place = |bytes: &[u8]| {
+        let at = bytes.windows(10).position(|w| w == b"index_pos=").unwrap() + 10;
+        (
+            at,
+            usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap(),
+        )
+    };
+    let ((at, end), (_, second_end)) = (place(&first), place(&second));
+    let body = first
+        .windows(12)
+        .position(|w| w == b"compression=")
+        .unwrap();
+    let start = (0..body)
+        .rev()
+        .find(|at| first[*at..].starts_with(b"op=\x05"))
+        .map_or(body, |op| op.min(body));
+    // From the length of the chunk record's header on.
+    let start = (0..start).rev().find(|at| {
+        let len = u32::from_le_bytes(first[*at..*at + 4].try_into().unwrap()) as usize;
+        (20..80).contains(&len) && at + 4 + len > body
+    });
+    let start = start.unwrap();
+    let mut bytes = [&first[..end], &second[start..second_end], &first[end..]].concat();
+    let moved = (end + second_end - start) as u64;
+    bytes[at..at + 8].copy_from_slice(&moved.to_le_bytes());
+    let (_, kept) = read_bytes("x.bag", &bytes);
+    assert_eq!(kept.counts(), truth, "{:?}", kept.notices);
+}
+
+#[test]
+fn a_cut_database_keeps_its_rows() {
+    let recording = support::small();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.db3");
+    sqlite3::write(&recording, &path);
+    let bytes = fs::read(&path).unwrap();
+    for (percent, least) in [(95, 70), (80, 50), (50, 20)] {
+        let cut = bytes.len() * percent / 100;
+        for want in [Want::Stamps, Want::Payload] {
+            let (_dir, path) = placed("cut.db3", &bytes[..cut]);
+            let (report, kept) = read(&path, want).unwrap();
+            let (found, truth) = (kept.stamps.len(), recording.messages.len());
+            assert!(!report.complete && found < truth, "{percent} %: {found}");
+            assert!(
+                found * 100 > truth * least,
+                "{percent} %: {found} of {truth}"
+            );
+            let kinds: Vec<_> = kept.notices.iter().map(|n| n.kind).collect();
+            assert!(kinds.contains(&NoticeKind::Truncated), "{:?}", kept.notices);
+        }
+    }
+    assert!(read(&path, Want::Payload).unwrap().0.complete);
+}
+
+#[test]
+fn tables_may_be_named_in_capitals() {
+    let recording = short();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.db3");
+    sqlite3::write(&recording, &path);
+    let db = rusqlite::Connection::open(&path).unwrap();
+    db.execute_batch(
+        "ALTER TABLE topics RENAME TO a; ALTER TABLE a RENAME TO Topics;
+         ALTER TABLE messages RENAME TO b; ALTER TABLE b RENAME TO MESSAGES;
+         ALTER TABLE MESSAGES RENAME COLUMN topic_id TO Topic_ID;",
+    )
+    .unwrap();
+    db.close().unwrap();
+    assert_eq!(
+        read(&path, Want::Payload).unwrap().1.counts(),
+        recording.counts()
+    );
+}
+
+#[test]
+fn messages_at_the_end_of_time_count() {
+    let mut recording = Recording::default();
+    let clock = recording.publisher("/clock", "/clock", "std_msgs/String");
+    for at in [i64::MAX - 1_000_000_000, i64::MAX] {
+        recording.messages.push((clock, at, vec![0; 8]));
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.db3");
+    sqlite3::write(&recording, &path);
+    let (code, told) = bagreel(&["info", path.to_str().unwrap(), "--format", "json"]);
+    assert!(
+        code == Some(0) && told.contains("\"messages\": 2"),
+        "{told}"
+    );
+    recording.messages.remove(0);
+    let (_dir, path) = placed(
+        "x.mcap",
+        &mcap::write(&recording, &mcap::Options::default()),
+    );
+    let (code, told) = bagreel(&["info", path.to_str().unwrap(), "--format", "json"]);
+    assert!(
+        code == Some(0) && told.contains("\"messages\": 1"),
+        "{told}"
+    );
+}
+
+#[test]
+fn what_is_set_aside_is_told_by_the_exit_code() {
+    let mut recording = short();
+    recording.messages[5].1 += 1 << 62;
+    recording.messages.sort_by_key(|m| m.1);
+    let (_dir, path) = placed(
+        "x.mcap",
+        &mcap::write(&recording, &mcap::Options::default()),
+    );
+    let (code, told) = bagreel(&["info", path.to_str().unwrap()]);
+    assert!(
+        code == Some(3) && told.contains("impossible time"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_second_reader_that_stops_verifies_nothing() {
+    let mut bytes = mcap::write(&short(), &mcap::Options::default());
+    let (_dir, path) = placed("sound.mcap", &bytes);
+    let (code, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
+    assert!(
+        code == Some(0) && told.contains("counts the same"),
+        "{told}"
+    );
+    // The checksum of the last chunk stands before the name of its compression.
+    let last = bytes
+        .windows(4)
+        .enumerate()
+        .filter(|(at, w)| *w == b"zstd" && bytes[at - 4..*at] == 4u32.to_le_bytes());
+    let data_end = bytes.len() - 8 - 29;
+    let last = last
+        .map(|(at, _)| at)
+        .rfind(|at| bytes[at - 41] == 6 && *at < data_end);
+    bytes[last.unwrap() - 5] ^= 1;
+    let (_dir, path) = placed("x.mcap", &bytes);
+    let (code, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
+    assert_eq!(code, Some(3), "{told}");
+    assert!(told.contains("could not be verified"), "{told}");
+    assert!(!told.contains("a second reader counts the same"), "{told}");
+}
+
+#[test]
+fn what_no_second_reader_reads_is_said() {
+    let bytes = rosbag1::unindexed(&rosbag1::write(&short(), Pack::Lz4, 4000));
+    let (_dir, path) = placed("killed.bag.active", &bytes);
+    let (_, told) = bagreel(&["info", "--verify", path.to_str().unwrap()]);
+    assert!(told.contains("could not be verified"), "{told}");
+    assert!(!told.contains("a second reader counts the same"), "{told}");
+}
+
+#[test]
+fn a_bag_named_twice_counts_once_and_is_said() {
+    let recording = short();
+    let (_dir, path) = placed(
+        "x.mcap",
+        &mcap::write(&recording, &mcap::Options::default()),
+    );
+    let path = path.to_str().unwrap();
+    let (code, told) = bagreel(&["info", path, path]);
+    let count = format!("{} messages", recording.messages.len());
+    assert!(code == Some(0) && told.contains("named twice"), "{told}");
+    assert!(told.contains(&count), "no `{count}` in {told}");
+    let (code, told) = bagreel(&["info", "-", "-"]);
+    assert!(code == Some(2) && told.contains("read once"), "{told}");
+    let (code, told) = bagreel(&["info", "--verify", "-"]);
+    assert!(
+        code == Some(2) && told.contains("reads a bag twice"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_survey_has_a_row_for_a_bag_that_cannot_be_read_and_says_so() {
+    let (dir, _) = placed(
+        "good.mcap",
+        &mcap::write(&short(), &mcap::Options::default()),
+    );
+    let folder = dir.path().join("bags");
+    fs::create_dir(&folder).unwrap();
+    fs::rename(dir.path().join("good.mcap"), folder.join("good.mcap")).unwrap();
+    fs::create_dir(folder.join("below")).unwrap();
+    fs::copy(folder.join("good.mcap"), folder.join("below/other.mcap")).unwrap();
+    // A folder of storage files would be one recording.
+    fs::rename(folder.join("good.mcap"), folder.join("below/third.mcap")).unwrap();
+    let (code, told) = bagreel(&["info", folder.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{told}");
+    fs::write(folder.join("bad.bag"), b"#ROSBAG V1.0\n").unwrap();
+    let (code, told) = bagreel(&["info", folder.to_str().unwrap()]);
+    assert!(code == Some(3) && told.contains("bad.bag"), "{told}");
+}
+
+#[test]
+#[cfg(unix)]
+fn more_parts_than_files_may_be_open_are_all_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("run");
+    fs::create_dir(&folder).unwrap();
+    let mut paths = Vec::new();
+    for part in 0..90i64 {
+        let mut recording = Recording::default();
+        let one = recording.publisher("/one", "/one", "std_msgs/String");
+        recording
+            .messages
+            .push((one, ORIGIN + part * 1_000_000_000, vec![0; 8]));
+        let name = format!("run_{part}.mcap");
+        fs::write(
+            folder.join(&name),
+            mcap::write(&recording, &mcap::Options::default()),
+        )
+        .unwrap();
+        paths.push(format!("run/{name}"));
+    }
+    for inputs in ["run".to_owned(), paths.join(" ")] {
+        let command = format!(
+            "ulimit -n 40; exec {} info {inputs} --format json",
+            env!("CARGO_BIN_EXE_bagreel")
+        );
+        let mut run = Command::new("sh");
+        let run = run.current_dir(dir.path()).args(["-c", &command]);
+        let (code, told) = said(&run.output().unwrap());
+        assert!(
+            code == Some(0) && told.contains("\"messages\": 90"),
+            "{told}"
+        );
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_link_out_of_a_folder_is_not_followed() {
+    let recording = short();
+    let outside = tempfile::tempdir().unwrap();
+    let secret = outside.path().join("secret.db3");
+    sqlite3::write(&recording, &secret);
+    for named in [true, false] {
+        let dir = tempfile::tempdir_in(outside.path()).unwrap();
+        if named {
+            sqlite3::write_metadata(&recording, dir.path(), "sqlite3", &["link.db3"]);
+        }
+        std::os::unix::fs::symlink(&secret, dir.path().join("link.db3")).unwrap();
+        let refused = read(dir.path(), Want::Stamps).map(|(_, kept)| kept.stamps.len());
+        let why = refused.expect_err("the link was followed").to_string();
+        assert!(
+            why.contains("link.db3") && why.contains("not followed"),
+            "{why}"
+        );
+        // Beside a file of the folder's own it stays out as well.
+        sqlite3::write(&recording, &dir.path().join("own.db3"));
+        let (_, kept) = read(dir.path(), Want::Stamps).unwrap();
+        assert_eq!(kept.stamps.len(), recording.messages.len());
+    }
+}
+
+/// A chunk whose compressed zeros unfold to terabytes, in a ROS 1 bag that is read in each of the three ways.
+fn bombs() -> Vec<(&'static str, Vec<u8>)> {
+    let mut recording = Recording::default();
+    let bomb = recording.publisher("/rosout", "/rosout", "rosgraph_msgs/Log");
+    recording.send(bomb, (0, 2), 1, &[0; 64]);
+    rosbag1::bombs(&recording)
+}
+
+#[test]
+fn a_bomb_is_given_up_wherever_it_is_opened() {
+    for (name, bytes) in bombs() {
+        assert!(bytes.len() < 1_000_000, "{name}");
+        let (_dir, path) = placed("bomb.bag", &bytes);
+        let (report, _) = read(&path, Want::Payload).unwrap();
+        assert!(!report.complete, "{name}");
+    }
+}
+
+/// The numbers of the reports that come with the hostile files, where those are.
+#[test]
+fn hostile_files_are_read_as_far_as_they_go() {
+    let Some(folder) = support::shared("data/hostile") else {
+        return;
+    };
+    let count = |name: &str| {
+        let (report, kept) = read(&folder.join(name), Want::Stamps).unwrap();
+        (kept.stamps.len(), report.complete)
+    };
+    assert_eq!(count("03_forward_crc.mcap"), (30, false));
+    assert_eq!(count("03_forward_false_data_end.mcap"), (30, false));
+    assert_eq!(count("03_forward_opcode.mcap"), (30, false));
+    assert!(count("04_cut95.db3").0 >= 620);
+    let path: &Path = &folder.join("06_max_ts.db3");
+    let (_, kept) = read(path, Want::Stamps).unwrap();
+    assert!(kept.stamps.iter().all(|(_, at, _)| *at <= Stamp::LAST));
+}

@@ -1,0 +1,6 @@
+//! Topology files: csv.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    bagreel_fuzz::as_file("x.csv", bytes, |path| drop(bagreel::evidence::topology::read(path)));
+});

@@ -1,0 +1,75 @@
+//! What is told of a window is the same everywhere: headlines, counts, captions, marks.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use bagreel::bag::Input;
+use bagreel::pipeline::{Reading, Unwatched, read};
+use bagreel::view::{Frame, Mark, Shown, View, ViewOptions, view};
+
+fn example(name: &str) -> View {
+    let bag = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples")
+        .join(name);
+    let reading = Reading {
+        inputs: vec![Input::Path(bag)],
+        ..Reading::default()
+    };
+    let mission = read(&reading, &mut Unwatched).unwrap();
+    view(&mission, &ViewOptions::default()).0
+}
+
+fn all(frame: &Frame) -> impl Iterator<Item = &Shown> {
+    frame.items.iter().chain(&frame.arrows)
+}
+
+#[test]
+fn every_headline_is_counted_said_and_marked() {
+    for name in ["warehouse.bag", "courier.mcap"] {
+        let view = example(name);
+        assert!(
+            view.frames.iter().any(|f| !f.headlines.is_empty()),
+            "{name}"
+        );
+        for frame in &view.frames {
+            let at = format!("{name}, window {}", frame.index);
+            let told: BTreeSet<u32> = frame.headlines.iter().map(|h| h.entry).collect();
+            let said: usize = frame.caption.iter().map(|phrase| phrase.headlines).sum();
+            assert_eq!(
+                (told.len(), told.len()),
+                (frame.counts.total(), said),
+                "{at}"
+            );
+            let marked = all(frame).filter(|s| s.mark.is_some());
+            let marked: BTreeSet<u32> = marked.flat_map(|s| s.entries.clone()).collect();
+            assert!(marked.is_superset(&told), "{at}: {told:?} {marked:?}");
+            assert!(
+                all(frame).all(|s| s.mark.is_none() || !s.entries.is_empty()),
+                "{at}"
+            );
+        }
+    }
+}
+
+/// What a window shows when its marks are gone, but for clock and numbers.
+fn settled(frame: &Frame) -> Vec<String> {
+    let stays = all(frame).filter(|s| s.mark != Some(Mark::Removed));
+    let look = |s: &Shown| format!("{} {:?} {:?} {:?}", s.id, s.state, s.degree, s.steady_hz);
+    stays.map(look).collect()
+}
+
+#[test]
+fn a_window_without_a_headline_looks_like_the_one_before() {
+    let view = example("warehouse.bag");
+    for pair in view.frames.windows(2).filter(|p| p[1].headlines.is_empty()) {
+        let paused = |f: &Frame| all(f).any(|s| s.is_paused);
+        if !paused(&pair[0]) && !paused(&pair[1]) {
+            assert_eq!(
+                settled(&pair[0]),
+                settled(&pair[1]),
+                "window {}",
+                pair[1].index
+            );
+        }
+    }
+}
