@@ -1,6 +1,7 @@
 //! What was typed, turned into work; the only file (with its folder) that knows clap and the environment.
 
 mod args;
+mod extract;
 mod look;
 mod stop;
 pub mod terminal;
@@ -16,19 +17,21 @@ use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::{budget, file};
 use crate::cli::terminal::Terminal;
+use crate::evidence::code::{SourceCode, Version};
 use crate::evidence::collector;
 use crate::evidence::topology;
 use crate::export::Output;
 use crate::graph;
 use crate::graph::window::{Division, Length};
-use crate::mission::info::{SurveyRow, json, survey_csv, survey_text};
+use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::mission::{Mission, events};
 use crate::pipeline::{
     Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
+    survey_file,
 };
 use args::{
-    Command, EventsArgs, EventsFormat, GraphArgs, InfoArgs, InfoFormat, Inputs, RenderArgs,
-    TimeArgs, Typed,
+    Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs,
+    RenderArgs, TimeArgs, Typed,
 };
 
 const DONE: u8 = 0;
@@ -68,7 +71,8 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = match typed.command {
         Command::Render(args) => render(&args, &mut terminal),
         Command::Info(args) => info(&args, &mut terminal),
-        Command::Events(args) => log(&args, &mut terminal),
+        Command::Extract(args) => extract(&args, &mut terminal),
+        Command::Events(args) => events(&args, &mut terminal),
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
             let mut text = Vec::new();
@@ -138,9 +142,36 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
             grace: graph.grace.unwrap_or(0) as usize,
             roles: graph.roles,
             topology: topology::read_all(&graph.topology)?,
+            code: None,
         },
+        code: source_code(graph)?,
         rate_change: graph.rate_change,
     })
+}
+
+/// Which source code to read, if any.
+fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
+    let infers = graph.infer.iter().any(|word| word == "source");
+    let Some(folder) = graph.source.clone() else {
+        return if infers {
+            Err(Error::usage(
+                "`--infer source` has no source code to read",
+                "add `--source DIR`, a workspace or repository",
+            ))
+        } else {
+            Ok(None)
+        };
+    };
+    let version = match graph.source_at.as_deref() {
+        None => Version::Recording,
+        Some("worktree") => Version::Worktree,
+        Some(commit) => Version::Commit(commit.to_owned()),
+    };
+    Ok(Some(SourceCode {
+        folder,
+        version,
+        infers,
+    }))
 }
 
 fn input(path: &Path) -> Input {
@@ -158,6 +189,13 @@ fn code(mission: &Mission) -> u8 {
     } else {
         DONE
     }
+}
+
+fn extract(args: &ExtractArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+    let inputs = args.bags.iter().map(|path| input(path)).collect();
+    let (notices, undecoded) = extract::extract(args, inputs, terminal)?;
+    let is_whole = undecoded == 0 && !notices.any_loss();
+    Ok(if is_whole { DONE } else { SKIPPED })
 }
 
 fn render(args: &RenderArgs, terminal: &mut Terminal) -> Result<u8, Error> {
@@ -237,7 +275,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .unwrap_or_else(|| title(&reading.inputs));
     let mut outputs = match &args.outputs[..] {
         [] => vec![Output::parse(
-            &default_output(&reading.inputs),
+            &default_output(&reading.inputs, args.figure.figure.is_some()),
             args.format.as_deref(),
         )?],
         some => some
@@ -259,11 +297,13 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         },
         sequence: crate::export::sequence::Options {
             append_to: summary(),
+            figure: look::figure(&args.figure, &args.look)?,
             ..look::sequence(&args.sequence)?
         },
         kept: kept(args),
         outputs,
         captions: args.look.captions.clone(),
+        phases: look::phases(&args.figure.phases),
         is_filtered: args.view.filtered,
         reading,
     })
@@ -272,7 +312,11 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
 /// The files that are read beside the bags. A style or captions may be a name that is no file, which does no harm.
 fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     let look = &args.look;
-    let named = [Some(&look.style), look.captions.as_ref()];
+    let named = [
+        Some(&look.style),
+        look.captions.as_ref(),
+        Some(&args.figure.phases),
+    ];
     let named = named.into_iter().flatten().map(PathBuf::from);
     let files = [&look.font, &look.layout_from].into_iter().flatten();
     let topologies = args.graph.topology.iter();
@@ -299,14 +343,15 @@ fn summary_format(output: &OsStr) -> Option<&'static str> {
         .then_some("md")
 }
 
-/// `out/<bag name>.gif`, the name without what tells the format.
-fn default_output(inputs: &[Input]) -> String {
+/// `out/<bag name>.gif`, of a figure `.pdf`, the name without what tells the format.
+fn default_output(inputs: &[Input], is_figure: bool) -> String {
     let name = inputs.first().map_or_else(String::new, Input::name);
     let mut stem = name.as_str();
     for end in [".active", ".zstd", ".bag", ".db3", ".mcap", ".json"] {
         stem = stem.strip_suffix(end).unwrap_or(stem);
     }
-    format!("out/{}.gif", stem.replace('/', "_"))
+    let extension = if is_figure { "pdf" } else { "gif" };
+    format!("out/{}.{extension}", stem.replace('/', "_"))
 }
 
 fn log(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
@@ -337,11 +382,11 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
         && is_survey(input)
     {
         let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
-        terminal.results(&match args.format {
-            InfoFormat::Text => survey_text(&rows),
-            InfoFormat::Csv => survey_csv(&rows),
-            InfoFormat::Json => json(&rows),
-        })?;
+        match args.format {
+            InfoFormat::Text => terminal.results(&survey_text(&rows))?,
+            InfoFormat::Json => terminal.results(&json(&rows))?,
+            table => terminal.table(&survey_file(&rows, table.of_table())?)?,
+        }
         return Ok(if skipped { SKIPPED } else { DONE });
     }
     if !args.why.is_empty() {
@@ -354,22 +399,21 @@ fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     }
     let mission = read(&reading, terminal)?;
     let info = crate::mission::info::info(&mission);
-    terminal.results(&match args.format {
-        InfoFormat::Text => crate::mission::info::text(&info),
-        InfoFormat::Json => json(&info),
-        InfoFormat::Csv => {
-            let path = mission
-                .bags
-                .first()
-                .map(|b| b.name.clone())
-                .unwrap_or_default();
-            survey_csv(&[SurveyRow {
-                path,
+    match args.format {
+        InfoFormat::Text => terminal.results(&crate::mission::info::text(&info))?,
+        InfoFormat::Json => terminal.results(&json(&info))?,
+        table => {
+            let row = SurveyRow {
+                path: mission
+                    .bags
+                    .first()
+                    .map_or_else(String::new, |b| b.name.clone()),
                 error: None,
                 info: Some(info),
-            }])
+            };
+            terminal.table(&survey_file(&[row], table.of_table())?)?;
         }
-    })?;
+    }
     terminal.notices(&mission.notices);
     Ok(code(&mission))
 }

@@ -5,6 +5,7 @@
 
 pub(crate) mod claim;
 pub(crate) mod clock;
+pub mod code;
 pub mod collector;
 mod kinds;
 pub mod message;
@@ -13,7 +14,6 @@ pub(crate) mod publishers;
 pub(crate) mod rhythm;
 pub(crate) mod source;
 pub(crate) mod spread;
-#[allow(dead_code, reason = "readers of source code need the rest")]
 pub(crate) mod syntax;
 pub(crate) mod texts;
 pub mod times;
@@ -271,6 +271,16 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "launch",
         about: "a launch file of the user's, which declares nodes; in Python, it is read and never run",
+        ..NOTHING
+    },
+    Source {
+        word: "source",
+        about: "source code of the user's: what a node that the bag names declares (with `--source`)",
+        ..NOTHING
+    },
+    Source {
+        word: "source_only",
+        about: "source code of the user's: the only place that can be meant (with `--infer source`)",
         ..NOTHING
     },
 ];

@@ -3,23 +3,29 @@
 mod animated_svg;
 mod apng;
 pub mod check;
-mod csv;
 pub mod dot;
 pub(crate) mod encoder;
+mod gexf;
 mod gif;
+mod graphml;
 pub mod html;
 mod json;
 pub mod mermaid;
 pub mod options;
 pub mod palette;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod pdf;
 mod png;
 pub mod report;
 pub mod run;
 pub mod sequence;
 pub mod sink;
+mod spells;
 mod svg;
+pub mod tables;
 pub mod target;
+mod tex;
 mod video;
 
 use std::ffi::OsStr;
@@ -29,9 +35,10 @@ use crate::base::error::{Error, Result};
 
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
-pub use encoder::{Encoder, Format, Frame, Needs, Start, Written};
+pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Start, Written};
 use sequence::Sequence;
 use target::Target;
+pub(crate) use tex::needs_figure;
 
 /// All formats.
 pub const FORMATS: &[Format] = &[
@@ -51,6 +58,7 @@ pub const FORMATS: &[Format] = &[
         word: "svg",
         what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
         start: start_svg,
+        whole: OneDrawing::Asked,
         ..PICTURE
     },
     Format {
@@ -81,6 +89,14 @@ pub const FORMATS: &[Format] = &[
         word: "pdf",
         what: "a page per window as vectors, or the `--strip`",
         start: pdf::start,
+        whole: OneDrawing::Asked,
+        ..PICTURE
+    },
+    Format {
+        word: "tex",
+        what: "the lines that put a `--figure` into LaTeX, with a caption",
+        start: tex::start,
+        whole: OneDrawing::Asked,
         ..PICTURE
     },
     Format {
@@ -117,9 +133,29 @@ pub const FORMATS: &[Format] = &[
     },
     Format {
         word: "csv",
-        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, `x.changes.csv`, `x.bags.csv`",
-        check: Some(csv::check),
-        start: csv::start,
+        what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, ledger, phases, bags",
+        check: Some(tables::check),
+        start: tables::start_csv,
+        ..DATA
+    },
+    #[cfg(feature = "parquet")]
+    Format {
+        word: "parquet",
+        what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
+        check: Some(tables::check),
+        start: tables::start_parquet,
+        ..DATA
+    },
+    Format {
+        word: "gexf",
+        what: "one dynamic graph for Gephi: who is there from when to when",
+        start: gexf::start,
+        ..DATA
+    },
+    Format {
+        word: "graphml",
+        what: "the union graph for yEd, networkx and others",
+        start: graphml::start,
         ..DATA
     },
 ];
@@ -134,7 +170,7 @@ const POSTER: &Format = &Format {
 
 /// Drawings where that is what is asked for, else one that moves.
 fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
-    let is_sequence = sequence.view.frames.len() > 1 && sequence.options.strip.is_none();
+    let is_sequence = sequence.view.frames.len() > 1 && !sequence.options.is_one_drawing();
     if is_sequence && !target.is_numbered() {
         animated_svg::start(sequence, target)
     } else {
@@ -208,14 +244,14 @@ pub fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
 /// The files that an output makes: of most formats the one of its name.
 fn files(output: &Output) -> Vec<Target> {
     match output.format.word {
-        "csv" => csv::files(&output.target),
+        word @ ("csv" | "parquet") => tables::files(&output.target, word),
         _ => vec![output.target.clone()],
     }
 }
 
 /// Whether a sequence of this many windows needs a strip for these outputs even if none was asked for.
 pub fn needs_strip(outputs: &[Output], windows: usize) -> bool {
-    let strip = |o: &Output| o.format.is_strip && !o.target.is_numbered();
+    let strip = |o: &Output| o.format.whole == OneDrawing::Always && !o.target.is_numbered();
     windows > 1 && outputs.iter().any(strip)
 }
 

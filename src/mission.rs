@@ -65,6 +65,8 @@ pub struct Mission {
     pub layout: Option<Places>,
     /// What went wrong without stopping us.
     pub notices: Notices,
+    /// What source code offers and was not drawn, a line each; made when bags are read, not part of a mission's file.
+    pub undrawn: Vec<String>,
 }
 
 /// The places of a drawing, in pixels at scale 1, y down.

@@ -3,13 +3,17 @@
 mod captions;
 mod draw;
 mod export;
+mod extract;
+mod figure;
 mod read;
 mod survey;
 
 pub use draw::Drawing;
 pub use export::{Render, Rendered, check, render, show};
+pub use extract::{Extract, Extracted, extract};
+pub use figure::Phases;
 pub use read::{Reading, explain, read};
-pub use survey::{Survey, is_survey, survey};
+pub use survey::{Survey, is_survey, survey, survey_file};
 
 /// A part of the work, as progress and timings tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

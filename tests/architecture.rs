@@ -18,8 +18,9 @@ const STATIONS: &[&str] = &[
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
         &["budget", "leftovers", "words"],
-        &["csv", "digest", "error", "geometry", "name", "notice", "time", "yaml"],
-        &["file"],
+        &["digest", "error", "geometry", "name", "notice", "time", "yaml"],
+        &["file", "table"],
+        &["csv"],
     ]),
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
@@ -32,7 +33,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
         &["kinds", "proof"],
-        &["publishers", "source"],
+        &["code", "publishers", "source"],
         &["collector"],
     ]),
     ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
@@ -46,16 +47,17 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
-    ("draw", &[&["text"], &["style"], &["scene"], &["picture"], &["paint", "strip"]]),
+    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
         &["check", "encoder"],
-        &["animated_svg", "apng", "csv", "dot", "gif", "html", "json", "mermaid", "pdf", "png", "svg", "video"],
-        &["report", "run"],
+        &["spells"],
+        &["animated_svg", "apng", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
+        &["report", "run", "tables"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["export", "survey"]]),
-    ("cli", &[&["args", "stop"], &["look", "terminal"]]),
+    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
+    ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
@@ -78,10 +80,16 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "mission/json",
         ],
     ),
-    // Tables of a mission are written as a stream, small ones as text.
-    ("csv", &["base/csv", "export/csv"]),
     // Temporary files: of outputs, of decompressed bags, of times beyond what memory may hold.
-    ("tempfile", &["bag/source", "evidence/times", "export/sink"]),
+    (
+        "tempfile",
+        &[
+            "bag/source",
+            "evidence/times",
+            "export/sink",
+            "export/tables",
+        ],
+    ),
     // Times are read and spelled.
     ("jiff", &["base"]),
     // Plain functions on numbers, as the standard library's would be.

@@ -53,6 +53,7 @@ fn mission(windows: usize) -> (Mission, View) {
     let second = |i: usize| Stamp(i64::try_from(i).unwrap() * 1_000_000_000);
     let period = Period::parse("1s").unwrap();
     let mission = Mission {
+        undrawn: Vec::new(),
         bags: Vec::new(),
         span: Span {
             start: second(0),
@@ -127,6 +128,7 @@ fn run(
         picture: &Discs,
         painter: &Painter::new(&fonts),
         fonts: &fonts,
+        latex: None,
         strip: None,
         options,
     };
@@ -243,12 +245,14 @@ fn two_runs_write_the_same_bytes() {
         "d.json",
         "t.csv",
         "e.pdf",
+        "g.gexf",
+        "h.graphml",
     ];
     for folder in &folders {
         show(folder.path(), &outputs, Options::default()).unwrap();
     }
     let files = names(folders[0].path());
-    assert_eq!(files.len(), 3 + 3 * 8 + 1 + 5);
+    assert_eq!(files.len(), 3 + 3 * 8 + 1 + 7 + 2);
     assert_eq!(files, names(folders[1].path()));
     for file in files {
         let [a, b] = folders

@@ -178,7 +178,9 @@ fn tables_without_an_ending_are_called_csv() {
         &["render", COURIER, "--format", "csv", "-o", "x"],
     );
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
-    let tables = ["bags", "changes", "edges", "nodes", "topics"];
+    let tables = [
+        "bags", "changes", "edges", "ledger", "nodes", "phases", "topics",
+    ];
     assert_eq!(names(dir.path()), tables.map(|t| format!("x.{t}.csv")));
 }
 

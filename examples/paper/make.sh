@@ -1,14 +1,15 @@
 #!/bin/sh
-# Makes the figures and sets the paper: needs bagreel on the path and a TeX Live with the packages graphicx and animate.
+# Makes the three figures and sets the page. Needs bagreel on the path (or BAGREEL=…) and pdfLaTeX with graphicx.
 set -eu
 cd "$(dirname "$0")"
+bagreel=${BAGREEL:-bagreel}
 bag=../warehouse.bag
-printf '\\newcommand{\\version}{%s}\n' "$(bagreel --version)" > version.tex
-# The width of the page, the width of a column: bagreel says so if a text would be smaller than 6 pt there.
-bagreel render "$bag" --period 30 --style paper --mode nodes --collapse /robot1 --collapse /robot2 --collapse /fleet \
-    --strip 1x3 --width 180mm -o strip.pdf
-bagreel render "$bag" --period 30 --style paper --ns-filter '/robot1/*' --strip 1x3 --width 88mm -o column.pdf
-bagreel render "$bag" --period 30 --style paper -o mission.pdf
+# A column is 88 mm wide, the page 180 mm: what --width says is included without scaling, so that 6 pt stay 6 pt.
+# With --bare the legend stands in the caption, which the .tex beside the .pdf holds.
+for figure in map:180mm lives:88mm steps:180mm; do
+    "$bagreel" render "$bag" --figure "${figure%%:*}" --width "${figure##*:}" --phases phases.txt --bare \
+        -o "${figure%%:*}.pdf" -o "${figure%%:*}.tex"
+done
+# Twice, for the references.
 pdflatex -interaction=nonstopmode -halt-on-error paper.tex
-# Once more for references and the animation.
 pdflatex -interaction=nonstopmode -halt-on-error paper.tex

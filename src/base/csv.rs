@@ -1,11 +1,148 @@
 //! Tables as comma-separated values (RFC 4180).
 
 use std::borrow::Cow;
+use std::io::{self, Write};
 
-use super::words::visible;
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
-/// A table as text: the names of the columns, then a row a line.
+use super::table::{Batch, Column, Kind, Texts, Values, span};
+use super::words::visible;
+
+/// A table being written: the names of its columns, then a row a line. A list is written as JSON, with `NaN` and
+/// `Infinity` as Python's and JavaScript's readers take them; what is unknown is empty.
+pub(crate) struct Rows<W: Write> {
+    writer: csv::Writer<W>,
+    field: Vec<u8>,
+}
+
+impl<W: Write> Rows<W> {
+    /// Begins a table with the columns of `batch`.
+    pub(crate) fn new(to: W, batch: &Batch) -> io::Result<Self> {
+        let mut writer = WriterBuilder::new()
+            .terminator(Terminator::Any(b'\n'))
+            .from_writer(to);
+        writer.write_record(batch.columns.iter().map(|c| c.name.as_bytes()))?;
+        Ok(Self {
+            writer,
+            field: Vec::new(),
+        })
+    }
+
+    /// Writes all rows of `batch`.
+    pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
+        for row in 0..batch.rows {
+            for column in &batch.columns {
+                self.field.clear();
+                if column.valid.as_ref().is_none_or(|valid| valid[row]) {
+                    field(column, 0, row, &mut self.field)?;
+                }
+                self.writer.write_field(&self.field)?;
+            }
+            self.writer.write_record(None::<&[u8]>)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the table.
+    pub(crate) fn finish(self) -> io::Result<W> {
+        self.writer
+            .into_inner()
+            .map_err(csv::IntoInnerError::into_error)
+    }
+}
+
+/// The value at place `at` of a level: a list, or below all lists what stands in it.
+fn field(column: &Column, level: usize, at: usize, to: &mut Vec<u8>) -> io::Result<()> {
+    let in_list = level > 0;
+    let Some(ends) = column.lists.get(level) else {
+        return value(column, at, in_list, to);
+    };
+    to.push(b'[');
+    for (count, element) in span(ends, at).enumerate() {
+        if count > 0 {
+            to.push(b',');
+        }
+        field(column, level + 1, element, to)?;
+    }
+    to.push(b']');
+    Ok(())
+}
+
+fn value(column: &Column, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
+    match &column.values {
+        Values::Flag(v) => write!(to, "{}", v[at]),
+        Values::I8(v) => write!(to, "{}", v[at]),
+        Values::U8(v) => write!(to, "{}", v[at]),
+        Values::I16(v) => write!(to, "{}", v[at]),
+        Values::U16(v) => write!(to, "{}", v[at]),
+        Values::I32(v) => write!(to, "{}", v[at]),
+        Values::U32(v) => write!(to, "{}", v[at]),
+        Values::I64(v) => write!(to, "{}", v[at]),
+        Values::U64(v) => write!(to, "{}", v[at]),
+        Values::F32(v) if v[at].is_finite() => write!(to, "{:?}", v[at]),
+        Values::F32(v) => odd(f64::from(v[at]), in_list, to),
+        Values::F64(v) if v[at].is_finite() => number(v[at], to),
+        Values::F64(v) => odd(v[at], in_list, to),
+        Values::Texts(v) if column.kind == Kind::Bytes => bytes(v.get(at), to),
+        // Columns in which nothing is unknown are a message's fields.
+        Values::Texts(v) => text(v, at, in_list, column.valid.is_none(), to),
+    }
+}
+
+/// The shortest digits that give the number back; very large and very small ones with an exponent.
+fn number(value: f64, to: &mut Vec<u8>) -> io::Result<()> {
+    let size = value.abs();
+    if value == 0.0 || (1e-5..1e17).contains(&size) {
+        write!(to, "{value}")
+    } else {
+        write!(to, "{value:e}")
+    }
+}
+
+/// A number that is none.
+fn odd(value: f64, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
+    match (in_list, value.is_nan(), value > 0.0) {
+        (_, true, _) => write!(to, "NaN"),
+        (true, _, true) => write!(to, "Infinity"),
+        (true, _, false) => write!(to, "-Infinity"),
+        (false, _, true) => write!(to, "inf"),
+        (false, _, false) => write!(to, "-inf"),
+    }
+}
+
+fn bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
+    for (count, byte) in bytes.iter().enumerate() {
+        let before = if count == 0 { '[' } else { ',' };
+        write!(to, "{before}{byte}")?;
+    }
+    write!(to, "{}", if bytes.is_empty() { "[]" } else { "]" })
+}
+
+fn text(
+    texts: &Texts,
+    at: usize,
+    in_list: bool,
+    is_data: bool,
+    to: &mut Vec<u8>,
+) -> io::Result<()> {
+    if !in_list {
+        let text = String::from_utf8_lossy(texts.get(at));
+        to.extend_from_slice(cell(&text, is_data).as_bytes());
+        return Ok(());
+    }
+    to.push(b'"');
+    for byte in texts.get(at) {
+        match byte {
+            b'"' | b'\\' => to.extend([b'\\', *byte]),
+            0..0x20 => write!(to, "\\u{byte:04x}")?,
+            other => to.push(*other),
+        }
+    }
+    to.push(b'"');
+    Ok(())
+}
+
+/// A small table of texts as text: the names of the columns, then a row a line.
 pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = WriterBuilder::new()
         .terminator(Terminator::Any(b'\n'))
@@ -13,18 +150,19 @@ pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>
     // Writing to memory cannot fail, and rows are as long as the head.
     let _ = writer.write_record(columns);
     for row in rows {
-        let _ = writer.write_record(row.iter().map(|text| cell(text).into_owned()));
+        let _ = writer.write_record(row.iter().map(|text| cell(text, false).into_owned()));
     }
     let bytes = writer.into_inner().unwrap_or_default();
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// A text as it may stand in a cell: control characters are shown, not obeyed, and what a spreadsheet would take for a
-/// formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none of these signs.
-pub(crate) fn cell(text: &str) -> Cow<'_, str> {
+/// A text as it may stand in a cell: control characters are shown, not obeyed, unless it is a message's own `data`, and
+/// what a spreadsheet would take for a formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none of
+/// these signs.
+pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
     let is_formula =
         text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
-    let shown = visible(text);
+    let shown = if is_data { text.into() } else { visible(text) };
     if is_formula {
         format!("'{shown}").into()
     } else {
@@ -60,6 +198,7 @@ pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::table::Cell;
 
     #[test]
     fn no_cell_is_a_formula() {
@@ -72,16 +211,19 @@ mod tests {
             ("/a\u{1b}[2J\n::error::", "/a\\u{1b}[2J\\u{a}::error::"),
             ("/größe", "/größe"),
         ] {
-            assert_eq!(cell(text), shown);
+            assert_eq!(cell(text, false), shown);
         }
+        assert_eq!(cell("two\nlines", true), "two\nlines");
     }
 
     #[test]
     fn cells_are_quoted_where_they_must_be() {
-        let text = table(
-            &["a", "b"],
-            [vec!["x,y".to_owned(), "say \"hi\"".to_owned()]],
-        );
-        assert_eq!(text, "a,b\n\"x,y\",\"say \"\"hi\"\"\"\n");
+        let mut batch = Batch::new(&[("a", Kind::Text), ("b", Kind::Text), ("c", Kind::F64)]);
+        batch.push(&[Cell::text("x,y"), Cell::text("say \"hi\""), Cell::Null]);
+        batch.push(&[Cell::Null, Cell::text(""), Cell::Float(1e300)]);
+        let mut rows = Rows::new(Vec::new(), &batch).unwrap();
+        rows.write(&batch).unwrap();
+        let text = String::from_utf8(rows.finish().unwrap()).unwrap();
+        assert_eq!(text, "a,b,c\n\"x,y\",\"say \"\"hi\"\"\",\n,,1e300\n");
     }
 }

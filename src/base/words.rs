@@ -36,7 +36,7 @@ pub fn rate_of(count: u64, seconds: f64) -> String {
 }
 
 /// `value` rounded to so many significant digits; as it is where that makes no sense.
-fn significant(value: f64, digits: u8) -> f64 {
+pub fn significant(value: f64, digits: u8) -> f64 {
     if !value.is_finite() || value == 0.0 {
         return value;
     }

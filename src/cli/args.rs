@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::base::time::{Moment, Period, parse_nanos};
 use crate::export::FORMATS;
+use crate::export::tables::TableFormat;
 use crate::graph::window::{Align, Length};
 
 /// See how a robot's software reconfigures during a mission, straight from its bag files.
@@ -30,6 +31,9 @@ pub(super) enum Command {
     Render(Box<RenderArgs>),
     /// Tell what a bag holds, which evidence it has, and what cannot be known; over a folder, one row per bag.
     Info(Box<InfoArgs>),
+    /// Write the messages themselves as tables: a row per message, or a table per topic with every field.
+    #[command(after_help = EXTRACT_HELP)]
+    Extract(Box<ExtractArgs>),
     /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
     /// List the built-in styles, or print one to start your own from.
@@ -65,6 +69,8 @@ pub(super) struct RenderArgs {
     pub(super) look: LookArgs,
     #[command(flatten)]
     pub(super) sequence: SequenceArgs,
+    #[command(flatten)]
+    pub(super) figure: FigureArgs,
     /// Print how long each station took.
     #[arg(long)]
     pub(super) timings: bool,
@@ -109,6 +115,34 @@ pub(super) struct EventsArgs {
     pub(super) graph: GraphArgs,
 }
 
+#[derive(Debug, Args)]
+pub(super) struct ExtractArgs {
+    /// Bags, as `render` takes them. The messages of several are one table.
+    #[arg(required = true, value_name = "BAG")]
+    pub(super) bags: Vec<PathBuf>,
+    /// The file to write, `.csv` or `.parquet`; `-` is standard output; with `--fields` a folder.
+    #[arg(long, short, value_name = "FILE|FOLDER")]
+    pub(super) output: String,
+    /// The format, where the name does not tell it. [default with `--fields`: parquet]
+    #[arg(long, value_name = "csv|parquet")]
+    pub(super) format: Option<String>,
+    /// Decode messages: a table per topic, a column per field.
+    #[arg(long)]
+    pub(super) fields: bool,
+    /// Names of topics to take, as in `rqt_graph`: `/nav/.*,-/nav/debug`.
+    #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
+    pub(super) topic_filter: Option<String>,
+    /// Begin here: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(super) start: Option<Moment>,
+    /// End here, written like `--start`.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(super) end: Option<Moment>,
+}
+
+const EXTRACT_HELP: &str =
+    "Columns of a row per message: time_ns, topic, type, publisher, size_bytes; sorted by time.";
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "lower")]
 pub(super) enum InfoFormat {
@@ -116,6 +150,19 @@ pub(super) enum InfoFormat {
     Text,
     Json,
     Csv,
+    #[cfg(feature = "parquet")]
+    Parquet,
+}
+
+impl InfoFormat {
+    /// The format of a table; CSV for what is none.
+    pub(super) fn of_table(self) -> TableFormat {
+        match self {
+            #[cfg(feature = "parquet")]
+            Self::Parquet => TableFormat::Parquet,
+            _ => TableFormat::Csv,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -178,8 +225,17 @@ pub(super) struct GraphArgs {
     /// Add nodes and edges that the bag hides: CSV, YAML, DOT of rqt_graph, or a launch file.
     #[arg(long, value_name = "FILE")]
     pub(super) topology: Vec<PathBuf>,
-    /// Infer subscriptions from equal header stamps, or from equal payloads in bags larger than 64 MB too.
-    #[arg(long, value_name = "stamps,payloads", value_parser = ["stamps", "payloads"], value_delimiter = ',')]
+    /// Add what the source code in this workspace or repository declares for the nodes that the bag names; as of the
+    /// recording's day, where it is in git. Nothing is run.
+    #[arg(long, value_name = "DIR")]
+    pub(super) source: Option<PathBuf>,
+    /// The code to read, instead of the last commit before the recording's end: the newest commit, another one, or the
+    /// files as they lie.
+    #[arg(long, value_name = "HEAD|COMMIT|worktree", requires = "source")]
+    pub(super) source_at: Option<String>,
+    /// Infer subscriptions from equal header stamps, or from equal payloads in bags larger than 64 MB too; nodes that the
+    /// bag does not name from the only place in the source code that can be meant.
+    #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]
     pub(super) infer: Vec<String>,
     /// Read the size of every message, even where the index does not tell it.
     #[arg(long)]
@@ -260,6 +316,31 @@ pub(super) struct LookArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Figure")]
+pub(super) struct FigureArgs {
+    /// A figure for a paper, `--width` wide (88mm), with text of 6 pt at least: what lives when, who talks to whom, or
+    /// the reconfigurations one by one. For `.pdf`, `.svg`, `.png`, `.webp`; `.tex` includes it.
+    #[arg(long, value_name = "lives|map|steps", value_parser = ["lives", "map", "steps"], conflicts_with_all = [
+        "strip", "style", "size", "fit", "orientation", "layout", "layout_from", "mode", "hide", "group", "collapse",
+        "expand", "rqt_defaults", "show_recorder", "title",
+    ])]
+    pub(super) figure: Option<String>,
+    /// What the rows or boxes of a figure stand for; by default as much as fits.
+    #[arg(long, value_name = "nodes|groups|topics", value_parser = ["nodes", "groups", "topics"], requires = "figure")]
+    pub(super) rows: Option<String>,
+    /// The phases whose beginnings `--figure steps` shows, such as `3,5`. [default: the six that change most]
+    #[arg(long, value_name = "N,M,…", value_delimiter = ',', requires = "figure", value_parser = clap::value_parser!(u16).range(2..))]
+    pub(super) steps: Vec<u16>,
+    /// The size of names in a figure, `7pt` to `12pt`; all else is a point smaller.
+    #[arg(long, value_name = "PT", default_value = "7pt", value_parser = points, requires = "figure")]
+    pub(super) text: f64,
+    /// Phases of the mission: found (`auto`), `none`, or a file with a line per phase (`0:38 navigation`; names alone
+    /// name those that are found).
+    #[arg(long, value_name = "FILE|auto|none", default_value = "auto")]
+    pub(super) phases: String,
+}
+
+#[derive(Debug, Args)]
 #[command(next_help_heading = "Sequence")]
 pub(super) struct SequenceArgs {
     /// How long a window is shown, in milliseconds.
@@ -331,6 +412,12 @@ fn width(text: &str) -> Result<f64, String> {
     let millimetres = text.strip_suffix("mm").and_then(|n| n.parse().ok());
     let millimetres = millimetres.filter(|mm: &f64| (20.0..=2000.0).contains(mm));
     millimetres.ok_or_else(|| "write a width such as `88mm`; 20 to 2000".to_owned())
+}
+
+fn points(text: &str) -> Result<f64, String> {
+    let points = text.strip_suffix("pt").and_then(|n| n.parse().ok());
+    let points = points.filter(|pt: &f64| (7.0..=12.0).contains(pt));
+    points.ok_or_else(|| "write a size such as `8pt`; 7 to 12".to_owned())
 }
 
 fn bytes(text: &str) -> Result<u64, String> {

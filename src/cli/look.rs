@@ -3,16 +3,18 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::args::{LookArgs, SequenceArgs, ViewArgs};
+use super::args::{FigureArgs, LookArgs, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::{budget, file};
+use crate::draw::figure::{Kind, Rows};
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text::Fonts;
-use crate::export::options::{self, Profile};
+use crate::export::options::{self, FigureOptions, Profile};
 use crate::layout::Orientation;
 use crate::mission::{Places, read_json};
+use crate::pipeline::Phases;
 use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
 /// What is shown: `rqt_graph`'s defaults or ours, then what was asked for.
@@ -101,6 +103,47 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::Options> {
         links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
         ..options::Options::default()
     })
+}
+
+/// The figure that was asked for.
+pub(super) fn figure(args: &FigureArgs, look: &LookArgs) -> Result<Option<FigureOptions>> {
+    let Some(word) = &args.figure else {
+        return Ok(None);
+    };
+    let kind = Kind::parse(word)?;
+    let steps = args.steps.iter().map(|s| usize::from(*s)).collect();
+    if kind != Kind::Steps && !args.steps.is_empty() {
+        return Err(Error::usage(
+            format!("`--steps` says nothing to `--figure {word}`"),
+            "it chooses the panels of `--figure steps`",
+        ));
+    }
+    let rows = args.rows.as_deref().map(Rows::parse).transpose()?;
+    if kind != Kind::Lives && rows == Some(Rows::Topics) {
+        return Err(Error::usage(
+            format!("`--figure {word}` has no rows of topics"),
+            "`--rows nodes` or `--rows groups`; topics are arrows",
+        ));
+    }
+    let default = FigureOptions::default();
+    Ok(Some(FigureOptions {
+        kind,
+        width_mm: look.width.unwrap_or(default.width_mm),
+        text_pt: args.text,
+        rows,
+        steps,
+        is_bare: look.bare,
+        is_named: false,
+    }))
+}
+
+/// Where phases come from.
+pub(super) fn phases(word: &str) -> Phases {
+    match word {
+        "auto" => Phases::Found,
+        "none" => Phases::None,
+        file => Phases::File(file.into()),
+    }
 }
 
 fn link(text: &str) -> Result<(String, String)> {

@@ -83,13 +83,17 @@ impl Terminal {
     /// # Errors
     /// [`Error::Io`] where not all of it could be written.
     pub fn results(&mut self, text: &str) -> Result<()> {
-        let mut out = io::stdout().lock();
-        let written = out
-            .write_all(printable(text).as_bytes())
-            .and_then(|()| out.flush());
-        match written {
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-            other => other.map_err(Error::io("write", Path::new("standard output"))),
+        print(printable(text).as_bytes())
+    }
+
+    /// As [`Terminal::results`], of a table: bytes that are no text are printed as they are.
+    ///
+    /// # Errors
+    /// As [`Terminal::results`].
+    pub fn table(&mut self, table: &[u8]) -> Result<()> {
+        match std::str::from_utf8(table) {
+            Ok(text) => self.results(text),
+            Err(_) => print(table),
         }
     }
 
@@ -184,6 +188,15 @@ fn bar(stage: Stage) -> ProgressBar {
 /// Says why the process ends, whatever else is on the line.
 fn last_words() {
     let _ = writeln!(io::stderr(), "\nerror: {}", Error::Interrupted);
+}
+
+/// Writes to standard output. A closed pipe is no error.
+fn print(bytes: &[u8]) -> Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.map_err(Error::io("write", Path::new("standard output"))),
+    }
 }
 
 /// Lines as they may be printed, whatever names they hold: all but line ends and tabs is made visible.

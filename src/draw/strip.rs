@@ -395,6 +395,7 @@ mod tests {
             windows: Vec::new(),
             ledger: crate::mission::Ledger::default(),
             activity: crate::mission::Activity::default(),
+            undrawn: Vec::new(),
             layout: None,
             notices: Notices::new(),
         };

@@ -27,6 +27,11 @@ impl Color {
     /// Nothing is painted.
     pub const NONE: Self = Self(None);
 
+    /// Red, green and blue.
+    pub const fn of(rgb: [u8; 3]) -> Self {
+        Self(Some(rgb))
+    }
+
     /// Red, green and blue; `None` where nothing is painted.
     pub fn rgb(self) -> Option<[u8; 3]> {
         self.0

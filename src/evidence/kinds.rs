@@ -31,6 +31,12 @@ impl Evidence {
         Self(self.0 | other.0)
     }
 
+    /// Whether only source code speaks for it, which does not know when anything happened.
+    pub fn is_code_only(self) -> bool {
+        let code = Self::of("source").and(Self::of("source_only"));
+        !self.is_empty() && self.0 & !code.0 == 0
+    }
+
     /// Whether nothing is in it.
     pub fn is_empty(self) -> bool {
         self.0 == 0

@@ -3,5 +3,6 @@
 pub mod cursor;
 pub(crate) mod definition;
 pub(crate) mod dynamic;
+pub(crate) mod fields;
 pub(crate) mod log;
 pub(crate) mod parameters;

@@ -169,6 +169,17 @@ impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
 pub type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
 
+/// Whether a format holds one drawing of the whole mission: a film strip or a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OneDrawing {
+    /// It shows the sequence, or the graph itself.
+    Never,
+    /// Where one was asked for.
+    Asked,
+    /// Without `{n}` several windows become a film strip even unasked.
+    Always,
+}
+
 /// An output format.
 #[derive(Debug)]
 pub struct Format {
@@ -180,8 +191,8 @@ pub struct Format {
     pub is_drawn: bool,
     /// Whether `--max-bytes` binds it.
     pub is_limited: bool,
-    /// Whether, without `{n}`, several windows become a film strip unless one asks for another.
-    pub is_strip: bool,
+    /// Whether one drawing of the whole may stand in it.
+    pub whole: OneDrawing,
     /// What else it needs, checked before anything is read.
     pub check: Option<fn(&Target) -> Result<()>>,
     /// How an output begins.
@@ -194,7 +205,7 @@ pub(crate) const PICTURE: Format = Format {
     what: "",
     is_drawn: true,
     is_limited: false,
-    is_strip: false,
+    whole: OneDrawing::Never,
     check: None,
     start: nothing,
 };
@@ -207,7 +218,7 @@ pub(crate) const ANIMATION: Format = Format {
 
 /// What formats of single images have in common.
 pub(crate) const IMAGE: Format = Format {
-    is_strip: true,
+    whole: OneDrawing::Always,
     ..PICTURE
 };
 

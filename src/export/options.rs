@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::base::error::{Error, Result};
+pub use crate::draw::figure::Options as FigureOptions;
 pub use crate::draw::strip::Choice;
 
 /// How the sequence runs.
@@ -26,6 +27,8 @@ pub struct Options {
     pub dot_profile: Profile,
     /// The windows of a film strip, if one was asked for: it takes the place of a sequence of drawings too.
     pub strip: Option<Choice>,
+    /// The figure, if one was asked for: it stands where a strip would.
+    pub figure: Option<FigureOptions>,
     /// Links for the report: name and address.
     pub links: Vec<(String, String)>,
     /// A file that reports are appended to, where all others are written anew.
@@ -44,9 +47,17 @@ impl Default for Options {
             max_bytes: None,
             dot_profile: Profile::default(),
             strip: None,
+            figure: None,
             links: Vec::new(),
             append_to: None,
         }
+    }
+}
+
+impl Options {
+    /// Whether one drawing of the whole was asked for, which takes the place of a sequence.
+    pub fn is_one_drawing(&self) -> bool {
+        self.strip.is_some() || self.figure.is_some()
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) fn start<'a>(
     let fonts = sequence.fonts.clone();
     Ok(Box::new(Book {
         sequence,
-        strip: sequence.strip.filter(|_| sequence.options.strip.is_some()),
+        strip: sequence.strip.filter(|_| sequence.options.is_one_drawing()),
         target: target.clone(),
         sheets,
         press: thread::spawn(move || pdf::write(waiting.iter(), &fonts)),

@@ -64,6 +64,8 @@ pub struct Sequence<'a> {
     pub fonts: &'a Fonts,
     /// The film strip, for outputs that hold all windows in one drawing.
     pub strip: Option<&'a Scene>,
+    /// The lines that put the figure into LaTeX, if there is one.
+    pub latex: Option<&'a str>,
     /// How it runs.
     pub options: Options,
 }

@@ -26,7 +26,7 @@ pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
-    let strip = match single(sequence, target, sequence.options.strip.is_some())? {
+    let strip = match single(sequence, target, sequence.options.is_one_drawing())? {
         Single::Windows => None,
         Single::Strip(scene) => Some(scene),
     };

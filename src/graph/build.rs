@@ -13,6 +13,7 @@ pub(crate) mod windows;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
+use std::sync::Arc;
 
 use self::assemble::{Sight, Traffic, assemble};
 use self::liveness::{Extent, Liveness, Pulse};
@@ -25,9 +26,10 @@ use self::windows::Windows;
 use super::lives::Lives;
 use super::{Elements, Graph};
 use crate::base::error::Result;
-use crate::base::notice::{Notice, Notices};
+use crate::base::notice::Notices;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::claim::Name;
+use crate::evidence::code::{Code, matching};
 use crate::evidence::collector::{Collected, spool_error};
 use crate::evidence::proof::{Key, Proof, Validity};
 use crate::evidence::topology::Topology;
@@ -42,6 +44,8 @@ pub struct Options {
     pub roles: bool,
     /// Nodes and edges that the user knows of.
     pub topology: Topology,
+    /// What source code declares.
+    pub code: Option<Arc<Code>>,
 }
 
 /// The graphs of a mission.
@@ -57,6 +61,8 @@ pub struct Built {
     pub lives: Lives,
     /// What went wrong without stopping us.
     pub notices: Notices,
+    /// What source code offers and was not drawn, a line each.
+    pub undrawn: Vec<String>,
 }
 
 /// Builds the graph of each window. Windows are sorted by start, none inside another; they may overlap.
@@ -79,13 +85,13 @@ struct Builder<'a> {
     rates: Traffic,
     restarts: Restarts,
     values: Values,
-    /// Names of the user's that the bag does not know.
-    strange: Vec<Notice>,
+    /// What is worth saying about what was proved, and what source code offers beyond it.
+    code: matching::Outcome,
 }
 
 impl<'a> Builder<'a> {
     fn new(collected: &mut Collected, windows: &'a [Span], options: &Options) -> io::Result<Self> {
-        let (proofs, values, strange) = prove(collected, options)?;
+        let (proofs, values, code) = prove(collected, options)?;
         let start = collected.span.map_or(Stamp(0), |s| s.start);
         let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
         Ok(Self {
@@ -96,7 +102,7 @@ impl<'a> Builder<'a> {
             rates: BTreeMap::new(),
             restarts: Restarts::new(),
             values,
-            strange,
+            code,
         })
     }
 
@@ -105,10 +111,11 @@ impl<'a> Builder<'a> {
         self.restarts = restarts(collected, &self.proofs)?;
         self.track(collected)?;
         settle(&mut self.tracks, &self.proofs, &self.restarts, self.mission);
-        let strange = std::mem::take(&mut self.strange);
+        let code = std::mem::take(&mut self.code);
         let mut built = self.assemble(collected, options.grace);
         let told = options.topology.notices.iter().cloned();
-        built.notices.extend(told.chain(strange));
+        built.notices.extend(told.chain(code.notices));
+        built.undrawn = code.undrawn;
         Ok(built)
     }
 

@@ -8,7 +8,8 @@ mod why;
 use serde::Serialize;
 
 use advice::advice;
-pub use survey::{SurveyRow, survey_csv, survey_text};
+pub(crate) use survey::survey_table;
+pub use survey::{SurveyRow, survey_text};
 pub use text::text;
 pub use why::why;
 
@@ -51,6 +52,8 @@ pub struct Info {
     pub nodes: Vec<NodeInfo>,
     /// What would have told more, and how to record it; empty if nothing is missing.
     pub advice: Vec<String>,
+    /// What source code offers and was not drawn, and what else it tells; a line each.
+    pub undrawn: Vec<String>,
     /// What went wrong without stopping us.
     pub notices: Vec<String>,
 }
@@ -195,9 +198,14 @@ pub fn info(mission: &Mission) -> Info {
         end_ns: mission.span.end.0,
         duration_s: (mission.span.nanos() - 1).max(0) as f64 / 1e9,
         messages: mission.messages,
-        nodes_by_degree: best.nodes.iter().copied().collect(),
-        publishes_by_degree: best.publishes.iter().copied().collect(),
+        nodes_by_degree: known(&best.nodes, elements.nodes.iter().map(|e| e.evidence)).collect(),
+        publishes_by_degree: known(
+            &best.publishes,
+            elements.publishes.iter().map(|e| e.evidence),
+        )
+        .collect(),
         subscribes_by_degree: listeners(mission)
+            .filter(|(_, edge)| edge.evidence != Evidence::of("source_only"))
             .map(|(id, _)| best.subscribes[id])
             .collect(),
         topics_without_publisher: lacking(&topics, |t| t.publishers.is_empty()),
@@ -206,6 +214,7 @@ pub fn info(mission: &Mission) -> Info {
         nodes: nodes.collect(),
         topics,
         advice: Vec::new(),
+        undrawn: mission.undrawn.clone(),
         notices: mission.notices.iter().map(|n| n.text).collect(),
     };
     info.advice = advice(&info, is_ros1(mission));
@@ -276,6 +285,17 @@ impl BestDegrees {
 
 fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
+}
+
+/// How well each element is known, without those that only might be meant by the code.
+fn known(
+    degrees: &[Degree],
+    evidence: impl Iterator<Item = Evidence>,
+) -> impl Iterator<Item = Degree> {
+    let guessed = Evidence::of("source_only");
+    let all = degrees.iter().copied().zip(evidence);
+    all.filter(move |(_, evidence)| *evidence != guessed)
+        .map(|(degree, _)| degree)
 }
 
 /// Subscriptions with their ids, without those of the recorder, who is no part of the robot.

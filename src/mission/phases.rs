@@ -13,10 +13,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use self::partition::partition;
+pub(crate) use self::presence::knows_publishers;
 use self::presence::{Presence, is_topics, presences};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Elements, TopicId};
-use crate::mission::activity::Activity;
+use crate::mission::activity::{Activity, Cell};
 use crate::mission::ledger::Phase;
 
 /// A boundary is looked for this far around its cell, in nanoseconds and as a share of the mission.
@@ -58,6 +59,40 @@ pub fn phases(elements: &Elements, activity: &Activity) -> Vec<Phase> {
     told(&spans, &found, &ramps, unit)
 }
 
+/// Phases that somebody else cut, such as the user: what each changes, by majority.
+pub(crate) fn of_spans(elements: &Elements, activity: &Activity, spans: &[Span]) -> Vec<Phase> {
+    let present = presences(elements, activity);
+    let found: Vec<Configuration> = spans
+        .iter()
+        .map(|span| {
+            let (from, to) = cells_of(activity, *span);
+            configuration(elements, activity, &present, from, to)
+        })
+        .collect();
+    let unit = if is_topics(&present) { "topic" } else { "node" };
+    told(spans, &found, &vec![false; spans.len()], unit)
+}
+
+/// The majority graph of a phase that was found, or of any other stretch of time, by the cells whose middle lies in it.
+pub(crate) fn configuration_of(
+    elements: &Elements,
+    activity: &Activity,
+    span: Span,
+) -> Configuration {
+    let present = presences(elements, activity);
+    let (from, to) = cells_of(activity, span);
+    configuration(elements, activity, &present, from, to)
+}
+
+/// The cells whose middle lies in `span`, as a range; at least one if there is any.
+pub(crate) fn cells_of(activity: &Activity, span: Span) -> (usize, usize) {
+    let middle = |c: &Cell| c.span.start.plus(c.span.nanos() / 2);
+    let from = activity.cells.partition_point(|c| middle(c) < span.start);
+    let to = activity.cells.partition_point(|c| middle(c) < span.end);
+    let from = from.min(activity.cells.len().saturating_sub(1));
+    (from, to.max(from + 1).min(activity.cells.len()))
+}
+
 fn configuration(
     elements: &Elements,
     activity: &Activity,
@@ -82,7 +117,7 @@ fn configuration(
 }
 
 /// Who sends more than half of a topic's messages in these cells.
-fn senders(elements: &Elements, cells: &[super::activity::Cell]) -> BTreeMap<TopicId, Arc<str>> {
+fn senders(elements: &Elements, cells: &[Cell]) -> BTreeMap<TopicId, Arc<str>> {
     let mut sent: BTreeMap<TopicId, BTreeMap<Arc<str>, u64>> = BTreeMap::new();
     let mut all: BTreeMap<TopicId, u64> = BTreeMap::new();
     for cell in cells {

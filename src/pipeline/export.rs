@@ -4,17 +4,19 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use super::draw::{Composed, compose, places, unplaced};
-use super::{Drawing, Reading, Stage, Watch, captions, read};
+use super::figure::name_phases;
+use super::{Drawing, Phases, Reading, Stage, Watch, captions, read};
 use crate::bag::Input;
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
+use crate::draw::figure::Figure;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Source, Strip, strip};
-use crate::export::options::{self, Choice};
+use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::Sequence;
-use crate::export::{self, Output, Written};
+use crate::export::{self, OneDrawing, Output, Written};
 use crate::mission::Mission;
 use crate::view::{View, filtered};
 
@@ -31,8 +33,10 @@ pub struct Render {
     pub kept: Vec<PathBuf>,
     /// What to write.
     pub outputs: Vec<Output>,
-    /// Where mission phases come from: a file or a topic.
+    /// Where captions come from: a file or a topic.
     pub captions: Option<String>,
+    /// Where phases and their names come from.
+    pub phases: Phases,
     /// Whether data files hold the viewed graph only.
     pub is_filtered: bool,
 }
@@ -49,6 +53,7 @@ impl Render {
             sequence: options::Options::default(),
             outputs,
             captions: None,
+            phases: Phases::Found,
             kept: Vec::new(),
             is_filtered: false,
         })
@@ -79,12 +84,29 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 /// # Errors
 /// As [`export::check`].
 pub fn check(job: &Render) -> Result<()> {
+    check_figure(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
         Input::Stdin => None,
     });
     let kept: Vec<PathBuf> = inputs.chain(&job.kept).cloned().collect();
     export::check(&job.outputs, &kept)
+}
+
+/// A figure needs an output that holds it, and lines for LaTeX need a figure.
+fn check_figure(job: &Render) -> Result<()> {
+    let holds = |o: &Output| o.format.whole != OneDrawing::Never && o.format.word != "tex";
+    if job.sequence.figure.is_some() && !job.outputs.iter().any(holds) {
+        return Err(Error::usage(
+            "no output holds the figure",
+            "write it with `-o fig.pdf`, `.svg`, `.png` or `.webp`",
+        ));
+    }
+    let latex = job.outputs.iter().find(|o| o.format.word == "tex");
+    match latex.filter(|_| job.sequence.figure.is_none()) {
+        Some(output) => Err(export::needs_figure(&output.target)),
+        None => Ok(()),
+    }
 }
 
 /// Draws and writes a mission that was read.
@@ -96,8 +118,17 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
     if let Some(from) = &job.captions {
         drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
     }
-    // What is not drawn needs no places.
-    let is_drawn = job.outputs.iter().any(|o| o.format.is_drawn);
+    let is_named = name_phases(&mut mission, &job.phases)?;
+    let figure = drawn_figure(job, &mission, is_named)?;
+    for remark in figure.iter().flat_map(|(figure, _)| &figure.remarks) {
+        let notice = Notice::new(NoticeKind::Note, remark.clone());
+        mission.notices.add(notice);
+    }
+    // What is not drawn, or drawn as a figure, needs no places.
+    let is_graph = |o: &Output| {
+        o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
+    };
+    let is_drawn = job.outputs.iter().any(is_graph);
     let Composed {
         view,
         options,
@@ -114,7 +145,10 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
     let nothing = View::default();
     let drawn = if is_drawn { &view } else { &nothing };
     let picture = Measured::new(drawn, &drawing.style, &drawing.fonts, page).with(layout);
-    let strip = side_by_side(job, &mission, &view, &picture)?;
+    let strip = match figure {
+        Some(_) => None,
+        None => side_by_side(job, &mission, &view, &picture)?,
+    };
     for remark in strip.iter().flat_map(|s| &s.remarks) {
         let notice = Notice::new(NoticeKind::Note, remark.clone());
         mission.notices.add(notice);
@@ -127,7 +161,11 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         picture: &picture,
         painter: &Painter::new(&drawing.fonts),
         fonts: &drawing.fonts,
-        strip: strip.as_ref().map(|s| &s.scene),
+        strip: match &figure {
+            Some((figure, _)) => Some(&figure.scene),
+            None => strip.as_ref().map(|s| &s.scene),
+        },
+        latex: figure.as_ref().map(|(_, latex)| latex.as_str()),
         options: job.sequence.clone(),
     };
     watch.stage(Stage::Draw);
@@ -141,6 +179,22 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
     };
     let written = run::run(&sequence, &job.outputs, &mut progress)?;
     Ok(Rendered { mission, written })
+}
+
+/// The figure with its lines for LaTeX, if one was asked for.
+fn drawn_figure(
+    job: &Render,
+    mission: &Mission,
+    is_named: bool,
+) -> Result<Option<(Figure, String)>> {
+    let Some(options) = &job.sequence.figure else {
+        return Ok(None);
+    };
+    let options = FigureOptions {
+        is_named,
+        ..options.clone()
+    };
+    super::figure::draw(mission, &job.drawing, &options, &job.outputs).map(Some)
 }
 
 /// The film strip, if it was asked for or an output needs one.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::{Stage, Watch};
 use crate::bag::{self, Input, Kind, OpenOptions, Reader, Report};
@@ -10,6 +11,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::{budget, file};
 use crate::evidence::EvidenceLine;
+use crate::evidence::code::{self, SourceCode};
 use crate::evidence::collector::{self, Collected, Collector};
 use crate::graph;
 use crate::graph::diff::RATE_CHANGE;
@@ -34,6 +36,8 @@ pub struct Reading {
     pub collect: collector::Options,
     /// How graphs are built.
     pub graph: graph::Options,
+    /// The source code to read once the recording's day is known; takes the place of `graph.code`.
+    pub code: Option<SourceCode>,
     /// The share by which a rate must change to count, 0...
     pub rate_change: f64,
 }
@@ -48,6 +52,7 @@ impl Default for Reading {
             skip_unchanged: false,
             collect: collector::Options::default(),
             graph: graph::Options::default(),
+            code: None,
             rate_change: RATE_CHANGE,
         }
     }
@@ -91,6 +96,15 @@ pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
 pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec<EvidenceLine>)> {
     watch.stage(Stage::Read);
     if let Some(path) = mission_file(&reading.inputs)? {
+        if reading.code.is_some() {
+            return Err(Error::usage(
+                format!(
+                    "`--source` adds to bags, and `{}` is an evolution",
+                    path.display()
+                ),
+                "give the bag itself",
+            ));
+        }
         return Ok((reread(path, reading)?, Vec::new()));
     }
     let mut recorded = Recorded::read(reading, false, watch)?;
@@ -173,6 +187,17 @@ impl Recorded {
     }
 }
 
+/// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
+/// use if every payload were read.
+fn affordable(reading: &Reading) -> collector::Options {
+    let mut options = reading.collect.clone();
+    let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
+    if sizes.fold(0, u64::saturating_add) > options.payload_bytes {
+        options.payload_bytes = 0;
+    }
+    options
+}
+
 /// Every input once; a bag that was named twice would count twice.
 fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     let mut seen = BTreeSet::new();
@@ -193,17 +218,6 @@ fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
         }
     }
     Ok((once, twice))
-}
-
-/// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
-/// use if every payload were read.
-fn affordable(reading: &Reading) -> collector::Options {
-    let mut options = reading.collect.clone();
-    let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
-    if sizes.fold(0, u64::saturating_add) > options.payload_bytes {
-        options.payload_bytes = 0;
-    }
-    options
 }
 
 /// What is said of a bag that is whole and empty.
@@ -230,7 +244,7 @@ fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
 }
 
 /// The time that all bags cover, if every one of them tells without being read.
-fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
+pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
     let mut all: Option<Span> = None;
     for reader in readers {
         let Some(span) = reader.span()? else {
@@ -246,13 +260,21 @@ fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
 
 fn build(recorded: &mut Recorded, reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     watch.stage(Stage::Graphs);
+    let mut options = reading.graph.clone();
+    if let Some(wanted) = &reading.code {
+        let end = recorded
+            .collected
+            .span
+            .map_or(recorded.range.end, |span| span.end);
+        options.code = Some(Arc::new(code::read(wanted, end)?));
+    }
     let windows = window::divide(&reading.division, recorded.range)?;
-    let mut mission = graphs(recorded, &windows, reading)?;
+    let mut mission = graphs(recorded, &windows, reading, &options)?;
     if reading.skip_unchanged {
         let merged = merged(&mission, &windows);
-        mission = graphs(recorded, &merged, reading)?;
+        mission = graphs(recorded, &merged, reading, &options)?;
     }
-    mission.activity = activity(recorded, &mission, reading)?;
+    mission.activity = activity(recorded, &mission, &options)?;
     mission.ledger.phases = phases(&mission.elements, &mission.activity);
     if reading.division.length == Length::Auto {
         let text = format!("the period is {}; `--period` takes another", windows.period);
@@ -262,11 +284,15 @@ fn build(recorded: &mut Recorded, reading: &Reading, watch: &mut dyn Watch) -> R
 }
 
 /// The graphs of the same mission on the grid that no `--period` moves.
-fn activity(recorded: &mut Recorded, mission: &Mission, reading: &Reading) -> Result<Activity> {
+fn activity(
+    recorded: &mut Recorded,
+    mission: &Mission,
+    options: &graph::Options,
+) -> Result<Activity> {
     let options = graph::Options {
         // Counted in windows, which these are not.
         grace: 0,
-        ..reading.graph.clone()
+        ..options.clone()
     };
     let spans = activity::grid(mission.span);
     let built = graph::build(&mut recorded.collected, &spans, &options)?;
@@ -278,8 +304,13 @@ fn activity(recorded: &mut Recorded, mission: &Mission, reading: &Reading) -> Re
 }
 
 /// Builds the graph of every window and finds what changed.
-fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Result<Mission> {
-    let built = graph::build(&mut recorded.collected, &windows.spans, &reading.graph)?;
+fn graphs(
+    recorded: &mut Recorded,
+    windows: &Windows,
+    reading: &Reading,
+    options: &graph::Options,
+) -> Result<Mission> {
+    let built = graph::build(&mut recorded.collected, &windows.spans, options)?;
     let messages = built.messages.iter().sum();
     let mut notices: Notices = recorded.collected.notices.clone();
     notices.extend(built.notices.iter());
@@ -310,6 +341,7 @@ fn graphs(recorded: &mut Recorded, windows: &Windows, reading: &Reading) -> Resu
         windows: list,
         ledger: crate::mission::Ledger::default(),
         activity: Activity::default(),
+        undrawn: built.undrawn,
         layout: None,
         notices,
     };

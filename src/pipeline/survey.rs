@@ -7,14 +7,34 @@ use super::read::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
 use crate::bag::{self, Input, Kind};
 use crate::base::error::{Error, Result};
-use crate::mission::info::{SurveyRow, info};
+use crate::export::tables::{TableFormat, writer};
+use crate::mission::info::{SurveyRow, info, survey_table};
+
+/// The rows of a survey as a file of this format.
+///
+/// # Errors
+/// If the format cannot hold them.
+pub fn survey_file(rows: &[SurveyRow], format: TableFormat) -> Result<Vec<u8>> {
+    writer::whole(format, &survey_table(rows))
+}
 
 /// How deep below the folder bags are looked for.
 const DEEPEST: usize = 16;
 
-/// Whether `input` is a folder that is no bag itself.
+/// Whether `input` is a folder of bags, and not one recording with nothing beside it.
 pub fn is_survey(input: &Input) -> bool {
-    matches!(input, Input::Path(path) if path.is_dir() && bag::sniff(input).is_err())
+    let Input::Path(path) = input else {
+        return false;
+    };
+    let mut bags = Vec::new();
+    if !path.is_dir() || find(path, DEEPEST, &mut bags).is_err() {
+        return false;
+    }
+    let is_one = match &bags[..] {
+        [one] => one == path || one.parent() == Some(path) && bag::sniff(input).is_ok(),
+        _ => false,
+    };
+    !is_one
 }
 
 /// What was found of the bags below a folder.
@@ -42,11 +62,10 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
     }
     let mut skipped = false;
     let row = |path: PathBuf| {
-        let shown = path
-            .strip_prefix(folder)
-            .unwrap_or(&path)
-            .display()
-            .to_string();
+        let shown = match path.strip_prefix(folder).unwrap_or(&path) {
+            own if own == Path::new("") => ".".to_owned(),
+            below => below.display().to_string(),
+        };
         let one = Reading {
             inputs: vec![Input::Path(path)],
             ..reading.clone()
@@ -75,17 +94,22 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
     Ok(Survey { rows, skipped })
 }
 
-/// Adds every bag in `folder` in order of names; a folder that is a bag counts as one. Links are not followed.
+/// Adds every recording in `folder` in order of names: the folder itself where it is one, each other file that is a
+/// bag, and those of the folders in it. Links are not followed.
 fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
     let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
     paths.sort();
+    let own = own_parts(folder, &paths);
+    if let Some(parts) = own {
+        bags.push(folder.to_owned());
+        paths.retain(|path| !parts.contains(path));
+    }
     for path in paths {
         let Ok(meta) = fs::symlink_metadata(&path) else {
             continue;
         };
-        let is_bag = (meta.is_file() || meta.is_dir()) && is_bag(&path);
-        if is_bag {
+        if meta.is_file() && is_bag(&path) {
             bags.push(path);
         } else if meta.is_dir() && deeper > 0 {
             // A folder below that may not be read hides its bags, not the others.
@@ -93,6 +117,44 @@ fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The longest `metadata.yaml` that is searched for names, in bytes.
+const MOST_METADATA: u64 = 16 << 20;
+
+/// The files that make `folder` one recording of rosbag2: those that its `metadata.yaml` names, all storage files if it
+/// names none that is there. Without it, numbered parts of one name with no other storage file beside them.
+fn own_parts(folder: &Path, paths: &[PathBuf]) -> Option<Vec<PathBuf>> {
+    let storage = |path: &&PathBuf| [".db3", ".mcap", ".zstd"].iter().any(|e| ends_in(path, e));
+    let storage: Vec<PathBuf> = paths.iter().filter(storage).cloned().collect();
+    let metadata = folder.join("metadata.yaml");
+    if metadata.is_file() {
+        let is_short = metadata.metadata().is_ok_and(|m| m.len() <= MOST_METADATA);
+        let text = if is_short {
+            fs::read(&metadata)
+        } else {
+            Ok(Vec::new())
+        };
+        let text = String::from_utf8_lossy(&text.unwrap_or_default()).into_owned();
+        let is_named = |path: &&PathBuf| {
+            let name = bag::file_name(path);
+            text.contains(name.trim_end_matches(".zstd"))
+        };
+        let named: Vec<PathBuf> = storage.iter().filter(is_named).cloned().collect();
+        return Some(if named.is_empty() { storage } else { named });
+    }
+    let stems: Option<Vec<String>> = storage.iter().map(|path| numbered(path)).collect();
+    let mut stems = stems?;
+    stems.dedup();
+    (storage.len() > 1 && stems.len() == 1).then_some(storage)
+}
+
+/// The name of a recording of which this is a part: `run` of `run_0.db3`; `None` without a number.
+fn numbered(path: &Path) -> Option<String> {
+    let name = path.file_name()?.to_str()?;
+    let (stem, number) = name.split('.').next()?.rsplit_once('_')?;
+    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| stem.to_owned())
 }
 
 /// Whether a path is a bag by its first bytes, or calls itself one: a broken bag has its row too.

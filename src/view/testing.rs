@@ -30,6 +30,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
     let windows: Vec<Window> = windows.collect();
     let period = Period::from_nanos(SECOND).unwrap();
     let mut mission = Mission {
+        undrawn: Vec::new(),
         bags: Vec::new(),
         span: Span {
             start: span(0).start,

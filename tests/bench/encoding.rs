@@ -84,6 +84,7 @@ fn main() {
         picture: &picture,
         painter: &painter,
         fonts: &fonts,
+        latex: None,
         strip: Some(&page.scene),
         options,
     };

@@ -122,7 +122,8 @@ impl<G: Grammar> Query<'_, G> {
                 nameless(sink, entries.len() as u64);
                 continue;
             };
-            let known = self.wants[id.0 as usize] > Want::Stamps && self.range.is_none();
+            // Of entries outside the range they are not looked up, and no sink is told of those.
+            let known = self.wants[id.0 as usize] > Want::Stamps;
             let sizes = sizes
                 .as_ref()
                 .filter(|_| known)

@@ -186,19 +186,39 @@ impl<'a> Cursor<'a> {
         Ok(Stamp::from_ros(self.u32()?, self.u32()?))
     }
 
-    /// The next string; bytes that are no UTF-8 are an error.
-    pub fn string(&mut self) -> Result<&'a str> {
-        let len = self.u32()? as usize;
-        let mut text = self.bytes(len)?;
-        if self.is_cdr() {
-            match text {
-                [rest @ .., 0] => text = rest,
-                // Some writers leave an empty string without its closing zero.
-                [] => {}
-                _ => return Err(self.wrong("a string's closing zero")),
+    /// The next `count` numbers of `size` bytes each as they are written, aligned in CDR.
+    pub(crate) fn numbers(&mut self, count: usize, size: usize) -> Result<&'a [u8]> {
+        if let Some(origin) = self.origin.filter(|_| count > 0) {
+            let over = (self.at - origin) % size.max(1);
+            if over != 0 {
+                self.bytes(size - over)?;
             }
         }
+        self.bytes(count.saturating_mul(size))
+    }
+
+    /// Whether numbers are written with their most significant byte first.
+    pub(crate) fn is_big_endian(&self) -> bool {
+        self.big_endian
+    }
+
+    /// The next string; bytes that are no UTF-8 are an error.
+    pub fn string(&mut self) -> Result<&'a str> {
+        let text = self.text()?;
         std::str::from_utf8(text).map_err(|_| self.wrong("text in UTF-8"))
+    }
+
+    /// The bytes of the next string, whatever they are.
+    pub(crate) fn text(&mut self) -> Result<&'a [u8]> {
+        let len = self.u32()? as usize;
+        let text = self.bytes(len)?;
+        match text {
+            _ if !self.is_cdr() => Ok(text),
+            [rest @ .., 0] => Ok(rest),
+            // Some writers leave an empty string without its closing zero.
+            [] => Ok(text),
+            _ => Err(self.wrong("a string's closing zero")),
+        }
     }
 
     /// Like [`Cursor::string`], stepping over it without a look at its bytes.

@@ -20,6 +20,15 @@ impl Default for Budget {
 }
 
 impl Budget {
+    /// The budget for what one text of this many bytes says by itself, without other files: loops over long lists need
+    /// a tenth of it.
+    pub(super) fn of_text(bytes: usize) -> Self {
+        Self {
+            left: LAUNCH_WORK.min((1 << 20) + bytes.saturating_mul(500)),
+            is_spent: false,
+        }
+    }
+
     /// Takes `work` from it; `None` if not as much is left.
     pub(super) fn spend(&mut self, work: usize) -> Option<()> {
         match self.left.checked_sub(work) {

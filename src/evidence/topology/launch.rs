@@ -20,6 +20,9 @@ const DEEPEST: usize = 16;
 /// The work of opening a file, in bytes.
 const FILE: usize = 8 << 10;
 
+/// The length that is reckoned with for a launch file of a workspace, in bytes.
+const OWN_TEXT: usize = 10_000;
+
 /// Groups and files inside each other deeper than this are not followed.
 const NESTED: usize = 200;
 
@@ -72,7 +75,6 @@ pub(super) fn read(path: &Path, tree: &Tree) -> Result<Topology> {
     Ok(reader.topology)
 }
 
-#[allow(dead_code, reason = "readers of source code need it")]
 /// Every node that a launch file may start by itself, without what it includes, whatever its conditions say.
 pub(crate) fn nodes(path: &Path, tree: &Tree) -> Vec<LaunchedNode> {
     let mut reader = Launch::new(Undecided::Taken);
@@ -93,9 +95,14 @@ struct Launch {
 
 impl Launch {
     fn new(undecided: Undecided) -> Self {
+        // Files that a person names may include others; those of a workspace are read each by itself, and are many.
+        let budget = match undecided {
+            Undecided::LeftOut => Budget::default(),
+            Undecided::Taken => Budget::of_text(OWN_TEXT),
+        };
         Self {
             undecided,
-            budget: Budget::default(),
+            budget,
             stack: Vec::new(),
             nested: 0,
             topology: Topology::default(),

@@ -10,6 +10,7 @@ use super::values::Values;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
+use crate::evidence::code::matching;
 use crate::evidence::collector::Collected;
 use crate::evidence::proof::{Findings, Key, Proof, Validity};
 use crate::evidence::times::Stamps;
@@ -21,7 +22,7 @@ use crate::evidence::{Degree, EvidenceLine, SOURCES};
 pub(crate) fn prove(
     collected: &mut Collected,
     options: &Options,
-) -> io::Result<(Vec<Proof>, Values, Vec<Notice>)> {
+) -> io::Result<(Vec<Proof>, Values, matching::Outcome)> {
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
     let mut known = Findings::new(&collected.streams, &mut collected.facts, (start, end));
@@ -35,6 +36,8 @@ pub(crate) fn prove(
     for entry in &options.topology.entries {
         told(&mut known, entry, (start, end));
     }
+    let code = options.code.as_ref();
+    let told_by_code = code.map(|code| matching::conclude(code, &mut known));
     explain(&mut known, &collected.messages);
     if let Some(error) = known.failed {
         return Err(error);
@@ -58,7 +61,9 @@ pub(crate) fn prove(
         stream.speaker = stream.publisher.map(role);
     }
     let values = Values::new(&mut collected.facts, role)?;
-    Ok((proofs, values, strange))
+    let mut code = told_by_code.unwrap_or_default();
+    code.notices.extend(strange);
+    Ok((proofs, values, code))
 }
 
 /// Names of the user's that nothing in the bags bears: topics, and nodes that come close to one that is known.
@@ -172,7 +177,10 @@ fn told(known: &mut Findings<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
         (None, None) => Validity::Whole,
         (from, to) => Validity::Signs {
             signs: vec![at(from, mission.0), last(to).max(at(from, mission.0))],
-            ends: to.map(|_| last(to)).into_iter().collect(),
+            ends: to
+                .map(|to| last(Some(to)).max(at(from, mission.0)))
+                .into_iter()
+                .collect(),
             held: false,
         },
     };

@@ -69,7 +69,23 @@ impl<'a> Changes<'a> {
             self.handed_over(graph, graph, &mut Vec::new());
         }
         self.before = Some((span, graph.clone()));
+        changes.retain(|change| !self.is_from_code(change));
         changes
+    }
+
+    /// Whether only source code speaks for what came or went, which does not know when.
+    fn is_from_code(&self, change: &Change) -> bool {
+        let all = self.elements;
+        match change {
+            Change::Added { what, .. } | Change::Removed { what, .. } => match *what {
+                Element::Node(id) => all.nodes[id as usize].evidence,
+                Element::Topic(id) => all.topics[id as usize].evidence,
+                Element::Publish(id) => all.publishes[id as usize].evidence,
+                Element::Subscribe(id) => all.subscribes[id as usize].evidence,
+            }
+            .is_code_only(),
+            _ => false,
+        }
     }
 
     fn appeared(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Info;
-use crate::base::csv::table;
+use crate::base::table::{Batch, Cell, Kind};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 
@@ -18,63 +18,67 @@ pub struct SurveyRow {
     pub info: Option<Info>,
 }
 
-const COLUMNS: [&str; 19] = [
-    "path",
-    "bag_format",
-    "compression",
-    "tier",
-    "is_complete",
-    "file_bytes",
-    "start_ns",
-    "duration_s",
-    "messages",
-    "topics",
-    "nodes",
-    "publishes",
-    "subscribes",
-    "nodes_measured",
-    "publishes_measured",
-    "subscribes_measured",
-    "subscribes_stated",
-    "evidence",
-    "error",
+const COLUMNS: &[(&str, Kind)] = &[
+    ("path", Kind::Text),
+    ("bag_format", Kind::Text),
+    ("compression", Kind::Text),
+    ("tier", Kind::Text),
+    ("is_complete", Kind::Flag),
+    ("file_bytes", Kind::I64),
+    ("start_ns", Kind::Time),
+    ("duration_s", Kind::F64),
+    ("messages", Kind::I64),
+    ("topics", Kind::I64),
+    ("nodes", Kind::I64),
+    ("publishes", Kind::I64),
+    ("subscribes", Kind::I64),
+    ("nodes_measured", Kind::I64),
+    ("publishes_measured", Kind::I64),
+    ("subscribes_measured", Kind::I64),
+    ("subscribes_stated", Kind::I64),
+    ("evidence", Kind::Text),
+    ("error", Kind::Text),
 ];
 
-/// The survey as CSV, a row per bag, readable or not.
-pub fn survey_csv(rows: &[SurveyRow]) -> String {
-    table(&COLUMNS, rows.iter().map(csv_row))
+/// The survey as a table, a row per bag, readable or not.
+pub(crate) fn survey_table(rows: &[SurveyRow]) -> Batch {
+    let mut table = Batch::new(COLUMNS);
+    for row in rows {
+        table.push(&cells(row));
+    }
+    table
 }
 
-fn csv_row(row: &SurveyRow) -> Vec<String> {
+fn cells(row: &SurveyRow) -> Vec<Cell<'_>> {
+    let path = Cell::text(&row.path);
     let Some(info) = &row.info else {
-        let mut cells = vec![String::new(); COLUMNS.len()];
-        cells[0].clone_from(&row.path);
-        cells[18] = row.error.clone().unwrap_or_default();
+        let mut cells = vec![Cell::Null; COLUMNS.len()];
+        cells[0] = path;
+        cells[COLUMNS.len() - 1] = Cell::known(row.error.as_deref(), Cell::text);
         return cells;
     };
     let bag = info.bags.first();
-    let told = |of: &dyn Fn(&super::BagInfo) -> String| bag.map(of).unwrap_or_default();
     let evidence: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
     vec![
-        row.path.clone(),
-        told(&|b| b.format.clone()),
-        told(&|b| b.compression.join(" ")),
-        told(&|b| b.tier.to_owned()),
-        told(&|b| b.complete.to_string()),
-        told(&|b| b.file_bytes.to_string()),
-        info.start_ns.to_string(),
-        info.duration_s.to_string(),
-        info.messages.to_string(),
-        info.topics.len().to_string(),
-        info.nodes_by_degree.total().to_string(),
-        info.publishes_by_degree.total().to_string(),
-        info.subscribes_by_degree.total().to_string(),
-        info.nodes_by_degree.measured.to_string(),
-        info.publishes_by_degree.measured.to_string(),
-        info.subscribes_by_degree.measured.to_string(),
-        info.subscribes_by_degree.stated.to_string(),
-        evidence.join(" "),
-        String::new(),
+        path,
+        Cell::known(bag, |b| Cell::text(&b.format)),
+        Cell::known(bag, |b| Cell::text(b.compression.join(" "))),
+        Cell::known(bag, |b| Cell::text(b.tier)),
+        Cell::known(bag, |b| Cell::Flag(b.complete)),
+        Cell::known(bag, |b| Cell::count(b.file_bytes)),
+        Cell::Time(Stamp(info.start_ns)),
+        Cell::Float(info.duration_s),
+        Cell::count(info.messages),
+        Cell::count(info.topics.len()),
+        Cell::count(info.nodes_by_degree.total()),
+        Cell::count(info.publishes_by_degree.total()),
+        Cell::count(info.subscribes_by_degree.total()),
+        Cell::count(info.nodes_by_degree.measured),
+        Cell::count(info.publishes_by_degree.measured),
+        Cell::count(info.subscribes_by_degree.measured),
+        Cell::count(info.subscribes_by_degree.stated),
+        Cell::text(evidence.join(" ")),
+        Cell::known(row.error.as_deref(), Cell::text),
     ]
 }
 

@@ -18,7 +18,20 @@ pub fn text(info: &Info) -> String {
     let _ = known(&mut out, info);
     let _ = topics(&mut out, &info.topics);
     let _ = nodes(&mut out, info);
+    let _ = undrawn(&mut out, info);
     out
+}
+
+/// What source code offers beyond what is drawn.
+fn undrawn(out: &mut String, info: &Info) -> std::fmt::Result {
+    if info.undrawn.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "\nthe source code, not drawn")?;
+    for line in &info.undrawn {
+        writeln!(out, "  {}", words::visible(line))?;
+    }
+    Ok(())
 }
 
 fn head(out: &mut String, info: &Info) -> std::fmt::Result {

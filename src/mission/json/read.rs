@@ -132,6 +132,7 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
         windows,
         ledger: crate::mission::Ledger::default(),
         activity: crate::mission::Activity::default(),
+        undrawn: Vec::new(),
         layout: raw.layout.map(layout),
         notices: notices(raw.notices),
     }

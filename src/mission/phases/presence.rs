@@ -83,7 +83,7 @@ pub(crate) fn presences(elements: &Elements, activity: &Activity) -> Vec<Presenc
 }
 
 /// Whether at least half of the messages are on topics of which some publisher is known.
-fn knows_publishers(elements: &Elements, activity: &Activity) -> bool {
+pub(crate) fn knows_publishers(elements: &Elements, activity: &Activity) -> bool {
     let (mut all, mut known) = (0_u64, 0_u64);
     for cell in &activity.cells {
         let mut sent = vec![false; elements.topics.len()];

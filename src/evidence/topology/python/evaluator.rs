@@ -50,7 +50,7 @@ impl<'a> Evaluator<'a> {
             parsed,
             frames: vec![global],
             functions: BTreeMap::new(),
-            budget: Budget::default(),
+            budget: Budget::of_text(parsed.text.len()),
             undecided: 0,
             nested: 0,
         }

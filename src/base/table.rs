@@ -1,0 +1,338 @@
+//! A table in columns: every table that is written, whatever it holds and in whatever format.
+
+use std::borrow::Cow;
+
+use super::time::Stamp;
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// True or false.
+    Flag,
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+    /// Text in UTF-8.
+    Text,
+    /// Bytes of any meaning.
+    Bytes,
+    /// A [`Stamp`].
+    Time,
+}
+
+/// Texts, or strings of bytes, one behind the other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Texts {
+    pub(crate) bytes: Vec<u8>,
+    /// Where each ends.
+    pub(crate) ends: Vec<i32>,
+}
+
+impl Texts {
+    /// Adds one. What is longer than 2 GB in all would not fit; a batch is written long before.
+    pub(crate) fn push(&mut self, text: &[u8]) {
+        self.bytes.extend_from_slice(text);
+        self.ends.push(length(self.bytes.len()));
+    }
+
+    /// The one at place `at`.
+    pub(crate) fn get(&self, at: usize) -> &[u8] {
+        &self.bytes[span(&self.ends, at)]
+    }
+
+    fn truncate(&mut self, len: usize) {
+        self.ends.truncate(len);
+        self.bytes
+            .truncate(self.ends.last().map_or(0, |end| place(*end)));
+    }
+}
+
+/// The values of a column, the elements of its lists if it holds lists.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    Flag(Vec<bool>),
+    I8(Vec<i8>),
+    U8(Vec<u8>),
+    I16(Vec<i16>),
+    U16(Vec<u16>),
+    I32(Vec<i32>),
+    U32(Vec<u32>),
+    /// Numbers, and stamps in nanoseconds.
+    I64(Vec<i64>),
+    U64(Vec<u64>),
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+    Texts(Texts),
+}
+
+impl Values {
+    fn new(kind: Kind) -> Self {
+        match kind {
+            Kind::Flag => Self::Flag(Vec::new()),
+            Kind::I8 => Self::I8(Vec::new()),
+            Kind::U8 => Self::U8(Vec::new()),
+            Kind::I16 => Self::I16(Vec::new()),
+            Kind::U16 => Self::U16(Vec::new()),
+            Kind::I32 => Self::I32(Vec::new()),
+            Kind::U32 => Self::U32(Vec::new()),
+            Kind::I64 | Kind::Time => Self::I64(Vec::new()),
+            Kind::U64 => Self::U64(Vec::new()),
+            Kind::F32 => Self::F32(Vec::new()),
+            Kind::F64 => Self::F64(Vec::new()),
+            Kind::Text | Kind::Bytes => Self::Texts(Texts::default()),
+        }
+    }
+
+    fn truncate(&mut self, len: usize) {
+        match self {
+            Self::Flag(v) => v.truncate(len),
+            Self::I8(v) => v.truncate(len),
+            Self::U8(v) => v.truncate(len),
+            Self::I16(v) => v.truncate(len),
+            Self::U16(v) => v.truncate(len),
+            Self::I32(v) => v.truncate(len),
+            Self::U32(v) => v.truncate(len),
+            Self::F32(v) => v.truncate(len),
+            Self::I64(v) => v.truncate(len),
+            Self::U64(v) => v.truncate(len),
+            Self::F64(v) => v.truncate(len),
+            Self::Texts(v) => v.truncate(len),
+        }
+    }
+
+    /// Adds what stands for nothing.
+    fn push_blank(&mut self) {
+        match self {
+            Self::Flag(v) => v.push(false),
+            Self::I8(v) => v.push(0),
+            Self::U8(v) => v.push(0),
+            Self::I16(v) => v.push(0),
+            Self::U16(v) => v.push(0),
+            Self::I32(v) => v.push(0),
+            Self::U32(v) => v.push(0),
+            Self::F32(v) => v.push(0.0),
+            Self::I64(v) => v.push(0),
+            Self::U64(v) => v.push(0),
+            Self::F64(v) => v.push(0.0),
+            Self::Texts(v) => v.push(b""),
+        }
+    }
+}
+
+/// One column.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Column {
+    pub(crate) name: Cow<'static, str>,
+    pub(crate) kind: Kind,
+    pub(crate) values: Values,
+    /// Where each list ends among the lists of the next level, or among the values; the rows' own lists first. None
+    /// for a column of single values.
+    pub(crate) lists: Vec<Vec<i32>>,
+    /// Whether each row has a value; none for a column in which all rows have.
+    pub(crate) valid: Option<Vec<bool>>,
+}
+
+impl Column {
+    /// A column of single values, some of which may be unknown.
+    pub(crate) fn known(name: impl Into<Cow<'static, str>>, kind: Kind) -> Self {
+        Self {
+            valid: Some(Vec::new()),
+            ..Self::full(name, kind, 0)
+        }
+    }
+
+    /// A column in which every row has a value: a list of lists `levels` deep, 0 for a single value.
+    pub(crate) fn full(name: impl Into<Cow<'static, str>>, kind: Kind, levels: usize) -> Self {
+        Self {
+            name: name.into(),
+            kind,
+            values: Values::new(kind),
+            lists: vec![Vec::new(); levels],
+            valid: None,
+        }
+    }
+
+    /// Ends a list of `count` elements on this level.
+    pub(crate) fn end_list(&mut self, level: usize, count: usize) {
+        let ends = &mut self.lists[level];
+        let before = ends.last().copied().unwrap_or(0);
+        ends.push(before.saturating_add(length(count)));
+    }
+
+    /// Forgets all rows from `rows` on, the last one half-filled or not.
+    fn truncate(&mut self, rows: usize) {
+        let mut len = rows;
+        for ends in &mut self.lists {
+            ends.truncate(len);
+            len = ends.last().map_or(0, |end| place(*end));
+        }
+        self.values.truncate(len);
+        if let Some(valid) = &mut self.valid {
+            valid.truncate(rows);
+        }
+    }
+
+    fn push(&mut self, cell: &Cell<'_>) {
+        let is_known = match (&mut self.values, cell) {
+            (Values::Flag(to), Cell::Flag(value)) => {
+                to.push(*value);
+                true
+            }
+            (Values::I64(to), Cell::Int(value) | Cell::Time(Stamp(value))) => {
+                to.push(*value);
+                true
+            }
+            (Values::F64(to), Cell::Float(value)) if value.is_finite() => {
+                to.push(*value);
+                true
+            }
+            (Values::Texts(to), Cell::Text(value)) => {
+                to.push(value.as_bytes());
+                true
+            }
+            (other, _) => {
+                other.push_blank();
+                false
+            }
+        };
+        if let Some(valid) = &mut self.valid {
+            valid.push(is_known);
+        }
+    }
+}
+
+/// One value of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Cell<'a> {
+    /// Unknown.
+    Null,
+    Flag(bool),
+    Int(i64),
+    Float(f64),
+    Text(Cow<'a, str>),
+    Time(Stamp),
+}
+
+impl<'a> Cell<'a> {
+    /// A text.
+    pub(crate) fn text(text: impl Into<Cow<'a, str>>) -> Self {
+        Self::Text(text.into())
+    }
+
+    /// A number of things; what is past `i64` stays at its end.
+    pub(crate) fn count(count: impl TryInto<i64>) -> Self {
+        Self::Int(count.try_into().unwrap_or(i64::MAX))
+    }
+
+    /// What is known, as `cell` makes a value of it.
+    pub(crate) fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Self) -> Self {
+        value.map_or(Self::Null, cell)
+    }
+}
+
+/// Rows of a table, in columns.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Batch {
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: usize,
+}
+
+impl Batch {
+    /// No rows yet, of columns of these names and kinds.
+    pub(crate) fn new(columns: &[(&'static str, Kind)]) -> Self {
+        Self::of(
+            columns
+                .iter()
+                .map(|(name, kind)| Column::known(*name, *kind)),
+        )
+    }
+
+    /// No rows yet, of these columns.
+    pub(crate) fn of(columns: impl IntoIterator<Item = Column>) -> Self {
+        Self {
+            columns: columns.into_iter().collect(),
+            rows: 0,
+        }
+    }
+
+    /// Adds a row: a cell per column, unknown where it is of another kind than the column.
+    pub(crate) fn push(&mut self, row: &[Cell<'_>]) {
+        for (column, cell) in self.columns.iter_mut().zip(row) {
+            column.push(cell);
+        }
+        self.rows += 1;
+    }
+
+    /// Forgets what has been added behind the last whole row.
+    pub(crate) fn take_back(&mut self) {
+        let rows = self.rows;
+        self.columns.iter_mut().for_each(|c| c.truncate(rows));
+    }
+
+    /// Forgets all rows.
+    pub(crate) fn clear(&mut self) {
+        self.rows = 0;
+        self.take_back();
+    }
+}
+
+/// The places of list `at` among what lies below it.
+pub(crate) fn span(ends: &[i32], at: usize) -> std::ops::Range<usize> {
+    let start = at.checked_sub(1).map_or(0, |before| place(ends[before]));
+    start..place(ends[at])
+}
+
+fn place(end: i32) -> usize {
+    usize::try_from(end).unwrap_or(0)
+}
+
+fn length(len: usize) -> i32 {
+    i32::try_from(len).unwrap_or(i32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_half_filled_row_is_taken_back() {
+        let mut batch = Batch::of([
+            Column::full("a", Kind::I64, 0),
+            Column::full("b", Kind::Text, 1),
+        ]);
+        let add = |batch: &mut Batch, texts: &[&str]| {
+            if let Values::I64(to) = &mut batch.columns[0].values {
+                to.push(1);
+            }
+            if let Values::Texts(to) = &mut batch.columns[1].values {
+                for text in texts {
+                    to.push(text.as_bytes());
+                }
+            }
+        };
+        add(&mut batch, &["x", "yz"]);
+        batch.columns[1].end_list(0, 2);
+        batch.rows = 1;
+        let whole = batch.clone();
+        add(&mut batch, &["lost"]);
+        batch.take_back();
+        assert_eq!(batch, whole);
+        assert_eq!(span(&batch.columns[1].lists[0], 0), 0..2);
+    }
+
+    #[test]
+    fn a_cell_of_another_kind_is_unknown() {
+        let mut batch = Batch::new(&[("a", Kind::F64)]);
+        batch.push(&[Cell::Float(f64::NAN)]);
+        batch.push(&[Cell::Int(1)]);
+        batch.push(&[Cell::Float(2.0)]);
+        assert_eq!(batch.columns[0].valid, Some(vec![false, false, true]));
+    }
+}

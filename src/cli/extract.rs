@@ -1,0 +1,80 @@
+//! `bagreel extract`: what was typed, turned into tables of messages.
+
+use crate::bag::Input;
+use crate::base::error::Error;
+use crate::base::notice::Notices;
+use crate::cli::args::ExtractArgs;
+use crate::cli::terminal::Terminal;
+use crate::export::check;
+use crate::export::tables::TableFormat;
+use crate::export::target::Target;
+use crate::pipeline::{self, Extract};
+use crate::view::NameFilter;
+
+/// Writes the tables; answers what is worth saying, and how many messages could not be decoded.
+pub(super) fn extract(
+    args: &ExtractArgs,
+    inputs: Vec<Input>,
+    terminal: &mut Terminal,
+) -> Result<(Notices, u64), Error> {
+    let job = job(args, inputs)?;
+    let done = pipeline::extract(&job, terminal)?;
+    terminal.notices(&done.notices);
+    if job.target != Target::Stdout {
+        let tables = match (job.fields, done.tables) {
+            (false, _) => String::new(),
+            (true, 1) => "1 table, ".to_owned(),
+            (true, count) => format!("{count} tables, "),
+        };
+        let (path, rows) = (job.target.path().display(), done.rows);
+        let seconds = terminal.seconds();
+        terminal.say(&format!(
+            "wrote {path}: {tables}{rows} rows, in {seconds:.1} s"
+        ));
+    }
+    Ok((done.notices, done.undecoded))
+}
+
+fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
+    let target = Target::parse(&args.output);
+    target.must_be_one("all messages are in one table, or one folder of tables")?;
+    if args.fields && target == Target::Stdout {
+        return Err(Error::usage(
+            "the fields of all topics are several tables, standard output is one",
+            "name a folder: `-o tables/`",
+        ));
+    }
+    let paths: Vec<_> = inputs
+        .iter()
+        .filter_map(|input| match input {
+            Input::Path(path) => Some(path.clone()),
+            Input::Stdin => None,
+        })
+        .collect();
+    if !args.fields {
+        check::check(std::slice::from_ref(&target), &paths)?;
+        check::make_folder(&target)?;
+    }
+    Ok(Extract {
+        inputs,
+        format: format(args, &target)?,
+        target,
+        fields: args.fields,
+        topics: NameFilter::parse(args.topic_filter.as_deref().unwrap_or_default())?,
+        start: args.start,
+        end: args.end,
+    })
+}
+
+/// The format that was asked for, by word or by the name's ending.
+fn format(args: &ExtractArgs, target: &Target) -> Result<TableFormat, Error> {
+    match (&args.format, target.extension()) {
+        (Some(word), _) => TableFormat::parse(word),
+        (None, _) if args.fields => Ok(*TableFormat::ALL.last().unwrap_or(&TableFormat::Csv)),
+        (None, Some(word)) => TableFormat::parse(&word),
+        (None, None) => Err(Error::usage(
+            format!("`{}` does not say its format", args.output),
+            "say it with `--format`: csv, parquet",
+        )),
+    }
+}

@@ -1,0 +1,183 @@
+//! Figures for papers, exact in width and never with text below 6 pt: lives, map and steps.
+//!
+//! What does not fit steps down a ladder (nodes, groups) and is refused at its end with what would fit; text is never
+//! scaled.
+
+pub(crate) mod band;
+pub(crate) mod canvas;
+mod groups;
+pub(crate) mod incidents;
+mod legend;
+pub(crate) mod levels;
+pub(crate) mod lives;
+mod map;
+pub(crate) mod notes;
+mod page;
+mod panel;
+mod parts;
+mod place;
+pub(crate) mod rows;
+pub(crate) mod source;
+mod steps;
+mod talks;
+mod tex;
+pub(crate) mod tracks;
+
+use crate::base::error::{Error, Result};
+use crate::draw::scene::Scene;
+use crate::draw::text::Fonts;
+use crate::mission::Mission;
+use crate::view::NameFilter;
+
+use canvas::Sizes;
+use source::Source;
+
+/// Which figure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// What is alive when, how busy, what changed.
+    #[default]
+    Lives,
+    /// Who talks to whom, and in which phases.
+    Map,
+    /// One reconfiguration after the other, as differences.
+    Steps,
+}
+
+impl Kind {
+    /// The figures by the words of the command line.
+    pub const ALL: [(&'static str, Self); 3] = [
+        ("lives", Self::Lives),
+        ("map", Self::Map),
+        ("steps", Self::Steps),
+    ];
+
+    /// The figure of this word.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another word.
+    pub fn parse(word: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|(name, _)| *name == word);
+        found.map(|(_, kind)| *kind).ok_or_else(|| {
+            Error::usage(
+                format!("`{word}` is not a figure"),
+                "figures: lives, map, steps",
+            )
+        })
+    }
+
+    /// Its word on the command line.
+    pub fn word(self) -> &'static str {
+        Self::ALL
+            .iter()
+            .find(|(_, kind)| *kind == self)
+            .map_or("", |(word, _)| word)
+    }
+}
+
+/// What rows and boxes stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rows {
+    /// Nodes, by role.
+    Nodes,
+    /// Nodes of one namespace that live in the same phases.
+    Groups,
+    /// Topics.
+    Topics,
+}
+
+impl Rows {
+    /// The rows of this word: `nodes`, `groups`, `topics`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another word.
+    pub fn parse(word: &str) -> Result<Self> {
+        match word {
+            "nodes" => Ok(Self::Nodes),
+            "groups" => Ok(Self::Groups),
+            "topics" => Ok(Self::Topics),
+            _ => {
+                let what = format!("`{word}` is not what rows can be");
+                Err(Error::usage(what, "rows: nodes, groups, topics"))
+            }
+        }
+    }
+}
+
+/// A figure as it was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Which one.
+    pub kind: Kind,
+    /// Its width in millimetres, exactly.
+    pub width_mm: f64,
+    /// The size of names in points, 7 to 12; all other text is 1 pt smaller.
+    pub text_pt: f64,
+    /// What rows and boxes stand for; as much as fits if `None`.
+    pub rows: Option<Rows>,
+    /// The boundaries that [`Kind::Steps`] shows, by the number of the phase that begins, 2..; the largest if empty.
+    pub steps: Vec<usize>,
+    /// Whether legend and notes are left to the caption.
+    pub is_bare: bool,
+    /// Whether phases are the user's, so that their names are worth telling.
+    pub is_named: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            kind: Kind::default(),
+            width_mm: 88.0,
+            text_pt: 7.0,
+            rows: None,
+            steps: Vec::new(),
+            is_bare: false,
+            is_named: false,
+        }
+    }
+}
+
+/// A figure that was drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// The drawing; its size is that on paper.
+    pub scene: Scene,
+    /// A caption for `LaTeX`, escaped: what is drawn, the phases with their times, bag and length, the legend in words.
+    pub caption: String,
+    /// What the user should know; lower case, no period.
+    pub remarks: Vec<String>,
+}
+
+/// The largest height of a figure in millimetres: the text block of a page.
+pub(crate) const MOST_HEIGHT: f64 = 225.0;
+
+/// Draws a figure of what passes the filters of nodes and topics.
+///
+/// # Errors
+/// [`Error::Usage`] where nothing is left, or it does not fit whatever is put together: with a filter that would do.
+pub fn figure(
+    mission: &Mission,
+    filters: (&NameFilter, &NameFilter),
+    fonts: &Fonts,
+    options: &Options,
+) -> Result<Figure> {
+    let source = Source::new(mission, filters.0, filters.1, options.is_named);
+    let sizes = Sizes::of_names(options.text_pt);
+    let sheet = page::Sheet {
+        source: &source,
+        fonts,
+        sizes,
+        options,
+    };
+    let (scene, remarks) = sheet.draw()?;
+    Ok(Figure {
+        caption: tex::caption(&source, options, &remarks),
+        scene,
+        remarks,
+    })
+}
+
+/// A `LaTeX` file that shows the figure of this file name.
+pub fn latex(figure: &Figure, picture: &str, options: &Options) -> String {
+    tex::file(figure, picture, options)
+}

@@ -1,0 +1,274 @@
+//! What figures are drawn with: lengths in millimetres, four kinds of type, one palette; it makes a scene of them.
+
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text};
+use crate::draw::style::Color;
+use crate::draw::text::{Fonts, Weight};
+
+/// Pixels per millimetre of a page on paper, 96 to the inch.
+pub(crate) const PX_PER_MM: f64 = 96.0 / 25.4;
+/// Millimetres per point.
+pub(crate) const MM_PER_PT: f64 = 25.4 / 72.0;
+/// The thinnest line in millimetres: 0.5 pt, what printers ask for.
+pub(crate) const HAIRLINE: f64 = 0.18;
+
+/// The colours of a figure, which is on white paper. Every mark has a shape of its own too, so that grey print loses
+/// nothing; the three colours of change are those of the pictures, told apart by colour-blind readers.
+pub(crate) mod ink {
+    use crate::draw::style::Color;
+
+    pub(crate) const PAPER: Color = Color::of([0xff, 0xff, 0xff]);
+    pub(crate) const TEXT: Color = Color::of([0x1f, 0x29, 0x37]);
+    pub(crate) const QUIET: Color = Color::of([0x6b, 0x72, 0x80]);
+    pub(crate) const BAR: Color = Color::of([0x8e, 0x9c, 0xb5]);
+    pub(crate) const FOLDED: Color = Color::of([0xc3, 0xcb, 0xd8]);
+    pub(crate) const LINE: Color = Color::of([0x4a, 0x5b, 0x78]);
+    pub(crate) const BAND: [Color; 2] =
+        [Color::of([0xd5, 0xdb, 0xe5]), Color::of([0xe6, 0xea, 0xf0])];
+    pub(crate) const TINT: Color = Color::of([0xee, 0xf1, 0xf5]);
+    pub(crate) const RULE: Color = Color::of([0xa3, 0xab, 0xb8]);
+    pub(crate) const ADDED: Color = Color::of([0x00, 0x79, 0x5c]);
+    pub(crate) const ADDED_FILL: Color = Color::of([0xe3, 0xf2, 0xec]);
+    pub(crate) const REMOVED: Color = Color::of([0xc4, 0x49, 0x00]);
+    pub(crate) const CHANGED: Color = Color::of([0x6a, 0x35, 0xc9]);
+    pub(crate) const CHANGED_FILL: Color = Color::of([0xef, 0xe9, 0xfb]);
+    pub(crate) const GROUND: Color = Color::of([0xf6, 0xf8, 0xfb]);
+}
+
+/// What a text is, which decides its size and weight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Type {
+    /// A node, a topic.
+    Name,
+    /// A namespace, the number of a phase.
+    Head,
+    /// Everything else.
+    Small,
+    /// The same, bold.
+    Strong,
+}
+
+/// The sizes of type in points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sizes {
+    pub(crate) name: f64,
+    pub(crate) small: f64,
+}
+
+impl Sizes {
+    /// 7 and 6 pt, or as much more as `names` asks for.
+    pub(crate) fn of_names(names: f64) -> Self {
+        Self {
+            name: names,
+            small: names - 1.0,
+        }
+    }
+
+    /// From one row to the next in millimetres: 2.75 at 7 pt, 3.15 at 8 pt.
+    pub(crate) fn pitch(&self) -> f64 {
+        2.75 + 0.4 * (self.name - 7.0)
+    }
+
+    /// From one line of notes to the next.
+    pub(crate) fn line(&self) -> f64 {
+        self.small * MM_PER_PT * 1.18
+    }
+}
+
+/// A drawing in the making. Everything is in millimetres, y down.
+pub(crate) struct Canvas<'a> {
+    pub(crate) fonts: &'a Fonts,
+    pub(crate) sizes: Sizes,
+    /// Pixels of the scene per millimetre.
+    scale: f64,
+    groups: Vec<Group>,
+}
+
+impl<'a> Canvas<'a> {
+    pub(crate) fn new(fonts: &'a Fonts, sizes: Sizes, scale: f64) -> Self {
+        Self {
+            fonts,
+            sizes,
+            scale,
+            groups: vec![Group::named("ground")],
+        }
+    }
+
+    /// Begins a group; what is drawn next is in it.
+    pub(crate) fn begin(&mut self, id: &str) {
+        self.groups.push(Group::named(id));
+    }
+
+    fn group(&mut self) -> Option<&mut Group> {
+        self.groups.last_mut()
+    }
+
+    fn size(&self, of: Type) -> (f64, Weight) {
+        match of {
+            Type::Name => (self.sizes.name, Weight::Regular),
+            Type::Head => (self.sizes.name, Weight::SemiBold),
+            Type::Small => (self.sizes.small, Weight::Regular),
+            Type::Strong => (self.sizes.small, Weight::SemiBold),
+        }
+    }
+
+    /// The height of capital letters.
+    pub(crate) fn cap(&self, of: Type) -> f64 {
+        self.size(of).0 * MM_PER_PT * 0.727
+    }
+
+    pub(crate) fn width(&self, text: &str, of: Type) -> f64 {
+        let (size, weight) = self.size(of);
+        let shown = self.fonts.shown(text);
+        self.fonts.width(&shown, size * MM_PER_PT, weight)
+    }
+
+    /// `text` cut at its end with … until it is at most `most` wide.
+    pub(crate) fn cut(&self, text: &str, of: Type, most: f64) -> String {
+        let shown = self.fonts.shown(text);
+        if self.width(&shown, of) <= most {
+            return shown.into_owned();
+        }
+        let mut kept: Vec<char> = shown.chars().collect();
+        while kept.pop().is_some() {
+            let cut: String = kept.iter().chain(&['\u{2026}']).collect();
+            if self.width(&cut, of) <= most {
+                return cut;
+            }
+        }
+        String::new()
+    }
+
+    /// A line of text whose capitals are centred on `y`.
+    pub(crate) fn text(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
+        self.put(Anchor::Start, Point::new(x, y), of, color, None, text);
+    }
+
+    /// The same, ending at `x`.
+    pub(crate) fn text_end(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
+        self.put(Anchor::End, Point::new(x, y), of, color, None, text);
+    }
+
+    /// The same, its middle at `x`.
+    pub(crate) fn text_middle(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
+        self.put(Anchor::Middle, Point::new(x, y), of, color, None, text);
+    }
+
+    /// The same on a white halo, over lines.
+    pub(crate) fn label(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
+        let halo = Some((ink::PAPER, 0.7 * self.scale));
+        self.put(Anchor::Middle, Point::new(x, y), of, color, halo, text);
+    }
+
+    fn put(
+        &mut self,
+        anchor: Anchor,
+        at: Point,
+        of: Type,
+        color: Color,
+        halo: Option<(Color, f64)>,
+        text: &str,
+    ) {
+        let (size, weight) = self.size(of);
+        let baseline = at.y + self.cap(of) / 2.0;
+        let text = Text {
+            at: Point::new(at.x * self.scale, baseline * self.scale),
+            anchor,
+            size: size * MM_PER_PT * self.scale,
+            weight,
+            color,
+            halo,
+            text: self.fonts.shown(text).into_owned(),
+        };
+        if let Some(group) = self.group() {
+            group.text(text);
+        }
+    }
+
+    /// A filled rectangle.
+    pub(crate) fn fill(&mut self, rect: Rect, color: Color) {
+        let form = Form::Rect(self.scaled(rect), 0.0);
+        self.shape(Shape::filled(form, color));
+    }
+
+    /// A rectangle with round corners, a line around and a filling.
+    pub(crate) fn frame(&mut self, rect: Rect, radius: f64, fill: Color, stroke: &Stroke) {
+        let form = Form::Rect(self.scaled(rect), radius * self.scale);
+        let stroke = stroke.scaled(self.scale);
+        self.shape(Shape { form, fill, stroke });
+    }
+
+    /// A disc with a line around.
+    pub(crate) fn disc(&mut self, at: Point, radius: f64, fill: Color, stroke: &Stroke) {
+        let rect = Rect::around(at, Size::new(2.0 * radius, 2.0 * radius));
+        let form = Form::Ellipse(self.scaled(rect));
+        let stroke = stroke.scaled(self.scale);
+        self.shape(Shape { form, fill, stroke });
+    }
+
+    /// A straight line.
+    pub(crate) fn line(&mut self, from: Point, to: Point, stroke: &Stroke) {
+        self.path(&[Step::Move(from), Step::Line(to)], Color::NONE, stroke);
+    }
+
+    /// A closed shape without a line around.
+    pub(crate) fn polygon(&mut self, points: &[Point], color: Color) {
+        let first = points.iter().take(1).map(|p| Step::Move(*p));
+        let rest = points.iter().skip(1).map(|p| Step::Line(*p));
+        let steps: Vec<Step> = first.chain(rest).chain([Step::Close]).collect();
+        self.path(&steps, color, &Stroke::default());
+    }
+
+    /// A path.
+    pub(crate) fn path(&mut self, steps: &[Step], fill: Color, stroke: &Stroke) {
+        let at = |p: &Point| Point::new(p.x * self.scale, p.y * self.scale);
+        let step = |step: &Step| match step {
+            Step::Move(p) => Step::Move(at(p)),
+            Step::Line(p) => Step::Line(at(p)),
+            Step::Curve([a, b, c]) => Step::Curve([at(a), at(b), at(c)]),
+            Step::Close => Step::Close,
+        };
+        let form = Form::Path(steps.iter().map(step).collect());
+        let stroke = stroke.scaled(self.scale);
+        self.shape(Shape { form, fill, stroke });
+    }
+
+    /// A filled head of an arrow that ends at `tip`, coming from `from`.
+    pub(crate) fn head(&mut self, from: Point, tip: Point, length: f64, color: Color) {
+        let (dx, dy) = (tip.x - from.x, tip.y - from.y);
+        let far = libm::hypot(dx, dy).max(1e-9);
+        let (dx, dy) = (dx / far * length, dy / far * length);
+        let base = Point::new(tip.x - dx, tip.y - dy);
+        let side = |by: f64| Point::new(base.x - dy * by, base.y + dx * by);
+        self.polygon(&[tip, side(0.36), side(-0.36)], color);
+    }
+
+    fn shape(&mut self, shape: Shape) {
+        if let Some(group) = self.group() {
+            group.shape(shape);
+        }
+    }
+
+    fn scaled(&self, r: Rect) -> Rect {
+        let by = self.scale;
+        Rect::new(r.x * by, r.y * by, r.w * by, r.h * by)
+    }
+
+    /// The groups, for a page of somebody else's.
+    pub(crate) fn into_groups(self) -> Vec<Group> {
+        let drawn = self.groups.into_iter();
+        drawn.filter(|g| !g.pieces.is_empty()).collect()
+    }
+
+    /// The page, `size` in millimetres; its width is exact.
+    pub(crate) fn into_scene(self, size: Size, title: String) -> Scene {
+        let by = self.scale;
+        Scene {
+            size: Size::new(size.w * by, size.h * by),
+            width_mm: Some(size.w),
+            background: ink::PAPER,
+            title,
+            groups: self.into_groups(),
+        }
+    }
+}

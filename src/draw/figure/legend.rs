@@ -1,0 +1,87 @@
+//! The legend of a figure of lives: only what is drawn.
+
+use super::canvas::{Canvas, Type, ink};
+use super::lives::{Lives, cross, start};
+use super::notes::{Item, Run, Sign};
+use super::rows::Row;
+use crate::base::geometry::{Point, Rect};
+use crate::draw::scene::Stroke;
+
+/// Every sign that `lives` draws, with its words.
+pub(crate) fn items(lives: &Lives<'_>) -> Vec<Item> {
+    let open: Vec<_> = lives
+        .rows
+        .iter()
+        .filter_map(|row| match row {
+            Row::Track(at, ..) => lives.tracks.get(*at),
+            _ => None,
+        })
+        .collect();
+    let all_lives = || open.iter().flat_map(|t| &t.lives);
+    let silent = open.iter().any(|t| {
+        let busy: i64 = t.bars.iter().map(|b| b.span.nanos()).sum();
+        let alive: i64 = t.lives.iter().map(|l| l.span.nanos()).sum();
+        alive - busy > alive / 50
+    });
+    let all: [(bool, Sign, &str); 6] = [
+        (
+            open.iter().any(|t| !t.bars.is_empty()),
+            (3.2, bar),
+            "sends (height: share of the row’s most)",
+        ),
+        (silent, (3.2, thin), "silent"),
+        (
+            all_lives().any(|l| l.is_inferred),
+            (3.2, dashed),
+            "alive by inference",
+        ),
+        (all_lives().any(|l| l.begins), (0.6, tick), "starts"),
+        (all_lives().any(|l| l.ends), (1.2, end), "ends"),
+        (
+            !lives.handovers.is_empty(),
+            (3.2, arrow),
+            "topic changes hands",
+        ),
+    ];
+    let drawn = all.into_iter().filter(|(is, ..)| *is);
+    let item = |(_, sign, words): (bool, Sign, &str)| {
+        let words = Run::Words(Type::Small, ink::QUIET, words.to_owned());
+        vec![Run::Sign(sign), words]
+    };
+    drawn.map(item).collect()
+}
+
+fn bar(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    canvas.fill(Rect::new(x, y - 1.0, 1.6, 2.0), ink::BAR);
+    canvas.fill(Rect::new(x + 1.6, y - 0.4, 1.6, 0.8), ink::BAR);
+}
+
+fn thin(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    let stroke = Stroke::solid(ink::LINE, 0.28);
+    canvas.line(Point::new(x, y), Point::new(x + 3.2, y), &stroke);
+}
+
+fn dashed(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    let stroke = Stroke {
+        color: ink::LINE,
+        width: 0.28,
+        dash: vec![0.55, 0.5],
+    };
+    canvas.line(Point::new(x, y), Point::new(x + 3.2, y), &stroke);
+}
+
+fn tick(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    start(canvas, x + 0.3, y);
+}
+
+fn end(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    cross(canvas, x + 0.6, y);
+}
+
+fn arrow(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    let stroke = Stroke::solid(ink::CHANGED, 0.3);
+    let (from, tip) = (Point::new(x + 0.55, y), Point::new(x + 3.2, y));
+    canvas.line(from, Point::new(x + 2.2, y), &stroke);
+    canvas.disc(from, 0.55, ink::CHANGED, &Stroke::default());
+    canvas.head(from, tip, 1.3, ink::CHANGED);
+}

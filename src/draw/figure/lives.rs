@@ -1,0 +1,477 @@
+//! Life lines: a row per node (or topic), time to the right; what is alive when, how busily it sends, what changed.
+//!
+//! One drawing at three sizes: a figure on paper ([`page`]), and, for whoever has a page already, the rows alone.
+//! `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` says how much room the rows take, and
+//! `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A canvas in pixels (a timeline below
+//! frames, the topic board) is `Canvas::new(fonts, sizes, scale)` with pixels per millimetre as its scale, and gives
+//! its groups by `into_groups`.
+
+use super::band::{self, Axis};
+use super::canvas::{Canvas, HAIRLINE, Type, ink};
+use super::incidents::{Handover, Incident, handovers, incidents, relative};
+use super::rows::{Row, folded_label, rows};
+use super::source::Source;
+use super::tracks::{Bar, Life, Track, of_nodes, of_topics};
+use crate::base::geometry::{Point, Rect};
+use crate::base::time::{Span, Stamp};
+use crate::base::words;
+use crate::draw::scene::Stroke;
+
+/// Lengths in pitches of 2.75 mm, as fractions of the pitch.
+const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
+const TICK: (f64, f64) = (0.4, 2.24 / 2.75);
+const CROSS: f64 = 0.5;
+const LETTER: f64 = 1.08;
+/// How far letters and arrows keep from each other in millimetres.
+const APART: f64 = 2.3;
+/// From this width on a column says who sends and receives what, this wide.
+pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
+
+/// Everything that a figure of lives says.
+pub(crate) struct Lives<'a> {
+    pub(crate) source: &'a Source<'a>,
+    pub(crate) tracks: Vec<Track>,
+    pub(crate) rows: Vec<Row>,
+    pub(crate) incidents: Vec<Incident>,
+    /// How many smaller ones have no letter.
+    pub(crate) unmarked: usize,
+    pub(crate) handovers: Vec<Handover>,
+}
+
+/// Where the rows of a figure stand, in millimetres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// The top of the band.
+    pub(crate) top: f64,
+    /// Where names begin.
+    pub(crate) left: f64,
+    /// The time axis.
+    pub(crate) axis: Axis,
+    /// The right end of the column of rates, if there is one.
+    pub(crate) rates: Option<f64>,
+    /// Where the text of who sends and receives what begins, and its width, if there is room.
+    pub(crate) talk: Option<(f64, f64)>,
+}
+
+impl<'a> Lives<'a> {
+    /// The lives of nodes, or of topics.
+    pub(crate) fn new(source: &'a Source<'a>, by_topics: bool) -> Self {
+        let tracks = if by_topics {
+            of_topics(source)
+        } else {
+            of_nodes(source)
+        };
+        Self::of(source, tracks)
+    }
+
+    /// The lives of these rows.
+    pub(crate) fn of(source: &'a Source<'a>, tracks: Vec<Track>) -> Self {
+        let (incidents, mut unmarked) = incidents(source, &tracks);
+        let (handovers, more) = handovers(source, &tracks);
+        unmarked += more;
+        let rows = rows(&tracks, source.span(), &incidents, &handovers);
+        Self {
+            source,
+            tracks,
+            rows,
+            incidents,
+            unmarked,
+            handovers,
+        }
+    }
+
+    /// The height of band, rows and axis in millimetres.
+    pub(crate) fn height(&self, canvas: &Canvas<'_>) -> f64 {
+        let band = if self.source.phases.is_empty() {
+            0.0
+        } else {
+            band::HEIGHT + 0.9
+        };
+        band + self.rows.len() as f64 * canvas.sizes.pitch() + 0.4 + canvas.sizes.line() + 1.2
+    }
+
+    /// How wide the column of names is: the widest, at most 36 % of `width`.
+    pub(crate) fn names_width(&self, canvas: &Canvas<'_>, width: f64) -> f64 {
+        let one = |row: &Row| match row {
+            Row::Space(name) => canvas.width(name, Type::Head),
+            Row::Track(_, label, inside) => {
+                canvas.width(label, Type::Name) + if *inside { 1.2 } else { 0.0 }
+            }
+            Row::Folded(all, _) => canvas.width(&folded_label(&self.tracks, all), Type::Name) + 1.2,
+        };
+        let widest = self.rows.iter().map(one).fold(8.0, f64::max);
+        (widest + 1.2).min(width * 0.36)
+    }
+
+    /// Draws band, rows, marks and axis; answers where the axis ends below.
+    pub(crate) fn draw(&self, canvas: &mut Canvas<'_>, place: &Place) -> f64 {
+        let pitch = canvas.sizes.pitch();
+        let phases = self.source.phases;
+        let top = place.top
+            + if phases.is_empty() {
+                0.0
+            } else {
+                band::HEIGHT + 0.9
+            };
+        let bottom = top + self.rows.len() as f64 * pitch + 0.4;
+        canvas.begin("phases");
+        self.columns(canvas, place, bottom);
+        canvas.begin("rows");
+        for (k, row) in self.rows.iter().enumerate() {
+            let y = top + (k as f64 + 0.5) * pitch;
+            self.row(canvas, place, y, row);
+        }
+        canvas.begin("handovers");
+        let y_of = |track: usize| {
+            let at = self.rows.iter().position(|r| r.holds(track))?;
+            Some(top + (at as f64 + 0.5) * pitch)
+        };
+        let mut taken = self.arrows(canvas, place, y_of);
+        canvas.begin("incidents");
+        for (k, incident) in self.incidents.iter().enumerate() {
+            if let Some(y) = y_of(incident.track) {
+                letter(canvas, place, (incident.at, y), k, &mut taken);
+            }
+        }
+        canvas.begin("axis");
+        band::axis(canvas, &place.axis, bottom, true)
+    }
+
+    /// The band, its columns behind the rows, and the heads of the other columns.
+    fn columns(&self, canvas: &mut Canvas<'_>, place: &Place, bottom: f64) {
+        let phases = self.source.phases;
+        let middle = place.top + band::HEIGHT / 2.0;
+        if !phases.is_empty() {
+            for (k, phase) in phases.iter().enumerate() {
+                let (left, right) = (place.axis.x(phase.span.start), place.axis.x(phase.span.end));
+                if k % 2 == 0 {
+                    let top = place.top + band::HEIGHT;
+                    canvas.fill(Rect::new(left, top, right - left, bottom - top), ink::TINT);
+                }
+            }
+            for phase in &phases[1..] {
+                let x = place.axis.x(phase.span.start);
+                let dashed = Stroke {
+                    color: ink::RULE,
+                    width: HAIRLINE,
+                    dash: vec![0.7, 0.6],
+                };
+                let from = Point::new(x, place.top + band::HEIGHT);
+                canvas.line(from, Point::new(x, bottom), &dashed);
+            }
+            band::band(canvas, &place.axis, place.top, phases);
+            canvas.text_end(
+                place.axis.left - 0.9,
+                middle,
+                Type::Small,
+                ink::QUIET,
+                "phase",
+            );
+        }
+        // Without a band the heads stand in the row of the first namespace, or above it.
+        let head = if phases.is_empty() {
+            place.top - canvas.sizes.line() / 2.0
+        } else {
+            middle
+        };
+        if let Some(right) = place.rates {
+            canvas.text_end(right, head, Type::Small, ink::QUIET, "Hz");
+        }
+        if let Some((x, _)) = place.talk.filter(|_| !self.is_of_topics()) {
+            let text = "→ sends  ← receives, as far as known";
+            canvas.text(x, head, Type::Small, ink::QUIET, text);
+        }
+    }
+
+    pub(crate) fn is_of_topics(&self) -> bool {
+        self.tracks.first().is_some_and(|t| t.topic.is_some())
+    }
+
+    fn row(&self, canvas: &mut Canvas<'_>, place: &Place, y: f64, row: &Row) {
+        let room = place.axis.left - place.left - 1.2;
+        match row {
+            Row::Space(name) => {
+                let name = canvas.cut(name, Type::Head, room);
+                canvas.text(place.left, y, Type::Head, ink::TEXT, &name);
+            }
+            Row::Track(at, label, inside) => {
+                let indent = if *inside { 1.2 } else { 0.0 };
+                let label = canvas.cut(label, Type::Name, room - indent);
+                canvas.text(place.left + indent, y, Type::Name, ink::TEXT, &label);
+                let track = &self.tracks[*at];
+                lines(canvas, place, y, track);
+                rate(canvas, place, y, track.hz);
+                if let Some((x, width)) = place.talk {
+                    talk(canvas, self.source, track, (x, y, width));
+                }
+            }
+            Row::Folded(all, space) => self.folded(canvas, place, y, all, space),
+        }
+    }
+
+    /// Rows that live throughout: one light bar.
+    fn folded(&self, canvas: &mut Canvas<'_>, place: &Place, y: f64, all: &[usize], space: &str) {
+        let room = place.axis.left - place.left - 2.4;
+        let label = canvas.cut(&folded_label(&self.tracks, all), Type::Name, room);
+        canvas.text(place.left + 1.2, y, Type::Name, ink::QUIET, &label);
+        let high = (BAR.0 + BAR.1) * canvas.sizes.pitch();
+        let axis = &place.axis;
+        let rect = Rect::new(axis.left, y - high / 2.0, axis.right - axis.left, high);
+        canvas.fill(rect, ink::FOLDED);
+        let hz = all.iter().filter_map(|at| self.tracks[*at].hz);
+        rate(canvas, place, y, hz.reduce(|a, b| a + b));
+        if let Some((x, width)) = place.talk {
+            let names: Vec<&str> = all
+                .iter()
+                .map(|at| relative(&self.tracks[*at].name, &format!("{space}/x")))
+                .collect();
+            let text = canvas.cut(&names.join(", "), Type::Small, width);
+            canvas.text(x, y, Type::Small, ink::QUIET, &text);
+        }
+    }
+
+    /// The arrows of hand-overs; answers where they and their labels stand: x, from y, to y.
+    fn arrows(
+        &self,
+        canvas: &mut Canvas<'_>,
+        place: &Place,
+        y_of: impl Fn(usize) -> Option<f64>,
+    ) -> Vec<(f64, f64, f64)> {
+        let mut taken: Vec<(f64, f64, f64)> = Vec::new();
+        let mut told: Vec<(usize, usize)> = Vec::new();
+        let stroke = Stroke::solid(ink::CHANGED, 0.3);
+        for handover in &self.handovers {
+            let (Some(from), Some(to)) = (y_of(handover.from), y_of(handover.to)) else {
+                continue;
+            };
+            let (low, high) = (from.min(to), from.max(to));
+            let mut x = place.axis.x(handover.at);
+            while taken
+                .iter()
+                .any(|(o, a, b)| (o - x).abs() < 1.0 && low < *b && *a < high)
+            {
+                x += 1.0;
+            }
+            let side = if to > from { -1.0 } else { 1.0 };
+            let tip = Point::new(x, to + side * 0.15);
+            canvas.line(Point::new(x, from), Point::new(x, to + side * 1.0), &stroke);
+            canvas.disc(Point::new(x, from), 0.55, ink::CHANGED, &Stroke::default());
+            canvas.head(Point::new(x, from), tip, 1.3, ink::CHANGED);
+            taken.push((x, low, high));
+            let pair = (
+                handover.from.min(handover.to),
+                handover.from.max(handover.to),
+            );
+            if !told.contains(&pair) {
+                told.push(pair);
+                let text = words::some_of(&handover.topics, 1);
+                let wide = canvas.width(&text, Type::Small);
+                let left = (x + 0.6).min(place.axis.right - wide);
+                let y = from + (to - from) * 0.66;
+                canvas.label(left + wide / 2.0, y, Type::Small, ink::CHANGED, &text);
+                taken.push((left + wide / 2.0, y - 1.2, y + 1.2));
+            }
+        }
+        taken
+    }
+}
+
+/// A circled letter at a moment of a row, out of the way of what stands there.
+fn letter(
+    canvas: &mut Canvas<'_>,
+    place: &Place,
+    (at, y): (Stamp, f64),
+    k: usize,
+    taken: &mut Vec<(f64, f64, f64)>,
+) {
+    let mut x = place.axis.x(at) + LETTER;
+    let near = |x: f64, taken: &[(f64, f64, f64)]| {
+        let hit = |(o, low, high): &&(f64, f64, f64)| {
+            (o - x).abs() < APART && *low - 1.0 < y && y < *high + 1.0
+        };
+        taken.iter().find(hit).map(|t| t.0)
+    };
+    let mut tries = 0;
+    while let Some(other) = near(x, taken).filter(|_| tries < 12) {
+        x = other + APART;
+        tries += 1;
+    }
+    if x > place.axis.right - LETTER {
+        x = place.axis.x(at) - LETTER;
+        while let Some(other) = near(x, taken).filter(|_| tries < 24) {
+            x = other - APART;
+            tries += 1;
+        }
+    }
+    taken.push((x, y, y));
+    let radius = LETTER * canvas.sizes.pitch() / 2.75;
+    let stroke = Stroke::solid(ink::CHANGED, 0.25);
+    canvas.disc(Point::new(x, y), radius, ink::PAPER, &stroke);
+    canvas.text_middle(x, y, Type::Strong, ink::CHANGED, &sign(k));
+}
+
+/// The letter of an incident: a, b, c, …
+pub(crate) fn sign(k: usize) -> String {
+    let letters = "abcdefghijklmnopqrstuvwxyz";
+    letters
+        .chars()
+        .nth(k)
+        .map_or_else(String::new, String::from)
+}
+
+fn rate(canvas: &mut Canvas<'_>, place: &Place, y: f64, hz: Option<f64>) {
+    let Some(right) = place.rates else { return };
+    // Two digits from 1 Hz on, one below: more is not known, and not needed.
+    let digits = |hz: f64| if hz < 0.95 { 1 } else { 2 };
+    let shown = |hz: f64| words::number(words::significant(hz, digits(hz)));
+    let text = hz.map_or("–".to_owned(), shown);
+    canvas.text_end(right, y, Type::Small, ink::QUIET, &text);
+}
+
+/// The lives and the bars of a row, its starts and its ends.
+fn lines(canvas: &mut Canvas<'_>, place: &Place, y: f64, track: &Track) {
+    for life in &track.lives {
+        thin(canvas, place, y, life);
+    }
+    for bar in &track.bars {
+        thick(canvas, place, y, bar);
+    }
+    for life in &track.lives {
+        if life.begins {
+            start(canvas, place.axis.x(life.span.start), y);
+        }
+        if life.ends {
+            cross(canvas, place.axis.x(life.span.end), y);
+        }
+    }
+}
+
+fn thin(canvas: &mut Canvas<'_>, place: &Place, y: f64, life: &Life) {
+    let dash = if life.is_inferred {
+        vec![0.55, 0.5]
+    } else {
+        Vec::new()
+    };
+    let stroke = Stroke {
+        color: ink::LINE,
+        width: 0.28,
+        dash,
+    };
+    let (from, to) = (place.axis.x(life.span.start), place.axis.x(life.span.end));
+    canvas.line(Point::new(from, y), Point::new(to, y), &stroke);
+}
+
+fn thick(canvas: &mut Canvas<'_>, place: &Place, y: f64, bar: &Bar) {
+    let high = (BAR.0 + BAR.1 * bar.share) * canvas.sizes.pitch();
+    let (from, to) = (place.axis.x(bar.span.start), place.axis.x(bar.span.end));
+    let wide = (to - from).max(0.25);
+    canvas.fill(Rect::new(from, y - high / 2.0, wide, high), ink::BAR);
+}
+
+/// The mark of a start.
+pub(crate) fn start(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    let high = TICK.1 * canvas.sizes.pitch();
+    let rect = Rect::new(x - TICK.0 / 2.0, y - high / 2.0, TICK.0, high);
+    canvas.fill(rect, ink::ADDED);
+}
+
+/// The mark of an end.
+pub(crate) fn cross(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+    let stroke = Stroke::solid(ink::REMOVED, 0.38);
+    let (a, b) = (CROSS, CROSS * 1.35);
+    canvas.line(Point::new(x - a, y - b), Point::new(x + a, y + b), &stroke);
+    canvas.line(Point::new(x - a, y + b), Point::new(x + a, y - b), &stroke);
+}
+
+/// What a node sends, the fastest first, and what it receives, as far as there is room.
+fn talk(canvas: &mut Canvas<'_>, source: &Source<'_>, track: &Track, place: (f64, f64, f64)) {
+    let (x, y, width) = place;
+    let name = &track.name;
+    if let Some(topic) = track.topic {
+        let elements = &source.mission.elements;
+        let kind = elements
+            .topics
+            .get(topic as usize)
+            .map(|t| t.types.join(", "));
+        let text = canvas.cut(&kind.unwrap_or_default(), Type::Small, width);
+        canvas.text(x, y, Type::Small, ink::QUIET, &text);
+        return;
+    }
+    let (sends, receives) = (sent_by(source, track), received_by(source, track));
+    let list = |topics: &[&str], most: usize| {
+        let told: Vec<&str> = topics
+            .iter()
+            .take(most)
+            .map(|t| relative(t, name))
+            .collect();
+        match topics.len() - told.len() {
+            0 => told.join(", "),
+            more => format!("{} +{more}", told.join(", ")),
+        }
+    };
+    let (mut a, mut b) = (sends.len(), receives.len());
+    let said = |topics: &[&str], arrow: &str, most: usize| match topics {
+        [] => String::new(),
+        topics => format!("{arrow} {}", list(topics, most)),
+    };
+    let between = 1.4;
+    loop {
+        let (left, right) = (said(&sends, "→", a), said(&receives, "←", b));
+        let wide = canvas.width(&left, Type::Small);
+        let gap = if left.is_empty() || right.is_empty() {
+            0.0
+        } else {
+            between
+        };
+        let whole = wide + gap + canvas.width(&right, Type::Small);
+        if whole <= width || (a <= 1 && b <= 1) {
+            let left = canvas.cut(&left, Type::Small, width);
+            canvas.text(x, y, Type::Small, ink::TEXT, &left);
+            let rest = canvas.cut(&right, Type::Small, (width - wide - gap).max(0.0));
+            canvas.text(x + wide + gap, y, Type::Small, ink::QUIET, &rest);
+            return;
+        }
+        if b >= a && b > 1 {
+            b -= 1;
+        } else {
+            a -= 1;
+        }
+    }
+}
+
+fn sent_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
+    let mut rated: Vec<(f64, &str)> = Vec::new();
+    for edge in source.publications(&track.nodes) {
+        let count: f64 = source.sent(edge).iter().sum();
+        let seconds: i64 = source.sending(edge).iter().map(Span::nanos).sum();
+        let hz = if seconds > 0 {
+            count / (seconds as f64 / 1e9)
+        } else {
+            0.0
+        };
+        if let Some(of) = source.mission.elements.publishes.get(edge as usize)
+            && !source.is_hub(of.topic)
+        {
+            rated.push((hz, source.topic(of.topic)));
+        }
+    }
+    rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    let mut names: Vec<&str> = Vec::new();
+    for (_, name) in rated {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+fn received_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
+    let all = &source.mission.elements.subscribes;
+    let own = all.iter().filter(|e| {
+        track.nodes.contains(&e.node) && source.shows(e.topic) && !source.is_hub(e.topic)
+    });
+    let mut names: Vec<&str> = own.map(|e| source.topic(e.topic)).collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}

@@ -1,0 +1,460 @@
+//! The map: who talks to whom over the whole mission, and in which phases everyone lives.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use super::band::{self, Axis};
+use super::canvas::{Canvas, HAIRLINE, Type, ink};
+use super::groups::{groups, phases_of};
+use super::notes::{flow, sentence};
+use super::page::{Sheet, filter_that_fits, nothing};
+use super::place::{Placed, place, rooms};
+use super::talks::{Talk, Talks};
+use super::tracks::{Track, of_nodes};
+use super::{MOST_HEIGHT, Rows};
+use crate::base::error::{Error, Result};
+use crate::base::geometry::{Rect, Size};
+use crate::base::name::{last_part, namespace};
+use crate::base::words;
+use crate::draw::scene::{Scene, Stroke};
+use crate::layout::{Cluster, Link, Outline, Plan, Vertex, engine};
+
+/// Nodes give way to groups from this height on, in millimetres, where these fit.
+const HIGH: f64 = 130.0;
+/// The height of a node.
+const PILL: f64 = 3.3;
+/// The most members a group names.
+const NAMED: usize = 4;
+/// The most nodes that are laid out one by one; more never fit.
+const MOST_NODES: usize = 120;
+
+/// About so many nodes fit on a page.
+const FITTING: usize = 40;
+
+/// One box: what is written in it.
+enum Look {
+    /// A node by its label, and its phases.
+    Pill(String, String),
+    /// Nodes without a known partner.
+    List(Vec<(String, String)>),
+    /// A group: namespace, phases, its lines, and the cells of its bar.
+    Group(String, String, Vec<String>, BTreeSet<usize>),
+}
+
+/// A map laid out.
+struct Drawn {
+    looks: Vec<Look>,
+    spaces: Vec<String>,
+    talks: Vec<Talk>,
+    labels: Vec<Vec<Vec<String>>>,
+    placed: Placed,
+    /// Nodes of no framed namespace without a known partner: told in a note.
+    alone: Vec<String>,
+}
+
+/// The figure, on the ladder from nodes to groups to refusal.
+pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
+    let tracks = of_nodes(sheet.source);
+    if tracks.is_empty() {
+        return Err(nothing());
+    }
+    let asked = sheet.options.rows;
+    let few = tracks.len() <= MOST_NODES;
+    let nodes = (asked != Some(Rows::Groups) && few)
+        .then(|| page(sheet, &tracks, false))
+        .flatten();
+    let is_low = |s: &Scene, most: f64| s.size.h <= most * super::canvas::PX_PER_MM;
+    if let Some(scene) = nodes
+        .as_ref()
+        .filter(|s| asked.is_some() && is_low(s, MOST_HEIGHT) || is_low(s, HIGH))
+    {
+        return Ok((scene.clone(), Vec::new()));
+    }
+    let grouped = (asked != Some(Rows::Nodes))
+        .then(|| page(sheet, &tracks, true))
+        .flatten();
+    if let Some(scene) = grouped.filter(|s| is_low(s, MOST_HEIGHT)) {
+        let remark = format!(
+            "boxes are groups: {} one by one are too many for this width",
+            words::count(tracks.len(), "node")
+        );
+        let remarks = if asked.is_none() {
+            vec![remark]
+        } else {
+            Vec::new()
+        };
+        return Ok((scene, remarks));
+    }
+    match nodes.filter(|s| is_low(s, MOST_HEIGHT)) {
+        Some(scene) => Ok((scene, Vec::new())),
+        None => Err(too_large(sheet, &tracks)),
+    }
+}
+
+fn too_large(sheet: &Sheet<'_>, tracks: &[Track]) -> Error {
+    let width = sheet.options.width_mm;
+    let many = words::count(tracks.len(), "node");
+    let hint = if width < 181.0 && page_at(sheet, tracks, 181.0) {
+        "`--width 181mm` would do".to_owned()
+    } else {
+        filter_that_fits(tracks, FITTING, "--ns-filter", "node")
+    };
+    Error::usage(format!("a map of {many} does not fit on {width} mm"), hint)
+}
+
+/// Whether groups would fit at another width.
+fn page_at(sheet: &Sheet<'_>, tracks: &[Track], width: f64) -> bool {
+    let options = super::Options {
+        width_mm: width,
+        ..sheet.options.clone()
+    };
+    let wider = Sheet {
+        options: &options,
+        ..*sheet
+    };
+    page(&wider, tracks, true).is_some_and(|s| super::page::fits(&s))
+}
+
+fn page(sheet: &Sheet<'_>, tracks: &[Track], is_grouped: bool) -> Option<Scene> {
+    let width = sheet.options.width_mm;
+    let mut canvas = sheet.canvas();
+    let drawn = if is_grouped {
+        of_groups(sheet, &canvas, tracks)
+    } else {
+        of_pills(sheet, &canvas, tracks)
+    }?;
+    let many = drawn.labels.len();
+    let left_out = drawn.placed.left_out;
+    paint(&mut canvas, sheet, &drawn);
+    let end = drawn.placed.size.h + 0.2;
+    let told = (is_grouped, left_out, many);
+    let y = below(&mut canvas, sheet, end, told, &drawn.alone);
+    Some(canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Map")))
+}
+
+/// Band, names and notes below the drawing, which ends at `end`; answers where they end.
+fn below(
+    canvas: &mut Canvas<'_>,
+    sheet: &Sheet<'_>,
+    end: f64,
+    (is_grouped, left_out, many): (bool, usize, usize),
+    alone: &[String],
+) -> f64 {
+    let width = sheet.options.width_mm;
+    let mut y = end + 1.2;
+    canvas.begin("phases");
+    if !sheet.source.phases.is_empty() {
+        let axis = Axis {
+            left: 0.0,
+            right: width,
+            span: sheet.source.span(),
+        };
+        band::band(canvas, &axis, y, sheet.source.phases);
+        y += band::HEIGHT;
+        let wide = width >= 150.0;
+        if !wide {
+            y = band::axis(canvas, &axis, y, false);
+        }
+        canvas.begin("words");
+        y = band::names(canvas, sheet.source, width, y, wide.then_some(&axis));
+    }
+    canvas.begin("notes");
+    let mut text = String::new();
+    if !sheet.options.is_bare {
+        text.push_str(if is_grouped {
+            "Box: nodes of one namespace that come and go together; number and bar: the phases they live in. "
+        } else {
+            "Green number: the phases in which a node lives; grey: all of them. Dashed frame: nodes without a known partner. "
+        });
+        text.push_str("Arrow: topics, thicker = more Hz, dashed = inferred. ");
+    }
+    if !alone.is_empty() {
+        let _ = write!(text, "Without a known partner: {}. ", alone.join(", "));
+    }
+    if left_out > 0 {
+        let _ = write!(text, "{left_out} of {many} topic names left out.");
+    }
+    if text.is_empty() {
+        return y;
+    }
+    flow(
+        canvas,
+        width,
+        y + 0.4,
+        &[sentence(ink::QUIET, text.trim_end())],
+    )
+}
+
+/// Every node as a pill, namespaces as frames.
+fn of_pills(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option<Drawn> {
+    let source = sheet.source;
+    let talks = Talks::new(source, tracks);
+    let own: Vec<Option<usize>> = (0..tracks.len()).map(Some).collect();
+    let whole = (0, source.mission.activity.cells.len());
+    let all = talks.between(&own, whole, false);
+    let linked: BTreeSet<usize> = all.iter().flat_map(|t| [t.from, t.to]).collect();
+    let phases: Vec<String> = phases_of(source, tracks)
+        .iter()
+        .map(|p| ranges(p, source.phases.len()))
+        .collect();
+    let mut spaces: Vec<String> = Vec::new();
+    for track in tracks {
+        let space = namespace(&track.name).to_owned();
+        let many = tracks
+            .iter()
+            .filter(|t| namespace(&t.name) == space)
+            .count();
+        if space != "/" && many > 1 && !spaces.contains(&space) {
+            spaces.push(space);
+        }
+    }
+    let home = |track: &Track| spaces.iter().position(|s| s == namespace(&track.name));
+    let label = |track: &Track| match home(track) {
+        Some(_) => last_part(&track.name).to_owned(),
+        None => track.name.trim_start_matches('/').to_owned(),
+    };
+    let mut looks = Vec::new();
+    let mut vertices = Vec::new();
+    let mut vertex = vec![None; tracks.len()];
+    for at in linked.iter().copied() {
+        let look = Look::Pill(label(&tracks[at]), phases[at].clone());
+        vertex[at] = Some(vertices.len());
+        vertices.push(sized(canvas, &look, home(&tracks[at]), source.phases.len()));
+        looks.push(look);
+    }
+    for space in (0..spaces.len()).map(Some) {
+        let alone =
+            (0..tracks.len()).filter(|at| !linked.contains(at) && home(&tracks[*at]) == space);
+        let alone: Vec<(String, String)> = alone
+            .map(|at| (label(&tracks[at]), phases[at].clone()))
+            .collect();
+        for part in alone.chunks(8) {
+            let look = Look::List(part.to_vec());
+            vertices.push(sized(canvas, &look, space, source.phases.len()));
+            looks.push(look);
+        }
+    }
+    let talks = talks.between(&vertex, whole, false);
+    let alone = (0..tracks.len()).filter(|at| !linked.contains(at) && home(&tracks[*at]).is_none());
+    let alone: Vec<String> = alone
+        .map(|at| {
+            format!("{} {}", label(&tracks[at]), phases[at])
+                .trim_end()
+                .to_owned()
+        })
+        .collect();
+    let drawn = finished(sheet, canvas, (looks, vertices, spaces, talks), 1)?;
+    Some(Drawn { alone, ..drawn })
+}
+
+/// Every group as a box.
+fn of_groups(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option<Drawn> {
+    let source = sheet.source;
+    let groups = groups(source, tracks);
+    let mut vertex = vec![None; tracks.len()];
+    let mut looks = Vec::new();
+    let mut vertices = Vec::new();
+    for (k, group) in groups.iter().enumerate() {
+        let mut lines: Vec<String> = Vec::new();
+        for at in &group.members {
+            vertex[*at] = Some(k);
+            if lines.len() < NAMED || group.members.len() <= NAMED + 1 {
+                lines.push(last_part(&tracks[*at].name).to_owned());
+            }
+        }
+        let more = group.members.len() - lines.len();
+        if more > 0 {
+            lines.push(format!("+{more} more"));
+        }
+        let phases = ranges(&group.phases, source.phases.len());
+        let look = Look::Group(group.space.clone(), phases, lines, group.phases.clone());
+        vertices.push(sized(canvas, &look, None, source.phases.len()));
+        looks.push(look);
+    }
+    let talks = Talks::new(source, tracks);
+    let whole = (0, source.mission.activity.cells.len());
+    let talks = talks.between(&vertex, whole, false);
+    finished(sheet, canvas, (looks, vertices, Vec::new(), talks), 2)
+}
+
+fn finished(
+    sheet: &Sheet<'_>,
+    canvas: &Canvas<'_>,
+    (looks, vertices, spaces, talks): (Vec<Look>, Vec<Vertex>, Vec<String>, Vec<Talk>),
+    most: usize,
+) -> Option<Drawn> {
+    let link = |t: &Talk| Link {
+        from: t.from,
+        to: t.to,
+        label: None,
+    };
+    let title = |name: &String| Cluster {
+        parent: None,
+        title: Size::new(canvas.width(name, Type::Head), canvas.cap(Type::Head) + 0.9),
+    };
+    let plan = Plan {
+        vertices,
+        links: talks.iter().map(link).collect(),
+        clusters: spaces.iter().map(title).collect(),
+    };
+    let labels: Vec<Vec<Vec<String>>> =
+        talks.iter().map(|t| t.labels(sheet.source, most)).collect();
+    let rooms: Vec<Vec<Size>> = labels.iter().map(|l| rooms(canvas, l)).collect();
+    let engine = engine("layered").ok()?;
+    let placed = place(&plan, &rooms, sheet.options.width_mm - 0.4, engine)?;
+    let aside = (sheet.options.width_mm - placed.size.w) / 2.0;
+    Some(Drawn {
+        looks,
+        spaces,
+        talks,
+        labels,
+        placed: placed.moved(aside, 0.2),
+        alone: Vec::new(),
+    })
+}
+
+/// The phases as people write them: `2–4`, `1,3–5`; empty for all of them.
+pub(crate) fn ranges(phases: &BTreeSet<usize>, many: usize) -> String {
+    if phases.len() >= many {
+        return String::new();
+    }
+    let all: Vec<usize> = phases.iter().map(|p| p + 1).collect();
+    let runs = all.chunk_by(|a, b| a + 1 == *b).map(|run| match run {
+        [one] => one.to_string(),
+        [first, .., last] => format!("{first}–{last}"),
+        [] => String::new(),
+    });
+    runs.collect::<Vec<_>>().join(",")
+}
+
+fn sized(canvas: &Canvas<'_>, look: &Look, cluster: Option<usize>, phases: usize) -> Vertex {
+    let line = canvas.sizes.pitch();
+    let named = |(name, phases): &(String, String)| {
+        let gap = if phases.is_empty() { 0.0 } else { 1.0 };
+        canvas.width(name, Type::Name) + gap + canvas.width(phases, Type::Head)
+    };
+    let size = match look {
+        Look::Pill(name, phases) => Size::new(
+            named(&(name.clone(), phases.clone())) + 2.2,
+            PILL.max(line + 0.5),
+        ),
+        Look::List(all) => {
+            let widest = all.iter().map(named).fold(0.0, f64::max);
+            Size::new(widest + 1.6, line * 0.9 * all.len() as f64 + 0.8)
+        }
+        Look::Group(space, own, lines, _) => {
+            let widest = lines
+                .iter()
+                .map(|l| canvas.width(l, Type::Name))
+                .fold(0.0, f64::max);
+            let title = canvas.width(space, Type::Head) + canvas.width(own, Type::Head) + 2.0;
+            let bar = if phases > 0 { 2.0 } else { 0.0 };
+            Size::new(
+                widest.max(title) + 1.8,
+                line * (lines.len() as f64 + 1.0) + 0.8 + bar,
+            )
+        }
+    };
+    Vertex {
+        size,
+        outline: Outline::Box,
+        cluster,
+    }
+}
+
+fn paint(canvas: &mut Canvas<'_>, sheet: &Sheet<'_>, drawn: &Drawn) {
+    let placed = &drawn.placed;
+    let frame = Stroke::solid(ink::FOLDED, HAIRLINE);
+    canvas.begin("namespaces");
+    for (rect, name) in placed.clusters.iter().zip(&drawn.spaces) {
+        canvas.frame(*rect, 1.0, ink::GROUND, &frame);
+        let y = rect.y + 0.5 + canvas.cap(Type::Head) / 2.0;
+        canvas.text(rect.x + 0.7, y, Type::Head, ink::QUIET, name);
+    }
+    canvas.begin("arrows");
+    for (at, talk) in drawn.talks.iter().enumerate() {
+        let width = (0.14 + 0.12 * libm::log10(1.0 + talk.hz())).max(HAIRLINE);
+        let dash: &[f64] = if talk.is_inferred { &[0.9, 0.6] } else { &[] };
+        placed.arrow(canvas, at, ink::LINE, width, dash);
+    }
+    canvas.begin("topics");
+    for (at, lines) in drawn.labels.iter().enumerate() {
+        placed.label(canvas, at, lines);
+    }
+    canvas.begin("nodes");
+    for (look, rect) in drawn.looks.iter().zip(&placed.boxes) {
+        match look {
+            Look::Pill(name, phases) => pill(canvas, *rect, name, phases),
+            Look::List(all) => list(canvas, *rect, all),
+            Look::Group(space, own, lines, cells) => {
+                let many = sheet.source.phases.len();
+                group(canvas, *rect, (space, own, lines), cells, many);
+            }
+        }
+    }
+}
+
+fn pill(canvas: &mut Canvas<'_>, rect: Rect, name: &str, phases: &str) {
+    let fill = if phases.is_empty() {
+        ink::BAND[1]
+    } else {
+        ink::PAPER
+    };
+    let stroke = Stroke::solid(ink::LINE, 0.22);
+    canvas.frame(rect, rect.h / 2.0, fill, &stroke);
+    let y = rect.centre().y;
+    canvas.text(rect.x + 1.1, y, Type::Name, ink::TEXT, name);
+    canvas.text_end(rect.right() - 1.1, y, Type::Head, ink::ADDED, phases);
+}
+
+fn list(canvas: &mut Canvas<'_>, rect: Rect, all: &[(String, String)]) {
+    let stroke = Stroke {
+        color: ink::RULE,
+        width: HAIRLINE,
+        dash: vec![0.7, 0.6],
+    };
+    canvas.frame(rect, 0.4, ink::PAPER, &stroke);
+    let line = canvas.sizes.pitch() * 0.9;
+    for (k, (name, phases)) in all.iter().enumerate() {
+        let y = rect.y + 0.4 + line * (k as f64 + 0.5);
+        canvas.text(rect.x + 0.8, y, Type::Name, ink::QUIET, name);
+        canvas.text_end(rect.right() - 0.8, y, Type::Head, ink::ADDED, phases);
+    }
+}
+
+fn group(
+    canvas: &mut Canvas<'_>,
+    rect: Rect,
+    (space, own, lines): (&str, &str, &[String]),
+    cells: &BTreeSet<usize>,
+    many: usize,
+) {
+    let fill = if own.is_empty() {
+        ink::TINT
+    } else {
+        ink::PAPER
+    };
+    canvas.frame(rect, 0.8, fill, &Stroke::solid(ink::LINE, 0.25));
+    let line = canvas.sizes.pitch();
+    let y = |k: usize| rect.y + 0.4 + line * (k as f64 + 0.5);
+    canvas.text(rect.x + 0.9, y(0), Type::Head, ink::QUIET, space);
+    canvas.text_end(rect.right() - 0.9, y(0), Type::Head, ink::ADDED, own);
+    for (k, text) in lines.iter().enumerate() {
+        canvas.text(rect.x + 0.9, y(k + 1), Type::Name, ink::TEXT, text);
+    }
+    let wide = (rect.w - 1.8) / many.max(1) as f64;
+    for k in 0..many {
+        let fill = if cells.contains(&k) {
+            ink::LINE
+        } else {
+            ink::PAPER
+        };
+        let cell = Rect::new(
+            rect.x + 0.9 + wide * k as f64,
+            rect.bottom() - 1.9,
+            wide,
+            1.15,
+        );
+        canvas.frame(cell, 0.0, fill, &Stroke::solid(ink::LINE, HAIRLINE * 0.7));
+    }
+}

@@ -1,0 +1,110 @@
+//! Running text below a figure: runs of words and signs that wrap at the width.
+
+use super::canvas::{Canvas, Type};
+use crate::draw::style::Color;
+
+/// A small drawing inside a text: its width in millimetres, and what draws it with its left end and its middle line.
+pub(crate) type Sign = (f64, fn(&mut Canvas<'_>, f64, f64));
+
+/// A part of a text.
+pub(crate) enum Run {
+    Words(Type, Color, String),
+    Sign(Sign),
+}
+
+/// What is kept on one line if it can be.
+pub(crate) type Item = Vec<Run>;
+
+/// The room between items.
+const GAP: f64 = 2.6;
+
+/// Writes items one after another from `y`, the top, on; wraps before an item that does not fit, and inside one that
+/// is wider than a line. Answers where the next line would begin.
+pub(crate) fn flow(canvas: &mut Canvas<'_>, width: f64, y: f64, items: &[Item]) -> f64 {
+    let line = canvas.sizes.line();
+    let mut pen = Place {
+        x: 0.0,
+        y: y + line / 2.0,
+        width,
+        line,
+    };
+    for item in items {
+        let whole: f64 = item.iter().map(|run| run_width(canvas, run)).sum();
+        if pen.x > 0.0 && pen.x + GAP + whole > width {
+            pen.wrap();
+        } else if pen.x > 0.0 {
+            pen.x += GAP;
+        }
+        for run in item {
+            pen.put(canvas, run);
+        }
+    }
+    if items.is_empty() {
+        y
+    } else {
+        pen.y + line / 2.0
+    }
+}
+
+/// A sentence of ordinary words.
+pub(crate) fn sentence(color: Color, text: impl Into<String>) -> Item {
+    vec![Run::Words(Type::Small, color, text.into())]
+}
+
+struct Place {
+    x: f64,
+    y: f64,
+    width: f64,
+    line: f64,
+}
+
+impl Place {
+    fn wrap(&mut self) {
+        self.x = 0.0;
+        self.y += self.line;
+    }
+
+    fn put(&mut self, canvas: &mut Canvas<'_>, run: &Run) {
+        match run {
+            Run::Sign((width, draw)) => {
+                draw(canvas, self.x, self.y);
+                self.x += width + 0.8;
+            }
+            Run::Words(of, color, text) => {
+                let mut rest = text.as_str();
+                while !rest.is_empty() {
+                    let (now, after) = self.split(canvas, *of, rest);
+                    canvas.text(self.x, self.y, *of, *color, now.trim_end());
+                    self.x += canvas.width(now, *of);
+                    rest = after;
+                    if !rest.is_empty() {
+                        self.wrap();
+                    }
+                }
+            }
+        }
+    }
+
+    /// As many words as fit on this line, at least one word on an empty line.
+    fn split<'t>(&self, canvas: &Canvas<'_>, of: Type, text: &'t str) -> (&'t str, &'t str) {
+        let room = self.width - self.x + 0.01;
+        if canvas.width(text.trim_end(), of) <= room {
+            return (text, "");
+        }
+        let breaks = text.match_indices(' ').map(|(at, _)| at + 1);
+        let fits = |at: &usize| canvas.width(text[..*at].trim_end(), of) <= room;
+        let at = breaks.clone().rfind(fits);
+        // A first word that is too long for the rest of the line goes to the next one; one that is too long for any
+        // line stands out.
+        let at = at.or_else(|| (self.x > 0.0).then_some(0));
+        let at = at.or_else(|| breaks.clone().next()).unwrap_or(text.len());
+        (&text[..at], &text[at..])
+    }
+}
+
+fn run_width(canvas: &Canvas<'_>, run: &Run) -> f64 {
+    match run {
+        Run::Sign((width, _)) => width + 0.8,
+        Run::Words(of, _, text) => canvas.width(text, *of),
+    }
+}

@@ -1,0 +1,240 @@
+//! A page with one figure: the ladder from nodes to groups to refusal, and what stands below the drawing.
+
+use super::band::{Axis, clock, names};
+use super::canvas::{Canvas, PX_PER_MM, Sizes, Type, ink};
+use super::lives::{Lives, Place, WIDE, sign};
+use super::notes::{Item, Run, flow, sentence};
+use super::rows::Row;
+use super::source::Source;
+use super::tracks::Track;
+use super::{Kind, MOST_HEIGHT, Options, Rows, legend};
+use crate::base::error::{Error, Result};
+use crate::base::geometry::Size;
+use crate::base::name::last_part;
+use crate::base::words;
+use crate::draw::scene::Scene;
+use crate::draw::text::Fonts;
+
+/// The shortest time axis in millimetres on which anything can be seen.
+const SHORTEST_AXIS: f64 = 15.0;
+
+/// What a page is made of.
+pub(crate) struct Sheet<'a> {
+    pub(crate) source: &'a Source<'a>,
+    pub(crate) fonts: &'a Fonts,
+    pub(crate) sizes: Sizes,
+    pub(crate) options: &'a Options,
+}
+
+impl<'a> Sheet<'a> {
+    /// The figure and what the user should know of it.
+    pub(crate) fn draw(&self) -> Result<(Scene, Vec<String>)> {
+        match self.options.kind {
+            Kind::Lives => self.lives(),
+            Kind::Map => super::map::draw(self),
+            Kind::Steps => super::steps::draw(self),
+        }
+    }
+
+    pub(crate) fn canvas(&self) -> Canvas<'a> {
+        Canvas::new(self.fonts, self.sizes, PX_PER_MM)
+    }
+
+    /// The title of the page: what it is, and of which bag.
+    pub(crate) fn title(&self, what: &str) -> String {
+        let bags = &self.source.mission.bags;
+        match bags.first() {
+            Some(bag) => format!("{what} of {}", words::visible(&bag.name)),
+            None => what.to_owned(),
+        }
+    }
+
+    fn lives(&self) -> Result<(Scene, Vec<String>)> {
+        let by_topics = match self.options.rows {
+            Some(rows) => rows == Rows::Topics,
+            None => !self.source.knows_publishers(),
+        };
+        let first = Lives::new(self.source, by_topics);
+        if first.rows.is_empty() {
+            return Err(nothing());
+        }
+        let is_grouped = self.options.rows == Some(Rows::Groups);
+        let (mut scene, mut remarks) = (None, Vec::new());
+        if !is_grouped {
+            scene = self.lives_page(&first).filter(fits);
+        }
+        if scene.is_none() && !by_topics && matches!(self.options.rows, None | Some(Rows::Groups)) {
+            let groups = Lives::of(
+                self.source,
+                super::groups::tracks(self.source, &first.tracks),
+            );
+            scene = self.lives_page(&groups).filter(fits);
+            if scene.is_some() && !is_grouped {
+                let many = words::count(first.tracks.len(), "node");
+                remarks.push(format!(
+                    "{many} do not fit on a page; rows are groups of nodes that come and go together"
+                ));
+            }
+        }
+        let scene = scene.ok_or_else(|| self.too_high(&first))?;
+        Ok((scene, remarks))
+    }
+
+    /// The page of some lives, whatever its height.
+    fn lives_page(&self, lives: &Lives<'_>) -> Option<Scene> {
+        let width = self.options.width_mm;
+        let mut canvas = self.canvas();
+        let place = lives_place(lives, &canvas, width)?;
+        let mut y = lives.draw(&mut canvas, &place);
+        canvas.begin("words");
+        if self.options.is_named || !self.options.is_bare {
+            y = names(&mut canvas, self.source, width, y, None);
+        }
+        y = flow(&mut canvas, width, y, &incident_items(lives));
+        if !self.options.is_bare {
+            y = flow(
+                &mut canvas,
+                width,
+                y,
+                &lives_notes(lives, place.talk.is_some()),
+            );
+            y = flow(&mut canvas, width, y + 0.15, &legend::items(lives));
+        }
+        let what = if lives.is_of_topics() {
+            "Life lines of topics"
+        } else {
+            "Life lines"
+        };
+        Some(canvas.into_scene(Size::new(width, y + 0.3), self.title(what)))
+    }
+
+    /// Why it does not fit, and which namespace would.
+    fn too_high(&self, lives: &Lives<'_>) -> Error {
+        let canvas = self.canvas();
+        let width = self.options.width_mm;
+        if lives_place(lives, &canvas, width).is_none() {
+            let wider = (0..100).map(|mm| libm::ceil(width) + f64::from(mm));
+            let enough = wider.filter(|w| lives_place(lives, &canvas, *w).is_some());
+            let enough = enough.take(1).next().unwrap_or(88.0);
+            return Error::usage(
+                format!("{width} mm leave no room for time beside the names"),
+                format!("`--width {enough}mm` would do"),
+            );
+        }
+        let high = lives.height(&canvas);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "72 rows or so"
+        )]
+        let most = ((MOST_HEIGHT - 30.0) / self.sizes.pitch()) as usize;
+        let flag = if lives.is_of_topics() {
+            "--topic-filter"
+        } else {
+            "--ns-filter"
+        };
+        let hint = filter_that_fits(&lives.tracks, most, flag, "row");
+        let rows = words::count(lives.rows.len(), "row");
+        Error::usage(
+            format!("{rows} are {high:.0} mm high; a page has {MOST_HEIGHT} mm"),
+            hint,
+        )
+    }
+}
+
+/// The filter that leaves as many tracks as fit: the largest namespace that is not too large.
+pub(crate) fn filter_that_fits(tracks: &[Track], most: usize, flag: &str, word: &str) -> String {
+    let mut spaces: Vec<(&str, usize)> = Vec::new();
+    for top in tracks.iter().filter_map(|t| top_space(&t.name)) {
+        match spaces.iter_mut().find(|(name, _)| *name == top) {
+            Some((_, many)) => *many += 1,
+            None => spaces.push((top, 1)),
+        }
+    }
+    let fitting = spaces.iter().filter(|(_, many)| *many <= most);
+    let best = fitting.max_by_key(|(name, many)| (*many, std::cmp::Reverse(*name)));
+    let most = words::count(most, word);
+    match best {
+        None => format!("at most {most} fit; choose some with `{flag}`"),
+        Some((name, many)) => {
+            format!("`{flag} '{name}/.*'` leaves {many}; at most {most} fit")
+        }
+    }
+}
+
+/// The namespace below the root that a name is in, if it is in one.
+fn top_space(name: &str) -> Option<&str> {
+    let end = name.get(1..)?.find('/')?;
+    name.get(..=end)
+}
+
+pub(crate) fn nothing() -> Error {
+    Error::usage(
+        "nothing is left to draw",
+        "`--ns-filter` and `--topic-filter` leave nothing; `bagreel info` lists what there is",
+    )
+}
+
+pub(crate) fn fits(scene: &Scene) -> bool {
+    scene.size.h <= MOST_HEIGHT * PX_PER_MM
+}
+
+/// The columns of a page of lives; `None` where too little is left for the time axis.
+fn lives_place(lives: &Lives<'_>, canvas: &Canvas<'_>, width: f64) -> Option<Place> {
+    let names = lives.names_width(canvas, width.min(WIDE.0));
+    let talk = if width >= WIDE.0 { WIDE.1 + 1.8 } else { 0.0 };
+    let right = width - talk - 5.2;
+    let left = names.max(canvas.width("min:s", Type::Small) + 1.5);
+    let top = if lives.source.phases.is_empty() {
+        canvas.sizes.line()
+    } else {
+        0.0
+    };
+    (right - left >= SHORTEST_AXIS).then_some(Place {
+        top,
+        left: 0.0,
+        axis: Axis {
+            left,
+            right,
+            span: lives.source.span(),
+        },
+        rates: Some(right + 5.1),
+        talk: (width >= WIDE.0).then_some((width - WIDE.1, WIDE.1)),
+    })
+}
+
+/// The letters explained, in order of time.
+fn incident_items(lives: &Lives<'_>) -> Vec<Item> {
+    let start = lives.source.span().start;
+    let item = |(k, incident): (usize, &super::incidents::Incident)| {
+        let at = clock(incident.at.since(start));
+        vec![
+            Run::Words(Type::Strong, ink::CHANGED, format!("{} ", sign(k))),
+            Run::Words(Type::Small, ink::TEXT, format!("{at} {}", incident.text)),
+        ]
+    };
+    lives.incidents.iter().enumerate().map(item).collect()
+}
+
+/// What is folded where no column tells it, and what has no letter.
+fn lives_notes(lives: &Lives<'_>, is_told: bool) -> Vec<Item> {
+    let mut items = Vec::new();
+    for row in lives.rows.iter().filter(|_| !is_told) {
+        if let Row::Folded(all, space) = row {
+            let names: Vec<&str> = all
+                .iter()
+                .map(|at| last_part(&lives.tracks[*at].name))
+                .collect();
+            let text = format!("Throughout in {space}: {}.", names.join(", "));
+            items.push(sentence(ink::QUIET, text));
+        }
+    }
+    if lives.unmarked > 0 {
+        let text = format!(
+            "{} not marked.",
+            words::count(lives.unmarked, "smaller change")
+        );
+        items.push(sentence(ink::QUIET, text));
+    }
+    items
+}

@@ -1,0 +1,131 @@
+//! One step as a panel: its boxes by what became of them, its arrows, its words.
+
+use super::canvas::{Canvas, HAIRLINE, Type, ink};
+use super::place::Placed;
+use super::talks::Talk;
+use crate::base::geometry::{Point, Rect};
+use crate::draw::scene::Stroke;
+use crate::draw::style::Color;
+
+/// Room inside a panel.
+pub(crate) const INSIDE: f64 = 1.3;
+
+/// What became of a box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fate {
+    Began,
+    Ended,
+    ChangedHands,
+    Neighbour,
+}
+
+/// One box of a panel.
+pub(crate) struct Look {
+    pub(crate) fate: Fate,
+    pub(crate) space: String,
+    pub(crate) lines: Vec<String>,
+}
+
+/// A panel laid out, from its own corner.
+pub(crate) struct Panel {
+    pub(crate) heading: (String, String),
+    pub(crate) looks: Vec<Look>,
+    pub(crate) talks: Vec<(Talk, Fate)>,
+    pub(crate) labels: Vec<Vec<Vec<String>>>,
+    pub(crate) placed: Option<Placed>,
+    pub(crate) notes: Vec<(Color, String)>,
+    pub(crate) height: f64,
+}
+
+pub(crate) fn type_of(fate: Fate) -> Type {
+    if fate == Fate::Neighbour {
+        Type::Small
+    } else {
+        Type::Strong
+    }
+}
+
+/// Draws a panel into its frame.
+pub(crate) fn paint(canvas: &mut Canvas<'_>, panel: &Panel, rect: Rect) {
+    canvas.frame(rect, 0.4, ink::PAPER, &Stroke::solid(ink::FOLDED, HAIRLINE));
+    let (x, width) = (rect.x + INSIDE, rect.w - 2.0 * INSIDE);
+    let y = rect.y + INSIDE + canvas.cap(Type::Head) / 2.0 + 0.2;
+    canvas.text(x, y, Type::Head, ink::TEXT, &panel.heading.0);
+    let at = canvas.width(&panel.heading.0, Type::Head) + 1.4;
+    let words = canvas.cut(&panel.heading.1, Type::Name, width - at);
+    canvas.text(x + at, y, Type::Name, ink::TEXT, &words);
+    let line = canvas.sizes.line();
+    for (k, (color, text)) in panel.notes.iter().rev().enumerate() {
+        let y = rect.bottom() - INSIDE - line * (k as f64 + 0.5) + 0.5;
+        let text = canvas.cut(text, Type::Small, width);
+        canvas.text(x, y, Type::Small, *color, &text);
+    }
+    let Some(placed) = &panel.placed else { return };
+    let aside = x + 0.4 + ((width - 1.2 - placed.size.w) / 2.0).max(0.0);
+    let placed = placed
+        .clone()
+        .moved(aside, rect.y + INSIDE + canvas.sizes.pitch() + 0.6);
+    for (at, (talk, fate)) in panel.talks.iter().enumerate() {
+        let color = if *fate == Fate::Ended {
+            ink::REMOVED
+        } else {
+            ink::ADDED
+        };
+        let dash: &[f64] = if *fate == Fate::Ended {
+            &[0.9, 0.6]
+        } else {
+            &[]
+        };
+        let width = (0.14 + 0.12 * libm::log10(1.0 + talk.hz())).max(HAIRLINE);
+        placed.arrow(canvas, at, color, width, dash);
+    }
+    for (at, lines) in panel.labels.iter().enumerate() {
+        placed.label(canvas, at, lines);
+    }
+    for (look, rect) in panel.looks.iter().zip(&placed.boxes) {
+        boxed(canvas, look, *rect);
+    }
+}
+
+fn boxed(canvas: &mut Canvas<'_>, look: &Look, rect: Rect) {
+    let (fill, color, dash, width) = match look.fate {
+        Fate::Began => (ink::ADDED_FILL, ink::ADDED, Vec::new(), 0.38),
+        Fate::Ended => (ink::PAPER, ink::REMOVED, vec![1.1, 0.7], 0.38),
+        Fate::ChangedHands => (ink::CHANGED_FILL, ink::CHANGED, Vec::new(), 0.3),
+        Fate::Neighbour => (ink::TINT, ink::RULE, Vec::new(), HAIRLINE),
+    };
+    let stroke = Stroke { color, width, dash };
+    canvas.frame(rect, 0.6, fill, &stroke);
+    if look.fate == Fate::ChangedHands {
+        // A double frame, so that grey print tells it.
+        let inner = Stroke::solid(ink::CHANGED, HAIRLINE);
+        canvas.frame(rect.grown(-0.45), 0.3, Color::NONE, &inner);
+    }
+    let line = canvas.sizes.line();
+    let y = |k: usize| rect.y + 0.4 + line * (k as f64 + 0.5);
+    canvas.text(rect.x + 1.0, y(0), Type::Small, ink::QUIET, &look.space);
+    for (k, text) in look.lines.iter().enumerate() {
+        canvas.text(rect.x + 1.0, y(k + 1), type_of(look.fate), ink::TEXT, text);
+    }
+    if matches!(look.fate, Fate::Began | Fate::Ended) {
+        badge(canvas, Point::new(rect.right(), rect.y), look.fate, color);
+    }
+}
+
+/// A disc with a plus or a minus at a corner.
+fn badge(canvas: &mut Canvas<'_>, at: Point, fate: Fate, color: Color) {
+    canvas.disc(at, 0.75, color, &Stroke::default());
+    let sign = Stroke::solid(ink::PAPER, 0.26);
+    canvas.line(
+        Point::new(at.x - 0.42, at.y),
+        Point::new(at.x + 0.42, at.y),
+        &sign,
+    );
+    if fate == Fate::Began {
+        canvas.line(
+            Point::new(at.x, at.y - 0.42),
+            Point::new(at.x, at.y + 0.42),
+            &sign,
+        );
+    }
+}

@@ -1,0 +1,432 @@
+//! Boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed afterwards.
+
+use super::canvas::{Canvas, Type, ink};
+use super::parts::{PARTED, Part, parts, shelves};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::draw::scene::{Step, Stroke};
+use crate::draw::style::Color;
+use crate::layout::{Engine, Layout, Options, Orientation, Plan, Route, lay_out};
+
+/// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings.
+const TIGHTNESS: [f64; 5] = [3.6, 4.8, 6.5, 9.0, 12.0];
+/// Heights of the page that the engine is to fill, in widths.
+const ASPECTS: [f64; 2] = [0.45, 1.2];
+/// Where along an arrow its label is tried, best first.
+const STATIONS: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
+/// Pieces that a curve is measured in.
+const PIECES: usize = 8;
+/// A drawing in millimetres, its top left corner at (0, 0).
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    pub(crate) size: Size,
+    pub(crate) boxes: Vec<Rect>,
+    pub(crate) clusters: Vec<Rect>,
+    pub(crate) routes: Vec<Vec<Point>>,
+    curves: Vec<Route>,
+    /// The middle of each label that found room, and which of its alternatives did.
+    pub(crate) labels: Vec<Option<(Point, usize)>>,
+    pub(crate) left_out: usize,
+}
+
+/// The lowest drawing of a plan, in millimetres, that is at most `width` wide and keeps its labels; `None` where all are
+/// wider. Parts that nothing links are laid out each by itself and put side by side. `labels` holds, per link, what may
+/// be written on it, the best first.
+pub(crate) fn place(
+    plan: &Plan,
+    labels: &[Vec<Size>],
+    width: f64,
+    engine: &dyn Engine,
+) -> Option<Placed> {
+    let wanted = labels.iter().filter(|l| !l.is_empty()).count();
+    let parts = parts(plan);
+    let tried: Vec<Vec<Placed>> = parts
+        .iter()
+        .map(|part| candidates(&part.plan(plan), &part.labels(labels), width, engine))
+        .collect();
+    let mut best: Option<Choice> = None;
+    for chosen in choices(&tried, width)? {
+        let sizes: Vec<Size> = chosen
+            .iter()
+            .zip(&tried)
+            .map(|(at, all)| all[*at].size)
+            .collect();
+        let (corners, size) = shelves(&sizes, width);
+        let lost: usize = chosen
+            .iter()
+            .zip(&tried)
+            .map(|(at, all)| all[*at].left_out)
+            .sum();
+        let excess = if wanted < MANY {
+            0
+        } else {
+            lost.saturating_sub(wanted / TENTH)
+        };
+        let cost = size.h + lost as f64 * LOST + excess as f64 * EXCESS;
+        if best.as_ref().is_none_or(|b| cost < b.cost) {
+            let parts = chosen.into_iter().zip(corners).collect();
+            best = Some(Choice { cost, parts, size });
+        }
+    }
+    let Choice {
+        parts: chosen,
+        size,
+        ..
+    } = best?;
+    let mut whole = Placed::empty(plan, labels.len(), size);
+    for ((part, all), (at, corner)) in parts.iter().zip(tried).zip(chosen) {
+        if let Some(placed) = all.into_iter().nth(at) {
+            whole.take(part, placed.moved(corner.x, corner.y));
+        }
+    }
+    Some(whole)
+}
+
+/// A drawing for every part, by place among its candidates, and where it stands.
+struct Choice {
+    cost: f64,
+    parts: Vec<(usize, Point)>,
+    size: Size,
+}
+
+/// Ways to take one candidate of every part: for each of the largest part the others beside it, where they fit.
+fn choices(tried: &[Vec<Placed>], width: f64) -> Option<Vec<Vec<usize>>> {
+    let area = |all: &Vec<Placed>| all.iter().map(|p| p.size.w * p.size.h).fold(0.0, f64::max);
+    let order = |a: &usize, b: &usize| area(&tried[*a]).total_cmp(&area(&tried[*b])).then(b.cmp(a));
+    let Some(largest) = (0..tried.len()).max_by(order) else {
+        return Some(vec![Vec::new()]);
+    };
+    let mut ways = Vec::new();
+    for at in 0..tried[largest].len() {
+        let beside = width - tried[largest][at].size.w - PARTED;
+        for most in [beside, width] {
+            let way = tried.iter().enumerate().map(|(part, all)| {
+                if part == largest {
+                    Some(at)
+                } else {
+                    choice(all, most)
+                }
+            });
+            ways.push(way.collect::<Option<Vec<usize>>>()?);
+        }
+    }
+    Some(ways)
+}
+
+/// What a label that is left out costs, in millimetres of height.
+const LOST: f64 = 4.0;
+/// The share of many labels, one in so many, that may be left out before each more costs as much as `EXCESS`.
+const TENTH: usize = 10;
+const EXCESS: f64 = 15.0;
+const MANY: usize = 15;
+
+/// The cheapest drawing of a part that is at most this wide, else the narrowest.
+fn choice(all: &[Placed], most: f64) -> Option<usize> {
+    let cost = |p: &Placed| p.size.h + p.left_out as f64 * LOST;
+    let fitting = (0..all.len()).filter(|at| all[*at].size.w <= most);
+    let best = fitting.min_by(|a, b| cost(&all[*a]).total_cmp(&cost(&all[*b])));
+    best.or_else(|| (0..all.len()).min_by(|a, b| all[*a].size.w.total_cmp(&all[*b].size.w)))
+}
+
+/// Every drawing of a part that fits.
+fn candidates(plan: &Plan, labels: &[Vec<Size>], width: f64, engine: &dyn Engine) -> Vec<Placed> {
+    let mut all = Vec::new();
+    for tightness in TIGHTNESS {
+        for orientation in [Orientation::LeftRight, Orientation::TopBottom] {
+            for aspect in ASPECTS {
+                let page = Size::new(width * tightness, width * aspect * tightness);
+                let options = Options {
+                    page,
+                    orientation: Some(orientation),
+                };
+                let layout = lay_out(&scaled(plan, tightness), &options, engine);
+                if layout.size.w <= width * tightness + 0.01 {
+                    all.push(Placed::new(plan, &layout, labels, tightness, width));
+                }
+                if plan.links.is_empty() {
+                    // Nothing else would come of other ways.
+                    return all;
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The same plan with lengths in the engine's pixels, and without labels, which are placed afterwards.
+fn scaled(plan: &Plan, by: f64) -> Plan {
+    let mut plan = plan.clone();
+    for vertex in &mut plan.vertices {
+        vertex.size = Size::new(vertex.size.w * by, vertex.size.h * by);
+    }
+    for cluster in &mut plan.clusters {
+        cluster.title = Size::new(cluster.title.w * by, cluster.title.h * by);
+    }
+    plan
+}
+
+impl Placed {
+    /// Room for a whole plan, in which nothing stands yet.
+    fn empty(plan: &Plan, labels: usize, size: Size) -> Self {
+        Self {
+            size,
+            boxes: vec![Rect::default(); plan.vertices.len()],
+            clusters: vec![Rect::default(); plan.clusters.len()],
+            routes: vec![Vec::new(); plan.links.len()],
+            curves: vec![Route::default(); plan.links.len()],
+            labels: vec![None; labels],
+            left_out: 0,
+        }
+    }
+
+    /// Takes in a part.
+    fn take(&mut self, part: &Part, placed: Self) {
+        for (at, rect) in part.vertices.iter().zip(placed.boxes) {
+            self.boxes[*at] = rect;
+        }
+        for (at, rect) in part.clusters.iter().zip(placed.clusters) {
+            self.clusters[*at] = rect;
+        }
+        let lines = placed
+            .routes
+            .into_iter()
+            .zip(placed.curves)
+            .zip(placed.labels);
+        for (at, ((route, curve), label)) in part.links.iter().zip(lines) {
+            self.routes[*at] = route;
+            self.curves[*at] = curve;
+            self.labels[*at] = label;
+        }
+        self.left_out += placed.left_out;
+    }
+
+    fn new(plan: &Plan, layout: &Layout, labels: &[Vec<Size>], tightness: f64, width: f64) -> Self {
+        let point = |p: Point| Point::new(p.x / tightness, p.y / tightness);
+        let rect = |r: &Rect| {
+            Rect::new(
+                r.x / tightness,
+                r.y / tightness,
+                r.w / tightness,
+                r.h / tightness,
+            )
+        };
+        let curves: Vec<Route> = layout
+            .routes
+            .iter()
+            .map(|route| Route {
+                start: point(route.start),
+                curves: route.curves.iter().map(|c| c.map(point)).collect(),
+                label: None,
+            })
+            .collect();
+        let mut placed = Self {
+            size: Size::new(layout.size.w / tightness, layout.size.h / tightness),
+            boxes: layout.boxes.iter().map(rect).collect(),
+            clusters: layout.clusters.iter().map(rect).collect(),
+            routes: curves.iter().map(sampled).collect(),
+            curves,
+            labels: vec![None; labels.len()],
+            left_out: 0,
+        };
+        let titles: Vec<Rect> = placed
+            .clusters
+            .iter()
+            .zip(&plan.clusters)
+            .map(|(frame, cluster)| {
+                Rect::new(
+                    frame.x,
+                    frame.y,
+                    cluster.title.w + 1.0,
+                    cluster.title.h + 0.6,
+                )
+            })
+            .collect();
+        placed.set_labels(labels, titles, width);
+        placed
+    }
+
+    /// Places the labels, those of short arrows first.
+    fn set_labels(&mut self, labels: &[Vec<Size>], titles: Vec<Rect>, width: f64) {
+        let mut taken: Vec<Rect> = self.boxes.iter().map(|b| b.grown(0.25)).collect();
+        taken.extend(titles);
+        let tips = self.routes.iter().filter_map(|r| r.last());
+        taken.extend(tips.map(|p| Rect::around(*p, Size::new(1.4, 1.4))));
+        let mut order: Vec<usize> = (0..labels.len()).collect();
+        order.sort_by(|a, b| {
+            length(&self.routes[*a])
+                .total_cmp(&length(&self.routes[*b]))
+                .then(a.cmp(b))
+        });
+        for at in order {
+            let mut tries = labels[at].iter().enumerate();
+            let found = tries.find_map(|(k, size)| Some((self.spot(at, *size, &taken, width)?, k)));
+            self.labels[at] = found;
+            match found {
+                Some((spot, k)) => {
+                    let rect = Rect::around(spot, labels[at][k]);
+                    self.size.h = self.size.h.max(rect.bottom());
+                    self.size.w = self.size.w.max(rect.right());
+                    taken.push(rect.grown(0.1));
+                }
+                None if labels[at].is_empty() => {}
+                None => self.left_out += 1,
+            }
+        }
+    }
+
+    fn spot(&self, at: usize, size: Size, taken: &[Rect], width: f64) -> Option<Point> {
+        let route = &self.routes[at];
+        let mut best: Option<(f64, Point)> = None;
+        for (k, part) in STATIONS.into_iter().enumerate() {
+            let (on, normal) = along(route, part)?;
+            let reach = f64::midpoint(normal.x.abs() * size.w, normal.y.abs() * size.h) + 0.35;
+            for (aside, penalty) in [(0.0, 0.0), (reach, 0.8), (-reach, 0.8)] {
+                let centre = Point::new(on.x + normal.x * aside, on.y + normal.y * aside);
+                let rect = Rect::around(centre, size);
+                let outside = rect.x < 0.0 || rect.y < 0.0 || rect.right() > width;
+                if outside || taken.iter().any(|t| t.overlaps(&rect)) {
+                    continue;
+                }
+                let crossed =
+                    (0..self.routes.len()).filter(|o| *o != at && crosses(&self.routes[*o], &rect));
+                let cost = crossed.count() as f64 * 2.0 + penalty + k as f64 * 0.1;
+                if best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, centre));
+                }
+            }
+        }
+        best.map(|(_, centre)| centre)
+    }
+
+    /// The drawing moved by `dx`, `dy`.
+    pub(crate) fn moved(mut self, dx: f64, dy: f64) -> Self {
+        let point = |p: Point| Point::new(p.x + dx, p.y + dy);
+        for rect in self.boxes.iter_mut().chain(&mut self.clusters) {
+            (rect.x, rect.y) = (rect.x + dx, rect.y + dy);
+        }
+        for route in &mut self.curves {
+            route.start = point(route.start);
+            for curve in &mut route.curves {
+                *curve = curve.map(point);
+            }
+        }
+        for route in &mut self.routes {
+            for p in route {
+                *p = point(*p);
+            }
+        }
+        for (label, _) in self.labels.iter_mut().flatten() {
+            *label = point(*label);
+        }
+        self
+    }
+
+    /// Draws one arrow.
+    pub(crate) fn arrow(
+        &self,
+        canvas: &mut Canvas<'_>,
+        at: usize,
+        color: Color,
+        width: f64,
+        dash: &[f64],
+    ) {
+        let Some(route) = self.curves.get(at).filter(|r| !r.curves.is_empty()) else {
+            return;
+        };
+        let stroke = Stroke {
+            color,
+            width,
+            dash: dash.to_vec(),
+        };
+        let mut steps = vec![Step::Move(route.start)];
+        steps.extend(route.curves.iter().map(|c| Step::Curve(*c)));
+        canvas.path(&steps, Color::NONE, &stroke);
+        let points = &self.routes[at];
+        if let Some(tip) = points.last() {
+            let behind = points.iter().rev().find(|p| distance(**p, *tip) > 0.8);
+            canvas.head(*behind.unwrap_or(&route.start), *tip, 1.2 + width, color);
+        }
+    }
+
+    /// Draws the label of one arrow: the lines of that alternative that found room, centred.
+    pub(crate) fn label(&self, canvas: &mut Canvas<'_>, at: usize, alternatives: &[Vec<String>]) {
+        let Some((centre, k)) = self.labels.get(at).copied().flatten() else {
+            return;
+        };
+        let lines = alternatives.get(k).map_or(&[][..], Vec::as_slice);
+        let line = canvas.sizes.line();
+        let top = centre.y - line * lines.len() as f64 / 2.0;
+        for (k, text) in lines.iter().enumerate() {
+            let y = top + line * (k as f64 + 0.5);
+            canvas.label(centre.x, y, Type::Small, ink::TEXT, text);
+        }
+    }
+}
+
+/// The room that each alternative of a label takes.
+pub(crate) fn rooms(canvas: &Canvas<'_>, alternatives: &[Vec<String>]) -> Vec<Size> {
+    let room = |lines: &Vec<String>| {
+        let widths = lines.iter().map(|l| canvas.width(l, Type::Small));
+        let widest = widths.fold(0.0, f64::max);
+        Size::new(widest + 0.3, canvas.sizes.line() * lines.len() as f64)
+    };
+    alternatives.iter().map(room).collect()
+}
+
+fn sampled(route: &Route) -> Vec<Point> {
+    let mut points = vec![route.start];
+    let mut from = route.start;
+    for [a, b, to] in &route.curves {
+        for k in 1..=PIECES {
+            let t = k as f64 / PIECES as f64;
+            let u = 1.0 - t;
+            let mix = |p: f64, q: f64, r: f64, s: f64| {
+                u * u * u * p + 3.0 * u * u * t * q + 3.0 * u * t * t * r + t * t * t * s
+            };
+            points.push(Point::new(
+                mix(from.x, a.x, b.x, to.x),
+                mix(from.y, a.y, b.y, to.y),
+            ));
+        }
+        from = *to;
+    }
+    points
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    libm::hypot(a.x - b.x, a.y - b.y)
+}
+
+fn length(points: &[Point]) -> f64 {
+    points.windows(2).map(|w| distance(w[0], w[1])).sum()
+}
+
+/// The point at this part of a line, and the direction across it.
+fn along(points: &[Point], part: f64) -> Option<(Point, Point)> {
+    let mut left = length(points) * part;
+    for pair in points.windows(2) {
+        let long = distance(pair[0], pair[1]);
+        if long >= left && long > 0.0 {
+            let (dx, dy) = (
+                (pair[1].x - pair[0].x) / long,
+                (pair[1].y - pair[0].y) / long,
+            );
+            let at = Point::new(pair[0].x + dx * left, pair[0].y + dy * left);
+            return Some((at, Point::new(-dy, dx)));
+        }
+        left -= long;
+    }
+    None
+}
+
+/// Whether a line runs through a rectangle.
+fn crosses(points: &[Point], rect: &Rect) -> bool {
+    points.windows(2).any(|pair| {
+        let touched = Rect::new(
+            pair[0].x.min(pair[1].x),
+            pair[0].y.min(pair[1].y),
+            (pair[0].x - pair[1].x).abs().max(1e-6),
+            (pair[0].y - pair[1].y).abs().max(1e-6),
+        );
+        touched.overlaps(rect)
+    })
+}

@@ -1,0 +1,148 @@
+//! Which rows a figure of lives has and in which order: the staircase, namespaces, what is folded.
+
+use std::collections::BTreeSet;
+
+use super::incidents::{Handover, Incident};
+use super::tracks::Track;
+use crate::base::name::{last_part, namespace};
+use crate::base::time::{Span, Stamp};
+use crate::base::words;
+
+/// Starts at most this share of the mission apart, one in so many, are one burst.
+const BURST: i64 = 66;
+/// Ends are compared on a grid of one in so many parts.
+const END: i64 = 33;
+/// So many rows that live throughout are folded.
+const FEWEST_FOLDED: usize = 3;
+
+/// One row of the figure.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Row {
+    /// The title of a namespace.
+    Space(String),
+    /// A track, by place, with its label; members of a titled namespace are indented.
+    Track(usize, String, bool),
+    /// Tracks that live throughout, by place, and their namespace.
+    Folded(Vec<usize>, String),
+}
+
+impl Row {
+    /// Whether it stands for this track.
+    pub(crate) fn holds(&self, track: usize) -> bool {
+        match self {
+            Self::Space(_) => false,
+            Self::Track(at, ..) => *at == track,
+            Self::Folded(all, _) => all.contains(&track),
+        }
+    }
+}
+
+/// All rows in order. What `incidents` and `handovers` point at stays open.
+pub(crate) fn rows(
+    tracks: &[Track],
+    whole: Span,
+    incidents: &[Incident],
+    handovers: &[Handover],
+) -> Vec<Row> {
+    let marked: BTreeSet<usize> = incidents
+        .iter()
+        .map(|i| i.track)
+        .chain(handovers.iter().flat_map(|h| [h.from, h.to]))
+        .collect();
+    let mut spaces: Vec<(bool, Stamp, &str, Vec<usize>)> = Vec::new();
+    for (at, track) in tracks.iter().enumerate() {
+        let space = namespace(&track.name);
+        match spaces.iter_mut().find(|(.., name, _)| *name == space) {
+            Some((_, start, _, own)) => {
+                *start = (*start).min(track.start());
+                own.push(at);
+            }
+            None => spaces.push((space != "/", track.start(), space, vec![at])),
+        }
+    }
+    spaces.sort_by(|a, b| (a.0, a.1, a.2).cmp(&(b.0, b.1, b.2)));
+    let mut rows = Vec::new();
+    for (_, _, space, own) in spaces {
+        rows.extend(of_space(tracks, whole, &marked, space, own));
+    }
+    rows
+}
+
+fn of_space(
+    tracks: &[Track],
+    whole: Span,
+    marked: &BTreeSet<usize>,
+    space: &str,
+    own: Vec<usize>,
+) -> Vec<Row> {
+    if let [only] = own[..] {
+        let name = tracks[only].name.trim_start_matches('/');
+        return vec![Row::Track(only, name.to_owned(), false)];
+    }
+    let mut rows = vec![Row::Space(space.to_owned())];
+    let is_folded = |at: &usize| !marked.contains(at) && is_throughout(&tracks[*at], whole);
+    let folded: Vec<usize> = own.iter().copied().filter(is_folded).collect();
+    let folded = if folded.len() < FEWEST_FOLDED {
+        Vec::new()
+    } else {
+        folded
+    };
+    let open = own.into_iter().filter(|at| !folded.contains(at));
+    let open = in_order(tracks, whole, open.collect());
+    if !folded.is_empty() {
+        rows.push(Row::Folded(folded, space.to_owned()));
+    }
+    rows.extend(open.into_iter().map(|at| {
+        let label = last_part(&tracks[at].name).to_owned();
+        Row::Track(at, label, true)
+    }));
+    rows
+}
+
+/// Whether a track is there from (nearly) the first moment to the last, without a break or a step.
+fn is_throughout(track: &Track, whole: Span) -> bool {
+    let [life] = track.lives[..] else {
+        return false;
+    };
+    let nanos = whole.nanos();
+    let steady = track.topic.is_none() || track.bars.len() == 1;
+    life.span.start.since(whole.start) <= nanos / 20 && !life.ends && steady
+}
+
+/// By burst of start, then by end, the latest first, then by name.
+fn in_order(tracks: &[Track], whole: Span, mut own: Vec<usize>) -> Vec<usize> {
+    own.sort_by_key(|at| (tracks[*at].start(), *at));
+    let (near, grid) = (whole.nanos() / BURST, (whole.nanos() / END).max(1));
+    let mut bursts: Vec<Vec<usize>> = Vec::new();
+    let mut last: Option<Stamp> = None;
+    for at in own {
+        let start = tracks[at].start();
+        match bursts.last_mut() {
+            Some(burst) if last.is_some_and(|l| start.since(l) <= near) => burst.push(at),
+            _ => bursts.push(vec![at]),
+        }
+        last = Some(start);
+    }
+    let end = |at: usize| {
+        let ends = tracks[at].lives.last().is_some_and(|l| l.ends);
+        ends.then(|| tracks[at].end().since(whole.start) / grid)
+    };
+    // Who never ends comes first.
+    let end = |at: usize| end(at).unwrap_or(i64::MAX);
+    for burst in &mut bursts {
+        burst.sort_by(|a, b| {
+            let late = end(*b).cmp(&end(*a));
+            late.then_with(|| tracks[*a].name.cmp(&tracks[*b].name))
+        });
+    }
+    bursts.concat()
+}
+
+/// What a folded row says: `8 nodes throughout`.
+pub(crate) fn folded_label(tracks: &[Track], all: &[usize]) -> String {
+    let word = match all.first().and_then(|at| tracks[*at].topic) {
+        Some(_) => "topic",
+        None => "node",
+    };
+    format!("{} throughout", words::count(all.len(), word))
+}

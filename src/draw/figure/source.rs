@@ -1,0 +1,191 @@
+//! What a figure is drawn from: the mission, what of it is shown, and whether its phases have names.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::base::name::{is_quiet, last_part};
+use crate::base::time::Span;
+use crate::graph::{EdgeId, NodeId, State, TopicId};
+use crate::mission::Mission;
+use crate::mission::activity::is_hidden_node;
+use crate::mission::ledger::Phase;
+use crate::mission::phases::knows_publishers;
+use crate::view::NameFilter;
+
+/// The mission as figures see it: roles, without housekeeping, recorders and what filters leave out.
+pub(crate) struct Source<'a> {
+    pub(crate) mission: &'a Mission,
+    /// Roles with their nodes.
+    pub(crate) roles: BTreeMap<Arc<str>, Vec<NodeId>>,
+    /// Per topic, whether it is shown.
+    topics: Vec<bool>,
+    /// The phases; none if there is only one.
+    pub(crate) phases: &'a [Phase],
+    /// Whether their names are the user's.
+    pub(crate) is_named: bool,
+}
+
+impl<'a> Source<'a> {
+    /// What passes both filters.
+    pub(crate) fn new(
+        mission: &'a Mission,
+        nodes: &NameFilter,
+        topics: &NameFilter,
+        is_named: bool,
+    ) -> Self {
+        let mut roles: BTreeMap<Arc<str>, Vec<NodeId>> = BTreeMap::new();
+        for (id, node) in (0..).zip(&mission.elements.nodes) {
+            if !is_hidden_node(node) && nodes.passes(node.name.as_str()) {
+                roles.entry(Arc::clone(&node.role)).or_default().push(id);
+            }
+        }
+        let shown = mission.elements.topics.iter().map(|t| {
+            let name = t.name.as_str();
+            !is_quiet(name) && topics.passes(name)
+        });
+        let phases = &mission.ledger.phases[..];
+        Self {
+            mission,
+            roles,
+            topics: shown.collect(),
+            phases: if phases.len() > 1 { phases } else { &[] },
+            is_named,
+        }
+    }
+
+    /// The time of the whole.
+    pub(crate) fn span(&self) -> Span {
+        let whole = self.mission.activity.span();
+        if whole.nanos() > 0 {
+            whole
+        } else {
+            self.mission.span
+        }
+    }
+
+    /// Whether at least half of the messages have a known publisher; else rows are topics.
+    pub(crate) fn knows_publishers(&self) -> bool {
+        knows_publishers(&self.mission.elements, &self.mission.activity)
+    }
+
+    pub(crate) fn shows(&self, topic: TopicId) -> bool {
+        self.topics.get(topic as usize) == Some(&true)
+    }
+
+    /// Whether everybody is on this topic, so that arrows and lists of it say nothing: transforms, diagnostics, bonds.
+    pub(crate) fn is_hub(&self, topic: TopicId) -> bool {
+        let last = last_part(self.topic(topic));
+        matches!(last, "tf" | "tf_static" | "bond") || last.starts_with("diagnostics")
+    }
+
+    pub(crate) fn topic(&self, id: TopicId) -> &str {
+        let topic = self.mission.elements.topics.get(id as usize);
+        topic.map_or("", |t| t.name.as_str())
+    }
+
+    /// The topics that are shown.
+    pub(crate) fn shown_topics(&self) -> impl Iterator<Item = TopicId> + '_ {
+        (0..)
+            .zip(&self.topics)
+            .filter(|(_, is)| **is)
+            .map(|(id, _)| id)
+    }
+
+    /// The publications of some nodes on shown topics.
+    pub(crate) fn publications(&self, nodes: &[NodeId]) -> Vec<EdgeId> {
+        let all = (0..).zip(&self.mission.elements.publishes);
+        let own = all.filter(|(_, e)| nodes.contains(&e.node) && self.shows(e.topic));
+        own.map(|(id, _)| id).collect()
+    }
+
+    /// When a publication carried messages. One that is ever latched stands for its node by its message, and is not
+    /// busy: it has no such time.
+    pub(crate) fn sending(&self, edge: EdgeId) -> Vec<Span> {
+        let activity = &self.mission.activity;
+        let states = activity.cells.iter().map(|cell| {
+            let found = cell.graph.publishes.binary_search_by_key(&edge, |e| e.id);
+            found.ok().map(|at| cell.graph.publishes[at].state)
+        });
+        let states: Vec<Option<State>> = states.collect();
+        if states.contains(&Some(State::Latched)) {
+            return Vec::new();
+        }
+        match activity.sending.publishes.get(edge as usize) {
+            Some(exact) if !activity.sending.publishes.is_empty() => exact.clone(),
+            _ => self.runs(states.iter().map(|s| *s == Some(State::Active))),
+        }
+    }
+
+    /// When a topic carried messages.
+    pub(crate) fn topic_sending(&self, topic: TopicId) -> Vec<Span> {
+        let activity = &self.mission.activity;
+        if let Some(exact) = activity.sending.topics.get(topic as usize) {
+            return exact.clone();
+        }
+        let counts = activity.cells.iter().map(|cell| {
+            let found = cell.graph.topics.binary_search_by_key(&topic, |t| t.id);
+            found.is_ok_and(|at| cell.graph.topics[at].count > 0)
+        });
+        self.runs(counts)
+    }
+
+    /// Messages of a publication per cell.
+    pub(crate) fn sent(&self, edge: EdgeId) -> Vec<f64> {
+        let cells = self.mission.activity.cells.iter();
+        let count = cells.map(|cell| {
+            let found = cell.graph.publishes.binary_search_by_key(&edge, |e| e.id);
+            let state = found.ok().map(|at| &cell.graph.publishes[at]);
+            let seconds = cell.span.nanos() as f64 / 1e9;
+            state.map_or(0.0, |s| match (s.count, s.hz) {
+                (Some(count), _) => count as f64,
+                (None, Some(hz)) => hz * seconds,
+                (None, None) => 0.0,
+            })
+        });
+        count.collect()
+    }
+
+    /// Messages of a topic per cell.
+    pub(crate) fn topic_sent(&self, topic: TopicId) -> Vec<f64> {
+        let cells = self.mission.activity.cells.iter();
+        let count = cells.map(|cell| {
+            let found = cell.graph.topics.binary_search_by_key(&topic, |t| t.id);
+            found.map_or(0.0, |at| cell.graph.topics[at].count as f64)
+        });
+        count.collect()
+    }
+
+    /// The stretches of consecutive cells for which `is` holds.
+    pub(crate) fn runs(&self, is: impl Iterator<Item = bool>) -> Vec<Span> {
+        let mut runs: Vec<Span> = Vec::new();
+        let mut before = false;
+        for (cell, is) in self.mission.activity.cells.iter().zip(is) {
+            match runs.last_mut() {
+                Some(run) if is && before => run.end = cell.span.end,
+                _ if is => runs.push(cell.span),
+                _ => {}
+            }
+            before = is;
+        }
+        runs
+    }
+
+    /// The number of the phase, 0.., that a moment lies in.
+    pub(crate) fn phase_at(&self, at: crate::base::time::Stamp) -> usize {
+        let next = self.phases.partition_point(|p| p.span.start <= at);
+        next.saturating_sub(1)
+    }
+}
+
+/// Spans put together where they overlap or are at most `gap` nanoseconds apart.
+pub(crate) fn merged(mut spans: Vec<Span>, gap: i64) -> Vec<Span> {
+    spans.sort_unstable_by_key(|s| (s.start, s.end));
+    let mut out: Vec<Span> = Vec::new();
+    for span in spans {
+        match out.last_mut() {
+            Some(last) if span.start.since(last.end) <= gap => last.end = last.end.max(span.end),
+            _ => out.push(span),
+        }
+    }
+    out
+}

@@ -1,0 +1,451 @@
+//! Steps: one panel per phase boundary, only what began, what ended, what changed hands, and who is linked to it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::band::{clock, title};
+use super::canvas::{Canvas, PX_PER_MM, Type, ink};
+use super::groups::groups;
+use super::incidents::configurations;
+use super::notes::{Item, flow, sentence};
+use super::page::{Sheet, nothing};
+use super::panel::{Fate, INSIDE, Look, Panel, paint, type_of};
+use super::place::{Placed, place, rooms};
+use super::talks::{Talk, Talks};
+use super::tracks::{Track, of_nodes};
+use super::{MOST_HEIGHT, Rows};
+use crate::base::error::{Error, Result};
+use crate::base::geometry::{Rect, Size};
+use crate::base::name::{last_part, namespace};
+use crate::base::words;
+use crate::draw::scene::Scene;
+use crate::layout::{Link, Outline, Plan, Vertex, engine};
+use crate::mission::phases::{Configuration, cells_of};
+
+/// How many steps are shown unless some are asked for.
+const SHOWN: usize = 6;
+/// More changed nodes than this are drawn as groups.
+const ONE_BY_ONE: usize = 8;
+/// The most names in a box.
+const NAMED: usize = 4;
+/// Room between two panels.
+const BETWEEN: f64 = 2.0;
+
+/// What panels are made from.
+struct Studio<'s> {
+    sheet: &'s Sheet<'s>,
+    tracks: Vec<Track>,
+    talks: Talks<'s>,
+    found: Vec<Configuration>,
+}
+
+/// The figure.
+pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
+    let tracks = of_nodes(sheet.source);
+    if tracks.is_empty() {
+        return Err(nothing());
+    }
+    if sheet.source.phases.is_empty() {
+        return Err(Error::usage(
+            "this mission has one phase, so there is no step to show",
+            "`--figure lives` shows what there is; `--phases FILE` cuts by your own times",
+        ));
+    }
+    let studio = Studio {
+        talks: Talks::new(sheet.source, &tracks),
+        found: configurations(sheet.source),
+        tracks,
+        sheet,
+    };
+    let mut chosen = studio.chosen()?;
+    loop {
+        let panels: Option<Vec<Panel>> = chosen.iter().map(|k| studio.panel(*k)).collect();
+        let Some(panels) = panels else {
+            return Err(Error::usage(
+                format!("a step is wider than {} mm", sheet.options.width_mm),
+                "`--rows groups` or a larger `--width`, such as `181mm`, would do",
+            ));
+        };
+        let left = sheet.source.phases.len() - 1 - chosen.len();
+        let scene = studio.page(&panels, left);
+        if scene.size.h <= MOST_HEIGHT * PX_PER_MM {
+            return Ok((scene, Vec::new()));
+        }
+        if chosen.len() == 1 || !sheet.options.steps.is_empty() {
+            return Err(Error::usage(
+                format!("these steps are higher than {MOST_HEIGHT} mm"),
+                "`--steps 3` shows fewer of them, `--rows groups` makes them smaller, `--ns-filter` leaves nodes out",
+            ));
+        }
+        studio.drop_least(&mut chosen);
+    }
+}
+
+impl Studio<'_> {
+    /// How much a boundary changes.
+    fn weight(&self, k: usize) -> usize {
+        let phase = &self.sheet.source.phases[k];
+        (phase.nodes_added + phase.nodes_removed) as usize * 4 + self.handed(k).len()
+    }
+
+    /// The boundaries to show, by the place of the phase that begins.
+    fn chosen(&self) -> Result<Vec<usize>> {
+        let many = self.sheet.source.phases.len();
+        let asked = &self.sheet.options.steps;
+        if let Some(wrong) = asked.iter().find(|n| **n < 2 || **n > many) {
+            return Err(Error::usage(
+                format!("no step leads into phase {wrong}"),
+                format!("phases are counted from 1 to {many}; steps lead into 2 to {many}"),
+            ));
+        }
+        if !asked.is_empty() {
+            return Ok(asked.iter().map(|n| n - 1).collect());
+        }
+        let mut all: Vec<usize> = (1..many).collect();
+        all.sort_by_key(|k| (std::cmp::Reverse(self.weight(*k)), *k));
+        all.truncate(SHOWN);
+        all.sort_unstable();
+        Ok(all)
+    }
+
+    fn drop_least(&self, chosen: &mut Vec<usize>) {
+        let least = chosen
+            .iter()
+            .copied()
+            .min_by_key(|k| (self.weight(*k), std::cmp::Reverse(*k)));
+        chosen.retain(|k| Some(*k) != least);
+    }
+
+    /// Topics that others send from phase `k` on: topic, before, after.
+    fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>)> {
+        let (before, after) = (&self.found[k - 1].senders, &self.found[k].senders);
+        let changed = after.iter().filter_map(|(topic, to)| {
+            let from = before.get(topic).filter(|from| *from != to)?;
+            let shown = self.sheet.source.shows(*topic) && !self.sheet.source.is_hub(*topic);
+            shown.then(|| (*topic, Arc::clone(from), Arc::clone(to)))
+        });
+        changed.collect()
+    }
+
+    fn columns(&self) -> usize {
+        match self.sheet.options.width_mm {
+            w if w >= 150.0 => 3,
+            w if w >= 110.0 => 2,
+            _ => 1,
+        }
+    }
+
+    fn panel_width(&self) -> f64 {
+        let columns = self.columns() as f64;
+        (self.sheet.options.width_mm - BETWEEN * (columns - 1.0)) / columns
+    }
+
+    fn track(&self, name: &str) -> Option<usize> {
+        self.tracks.iter().position(|t| &*t.name == name)
+    }
+
+    /// The panel of the boundary into phase `k`; `None` where it is too wide.
+    fn panel(&self, k: usize) -> Option<Panel> {
+        let source = self.sheet.source;
+        let canvas = self.sheet.canvas();
+        let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
+        let place_of = |name: &Arc<str>| self.track(name);
+        let began: BTreeSet<usize> = after.difference(before).filter_map(place_of).collect();
+        let ended: BTreeSet<usize> = before.difference(after).filter_map(place_of).collect();
+        let handed = self.handed(k);
+        let partners = handed.iter().flat_map(|(_, from, to)| [from, to]);
+        let partners: BTreeSet<usize> = partners
+            .filter_map(place_of)
+            .filter(|at| !began.contains(at) && !ended.contains(at))
+            .collect();
+        let mut boxes = self.boxes(&[
+            (Fate::Began, &began),
+            (Fate::Ended, &ended),
+            (Fate::ChangedHands, &partners),
+        ]);
+        let mut vertex: Vec<Option<usize>> = vec![None; self.tracks.len()];
+        for (k, (_, members)) in boxes.iter().enumerate() {
+            for at in members {
+                vertex[*at] = Some(k);
+            }
+        }
+        let changed = boxes.len();
+        let linked = self.neighbours(k, &mut boxes, &mut vertex, (before, after));
+        let fates: Vec<Fate> = boxes.iter().map(|(fate, _)| *fate).collect();
+        let talks = self.talks(k, &vertex, &fates, &handed);
+        let looks: Vec<Look> = boxes
+            .iter()
+            .enumerate()
+            .map(|(at, (fate, members))| {
+                self.look(
+                    *fate,
+                    members,
+                    (at >= changed).then(|| linked.get(&at).copied()).flatten(),
+                )
+            })
+            .collect();
+        let phase = &source.phases[k];
+        let at = clock(phase.span.start.since(source.span().start));
+        let mut notes = Vec::new();
+        for (topic, from, to) in &handed {
+            let text = format!(
+                "{}: {} → {}",
+                last_part(source.topic(*topic)),
+                last_part(from),
+                last_part(to)
+            );
+            notes.push((ink::CHANGED, text));
+        }
+        let drawn: BTreeSet<usize> = boxes.iter().flat_map(|(_, m)| m.iter().copied()).collect();
+        let there = before
+            .union(after)
+            .filter_map(place_of)
+            .filter(|at| !drawn.contains(at))
+            .count();
+        if there > 0 {
+            notes.push((
+                ink::QUIET,
+                format!("{} not drawn", words::count(there, "node")),
+            ));
+        }
+        let labels: Vec<Vec<Vec<String>>> =
+            talks.iter().map(|(t, _)| t.labels(source, 1)).collect();
+        let placed = self.placed(&canvas, &looks, &talks, &labels)?;
+        let high = placed.size.h;
+        let line = canvas.sizes.line();
+        let heading = (
+            format!("{k} → {}", k + 1),
+            format!("{at} {}", title(source, k)),
+        );
+        Some(Panel {
+            heading,
+            looks,
+            talks,
+            labels,
+            height: INSIDE * 2.0
+                + canvas.sizes.pitch()
+                + 0.6
+                + high
+                + 0.8
+                + line * notes.len() as f64,
+            placed: Some(placed),
+            notes,
+        })
+    }
+
+    /// The changed nodes: one by one if they are few, else by groups.
+    fn boxes(&self, kinds: &[(Fate, &BTreeSet<usize>)]) -> Vec<(Fate, Vec<usize>)> {
+        let many: usize = kinds.iter().map(|(_, own)| own.len()).sum();
+        let grouped = match self.sheet.options.rows {
+            Some(rows) => rows == Rows::Groups,
+            None => many > ONE_BY_ONE,
+        };
+        let mut all = Vec::new();
+        for (fate, own) in kinds {
+            if !grouped {
+                all.extend(own.iter().map(|at| (*fate, vec![*at])));
+                continue;
+            }
+            let mut spaces: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+            for at in *own {
+                spaces
+                    .entry(namespace(&self.tracks[*at].name))
+                    .or_default()
+                    .push(*at);
+            }
+            all.extend(spaces.into_values().map(|members| (*fate, members)));
+        }
+        all
+    }
+
+    /// Adds the groups that are linked to what changed; answers by box the member that is linked most.
+    fn neighbours(
+        &self,
+        k: usize,
+        boxes: &mut Vec<(Fate, Vec<usize>)>,
+        vertex: &mut [Option<usize>],
+        names: (&BTreeSet<Arc<str>>, &BTreeSet<Arc<str>>),
+    ) -> BTreeMap<usize, usize> {
+        let source = self.sheet.source;
+        let own: Vec<Option<usize>> = (0..self.tracks.len()).map(Some).collect();
+        let mut links: BTreeMap<usize, usize> = BTreeMap::new();
+        for (phase, names, fate) in [(k - 1, names.0, Fate::Ended), (k, names.1, Fate::Began)] {
+            let range = cells_of(&source.mission.activity, source.phases[phase].span);
+            for talk in self.talks.between(&own, range, true) {
+                for (a, b) in [(talk.from, talk.to), (talk.to, talk.from)] {
+                    let changes = vertex[a].is_some_and(|v| boxes[v].0 == fate);
+                    let stays = vertex[b].is_none() && names.contains(&self.tracks[b].name);
+                    if changes && stays {
+                        *links.entry(b).or_default() += 1;
+                    }
+                }
+            }
+        }
+        let mut linked = BTreeMap::new();
+        for group in groups(source, &self.tracks) {
+            let most = group
+                .members
+                .iter()
+                .filter_map(|at| links.get(at).map(|n| (*n, std::cmp::Reverse(*at))))
+                .max();
+            let Some((_, std::cmp::Reverse(best))) = most else {
+                continue;
+            };
+            let free: Vec<usize> = group
+                .members
+                .iter()
+                .copied()
+                .filter(|at| vertex[*at].is_none())
+                .collect();
+            for at in &free {
+                vertex[*at] = Some(boxes.len());
+            }
+            linked.insert(boxes.len(), best);
+            boxes.push((Fate::Neighbour, free));
+        }
+        linked
+    }
+
+    /// The arrows at what changed: those of the phase before for what ended, of the phase after for what began; and
+    /// those of the topics that changed hands.
+    fn talks(
+        &self,
+        k: usize,
+        vertex: &[Option<usize>],
+        fates: &[Fate],
+        handed: &[(u32, Arc<str>, Arc<str>)],
+    ) -> Vec<(Talk, Fate)> {
+        let source = self.sheet.source;
+        let mut all = Vec::new();
+        for (phase, fate) in [(k - 1, Fate::Ended), (k, Fate::Began)] {
+            let range = cells_of(&source.mission.activity, source.phases[phase].span);
+            for mut talk in self.talks.between(vertex, range, true) {
+                let ends = [fates[talk.from], fates[talk.to]];
+                if ends.contains(&fate) {
+                    all.push((talk, fate));
+                    continue;
+                }
+                if !ends.contains(&Fate::ChangedHands)
+                    || ends.contains(&Fate::Began)
+                    || ends.contains(&Fate::Ended)
+                {
+                    continue;
+                }
+                // Of a partner only what it hands over, or takes over.
+                talk.topics.retain(|(topic, _)| {
+                    let moved = handed.iter().find(|(t, ..)| t == topic);
+                    moved.is_some_and(|(_, from, to)| {
+                        let sender = if fate == Fate::Ended { from } else { to };
+                        self.track(sender).and_then(|at| vertex[at]) == Some(talk.from)
+                    })
+                });
+                if !talk.topics.is_empty() {
+                    all.push((talk, fate));
+                }
+            }
+        }
+        all
+    }
+
+    fn look(&self, fate: Fate, members: &[usize], named: Option<usize>) -> Look {
+        let name = |at: usize| last_part(&self.tracks[at].name).to_owned();
+        let lines = match (named, members) {
+            (Some(first), members) if members.len() > 1 => {
+                vec![format!("{} +{}", name(first), members.len() - 1)]
+            }
+            (_, members) => {
+                let mut lines: Vec<String> =
+                    members.iter().take(NAMED).map(|at| name(*at)).collect();
+                if members.len() > NAMED {
+                    lines.push(format!("+{} more", members.len() - NAMED));
+                }
+                lines
+            }
+        };
+        let space = members
+            .first()
+            .map_or("", |at| namespace(&self.tracks[*at].name));
+        Look {
+            fate,
+            space: space.to_owned(),
+            lines,
+        }
+    }
+
+    fn placed(
+        &self,
+        canvas: &Canvas<'_>,
+        looks: &[Look],
+        talks: &[(Talk, Fate)],
+        labels: &[Vec<Vec<String>>],
+    ) -> Option<Placed> {
+        let vertex = |look: &Look| {
+            let of = type_of(look.fate);
+            let names = look.lines.iter().map(|l| canvas.width(l, of));
+            let widest = names.fold(canvas.width(&look.space, Type::Small), f64::max);
+            let rows = look.lines.len() as f64;
+            Vertex {
+                size: Size::new(widest + 2.0, canvas.sizes.line() * (rows + 1.0) + 0.8),
+                outline: Outline::Box,
+                cluster: None,
+            }
+        };
+        let link = |(talk, _): &(Talk, Fate)| Link {
+            from: talk.from,
+            to: talk.to,
+            label: None,
+        };
+        let plan = Plan {
+            vertices: looks.iter().map(vertex).collect(),
+            links: talks.iter().map(link).collect(),
+            clusters: Vec::new(),
+        };
+        let rooms: Vec<Vec<Size>> = labels.iter().map(|l| rooms(canvas, l)).collect();
+        // Badges stand out of their boxes.
+        let width = self.panel_width() - 2.0 * INSIDE - 1.6;
+        place(&plan, &rooms, width, engine("layered").ok()?)
+    }
+
+    /// All panels in columns, in order of time, and what is left out.
+    fn page(&self, panels: &[Panel], left: usize) -> Scene {
+        let sheet = self.sheet;
+        let mut canvas = sheet.canvas();
+        let (columns, wide) = (self.columns(), self.panel_width());
+        // Each panel into the column that is shortest so far, so that high ones leave no holes.
+        let mut ends = vec![0.1_f64; columns];
+        for (at, panel) in panels.iter().enumerate() {
+            let shortest = (0..columns).min_by(|a, b| ends[*a].total_cmp(&ends[*b]));
+            let column = shortest.unwrap_or(0);
+            canvas.begin(&format!("step-{}", at + 1));
+            let x = (wide + BETWEEN) * column as f64;
+            let rect = Rect::new(x + 0.1, ends[column], wide - 0.2, panel.height);
+            paint(&mut canvas, panel, rect);
+            ends[column] += panel.height + 1.2;
+        }
+        let y = ends.into_iter().fold(0.0, f64::max);
+        canvas.begin("notes");
+        let mut items: Vec<Item> = Vec::new();
+        if !sheet.options.is_bare {
+            let text = "+ solid: began. − dashed: ended. Double: its topic changed hands. Thin: who is linked to them.";
+            items.push(sentence(ink::QUIET, text));
+        }
+        let lost: usize = panels
+            .iter()
+            .filter_map(|p| p.placed.as_ref())
+            .map(|p| p.left_out)
+            .sum();
+        if lost > 0 {
+            let text = format!("{} left out.", words::count(lost, "topic name"));
+            items.push(sentence(ink::QUIET, text));
+        }
+        if left > 0 {
+            let text = format!("{} left out.", words::count(left, "smaller step"));
+            items.push(sentence(ink::QUIET, text));
+        }
+        let y = flow(&mut canvas, sheet.options.width_mm, y - 0.5, &items);
+        canvas.into_scene(
+            Size::new(sheet.options.width_mm, y + 0.3),
+            sheet.title("Steps"),
+        )
+    }
+}

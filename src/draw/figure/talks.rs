@@ -1,0 +1,186 @@
+//! Who talks to whom: arrows from publisher to subscriber, one per pair, with the topics on it.
+
+use std::collections::BTreeMap;
+
+use super::source::Source;
+use super::tracks::Track;
+use crate::base::name::last_part;
+use crate::base::words;
+use crate::evidence::Degree;
+use crate::graph::{EdgeState, TopicId};
+
+/// All topics from one box to another.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Talk {
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    /// With their rates while they are sent, the fastest first.
+    pub(crate) topics: Vec<(TopicId, f64)>,
+    /// Whether all of them are known by inference only.
+    pub(crate) is_inferred: bool,
+}
+
+impl Talk {
+    /// The rate of all topics.
+    pub(crate) fn hz(&self) -> f64 {
+        self.topics.iter().map(|(_, hz)| hz).sum()
+    }
+
+    /// What a label may say, the best first: the fastest `most` topics and how many more, one of them on two lines, on
+    /// one line.
+    pub(crate) fn labels(&self, source: &Source<'_>, most: usize) -> Vec<Vec<String>> {
+        let mut names: Vec<String> = Vec::new();
+        for (topic, _) in &self.topics {
+            let name = words::shorten(last_part(source.topic(*topic)), LONGEST).into_owned();
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        let lines = |most: usize| {
+            let mut lines: Vec<String> = names.iter().take(most).cloned().collect();
+            if names.len() > most {
+                lines.push(format!("+{}", names.len() - most));
+            }
+            lines
+        };
+        let mut all: Vec<Vec<String>> = (1..=most).rev().map(lines).collect();
+        all.push(vec![lines(1).join(" ")]);
+        all.dedup();
+        all
+    }
+}
+
+/// The longest name on an arrow, in characters.
+const LONGEST: usize = 22;
+
+/// The presence of an edge, cell by cell.
+struct Heard {
+    track: usize,
+    topic: TopicId,
+    cells: Vec<bool>,
+    degree: Degree,
+    hz: f64,
+}
+
+/// Every edge of the tracks, so that talks of any stretch can be told.
+pub(crate) struct Talks<'a> {
+    source: &'a Source<'a>,
+    sends: Vec<Heard>,
+    hears: Vec<Heard>,
+}
+
+impl<'a> Talks<'a> {
+    pub(crate) fn new(source: &'a Source<'a>, tracks: &[Track]) -> Self {
+        let elements = &source.mission.elements;
+        let mut track_of = vec![None; elements.nodes.len()];
+        for (at, track) in tracks.iter().enumerate() {
+            for node in &track.nodes {
+                if let Some(of) = track_of.get_mut(*node as usize) {
+                    *of = Some(at);
+                }
+            }
+        }
+        let cells = &source.mission.activity.cells;
+        let heard = |edges: &[crate::graph::Edge],
+                     states: &dyn Fn(usize) -> &'a [EdgeState],
+                     sent: bool| {
+            let mut all: Vec<Option<Heard>> = (0..)
+                .zip(edges)
+                .map(|(id, edge)| {
+                    let shown = source.shows(edge.topic) && !source.is_hub(edge.topic);
+                    let track = track_of.get(edge.node as usize).copied().flatten();
+                    track.filter(|_| shown).map(|track| Heard {
+                        track,
+                        topic: edge.topic,
+                        cells: vec![false; cells.len()],
+                        degree: Degree::Declared,
+                        hz: if sent { rate(source, id) } else { 0.0 },
+                    })
+                })
+                .collect();
+            for at in 0..cells.len() {
+                for state in states(at) {
+                    if let Some(Some(heard)) = all.get_mut(state.id as usize) {
+                        heard.cells[at] = true;
+                        heard.degree = heard.degree.min(state.degree);
+                    }
+                }
+            }
+            all.into_iter().flatten().collect::<Vec<Heard>>()
+        };
+        Self {
+            source,
+            sends: heard(&elements.publishes, &|at| &cells[at].graph.publishes, true),
+            hears: heard(
+                &elements.subscribes,
+                &|at| &cells[at].graph.subscribes,
+                false,
+            ),
+        }
+    }
+
+    /// The talks between boxes, `vertex` being the box of each track, that hold in at least one cell of `range`, or in
+    /// half of them.
+    pub(crate) fn between(
+        &self,
+        vertex: &[Option<usize>],
+        range: (usize, usize),
+        is_majority: bool,
+    ) -> Vec<Talk> {
+        let least = if is_majority {
+            (range.1 - range.0).div_ceil(2).max(1)
+        } else {
+            1
+        };
+        let mut all: BTreeMap<(usize, usize), (BTreeMap<TopicId, f64>, bool)> = BTreeMap::new();
+        for send in &self.sends {
+            for hear in self.hears.iter().filter(|h| h.topic == send.topic) {
+                let ends = (
+                    vertex.get(send.track).copied().flatten(),
+                    vertex.get(hear.track).copied().flatten(),
+                );
+                let (Some(from), Some(to)) = ends else {
+                    continue;
+                };
+                let both = send.cells[range.0..range.1]
+                    .iter()
+                    .zip(&hear.cells[range.0..range.1]);
+                if from == to || both.filter(|(a, b)| **a && **b).count() < least {
+                    continue;
+                }
+                let inferred = send.degree.max(hear.degree) >= Degree::Inferred;
+                let (topics, all_inferred) =
+                    all.entry((from, to)).or_insert((BTreeMap::new(), true));
+                let hz = topics.entry(send.topic).or_insert(0.0);
+                *hz = hz.max(send.hz);
+                *all_inferred &= inferred;
+            }
+        }
+        all.into_iter()
+            .map(|((from, to), (topics, is_inferred))| {
+                let mut topics: Vec<(TopicId, f64)> = topics.into_iter().collect();
+                topics.sort_by(|a, b| {
+                    b.1.total_cmp(&a.1)
+                        .then_with(|| self.source.topic(a.0).cmp(self.source.topic(b.0)))
+                });
+                Talk {
+                    from,
+                    to,
+                    topics,
+                    is_inferred,
+                }
+            })
+            .collect()
+    }
+}
+
+/// Messages per second of a publication while it sends; 0 where that is not known.
+fn rate(source: &Source<'_>, edge: u32) -> f64 {
+    let count: f64 = source.sent(edge).iter().sum();
+    let seconds = source
+        .sending(edge)
+        .iter()
+        .map(|s| s.nanos() as f64 / 1e9)
+        .sum::<f64>();
+    if seconds > 1e-3 { count / seconds } else { 0.0 }
+}

@@ -1,0 +1,115 @@
+//! A figure for `LaTeX`: the line that includes it, and a caption that says what is drawn.
+
+use super::band::{clock, title};
+use super::source::Source;
+use super::{Figure, Kind, Options};
+use crate::base::words;
+
+/// The caption: what is drawn, the phases with their times, bag and length, the legend in words.
+pub(crate) fn caption(source: &Source<'_>, options: &Options, remarks: &[String]) -> String {
+    let mut parts = vec![what(options.kind).to_owned()];
+    if !source.phases.is_empty() {
+        let start = source.span().start;
+        let told = source.phases.iter().enumerate().map(|(k, phase)| {
+            let at = clock(phase.span.start.since(start));
+            format!("{} {} from {at}", k + 1, escaped(&title(source, k)))
+        });
+        let told: Vec<String> = told.collect();
+        parts.push(format!("Phases: {}.", told.join("; ")));
+    }
+    if let Some(bag) = source.mission.bags.first() {
+        let length = words::duration(source.span().nanos());
+        let name = escaped(&words::visible(&bag.name));
+        parts.push(format!(
+            "Bag \\texttt{{{name}}}, {length}; bagreel {}.",
+            env!("CARGO_PKG_VERSION")
+        ));
+    }
+    if options.is_bare {
+        parts.push(legend(options.kind).to_owned());
+    }
+    parts.extend(remarks.iter().map(|r| format!("{}.", escaped(&capital(r)))));
+    parts.join(" ")
+}
+
+fn what(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Lives => "What was alive when, how busily it sent, and what changed.",
+        Kind::Map => "Who talks to whom, and in which phases.",
+        Kind::Steps => {
+            "The reconfigurations one after the other: what began, what ended, what changed hands."
+        }
+    }
+}
+
+fn legend(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Lives => {
+            "Bars: it sends, as high as its rate against the row's highest; thin lines: silent, dashed: alive by inference; \
+             tick: starts; cross: ends; arrows from a dot: a topic changes hands; circled letters: returns and steps of rates."
+        }
+        Kind::Map => {
+            "Numbers: the phases that a node lives in, none for all; arrows: topics, thicker for more messages per second, dashed \
+             if inferred; dashed frames: nodes without a known partner."
+        }
+        Kind::Steps => {
+            "Solid with plus: began; dashed with minus: ended; double frame: a topic changed hands; thin: their neighbours."
+        }
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(chars).collect()
+    })
+}
+
+/// Text in which `LaTeX` sees no command; signs of ours become theirs.
+fn escaped(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '\\' => out.push_str("\\textbackslash{}"),
+            '{' | '}' | '$' | '&' | '#' | '%' | '_' => {
+                out.push('\\');
+                out.push(c);
+            }
+            '~' => out.push_str("\\textasciitilde{}"),
+            '^' => out.push_str("\\textasciicircum{}"),
+            '−' => out.push_str("$-$"),
+            '→' => out.push_str("$\\rightarrow$"),
+            '←' => out.push_str("$\\leftarrow$"),
+            '\u{2026}' => out.push_str("\\ldots{}"),
+            '<' => out.push_str("\\textless{}"),
+            '>' => out.push_str("\\textgreater{}"),
+            _ => out.push(c),
+        }
+    }
+    out
+}
+
+/// The file that includes `picture`, a file name.
+pub(crate) fn file(figure: &Figure, picture: &str, options: &Options) -> String {
+    let star = if options.width_mm > 120.0 { "*" } else { "" };
+    format!(
+        "% Written by bagreel. Needs \\usepackage{{graphicx}}.\n\\begin{{figure{star}}}\n  \\centering\n  \
+         \\includegraphics{{{picture}}}\n  \\caption{{{}}}\n  \\label{{fig:{}}}\n\\end{{figure{star}}}\n",
+        figure.caption,
+        options.kind.word()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_no_commands() {
+        assert_eq!(
+            escaped("/a_b%{x}\\input"),
+            "/a\\_b\\%\\{x\\}\\textbackslash{}input"
+        );
+        assert_eq!(escaped("(+4 −3)"), "(+4 $-$3)");
+    }
+}

@@ -1,0 +1,253 @@
+//! The rows of a figure of lives: when each node or topic was there, when it sent and how busily.
+
+use std::sync::Arc;
+
+use super::levels::levels;
+use super::source::{Source, merged};
+use crate::base::time::{Span, Stamp};
+use crate::evidence::Degree;
+use crate::graph::{EdgeId, NodeId, TopicId};
+
+/// A silence below this, in nanoseconds or one in so many parts of the mission, does not interrupt a bar.
+const SILENCE: (i64, i64) = (4_000_000_000, 83);
+/// A step of a rate costs one octave held for one part in so many of the mission.
+const STEP: f64 = 20.0;
+/// A step holds for at least one part in so many.
+const SHORTEST_STEP: usize = 25;
+/// Who is first seen within so many nanoseconds, or one part in so many of the mission, was there before.
+const PRESENT: (i64, i64) = (1_000_000_000, 330);
+/// Who ends in the last fiftieth was cut off by the recording.
+const CUT: i64 = 50;
+/// So many messages make a rate; cells are put together until they hold them.
+const ENOUGH: f64 = 6.0;
+
+/// One life of a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Life {
+    pub(crate) span: Span,
+    /// Whether it began during the recording.
+    pub(crate) begins: bool,
+    /// Whether it ended during the recording.
+    pub(crate) ends: bool,
+    /// Whether it is known by inference only.
+    pub(crate) is_inferred: bool,
+}
+
+/// A stretch of sending at one rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bar {
+    pub(crate) span: Span,
+    /// Its share of the row's highest rate, above 0 to 1.
+    pub(crate) share: f64,
+}
+
+/// One row.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Track {
+    /// The full name: a role, or a topic.
+    pub(crate) name: Arc<str>,
+    pub(crate) nodes: Vec<NodeId>,
+    pub(crate) topic: Option<TopicId>,
+    pub(crate) lives: Vec<Life>,
+    pub(crate) bars: Vec<Bar>,
+    /// Messages per second while it sends; `None` where it never does, or nobody knows.
+    pub(crate) hz: Option<f64>,
+}
+
+impl Track {
+    pub(crate) fn start(&self) -> Stamp {
+        self.lives.first().map_or(Stamp::MAX, |l| l.span.start)
+    }
+
+    pub(crate) fn end(&self) -> Stamp {
+        self.lives.last().map_or(Stamp::MIN, |l| l.span.end)
+    }
+}
+
+/// A row per role.
+pub(crate) fn of_nodes(source: &Source<'_>) -> Vec<Track> {
+    let roles = source.roles.iter();
+    let tracks = roles.map(|(role, nodes)| node(source, role, nodes));
+    tracks.filter(|t| !t.lives.is_empty()).collect()
+}
+
+/// A row per topic that carried a message.
+pub(crate) fn of_topics(source: &Source<'_>) -> Vec<Track> {
+    let tracks = source.shown_topics().map(|t| topic(source, t));
+    tracks.filter(|t| !t.lives.is_empty()).collect()
+}
+
+fn node(source: &Source<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
+    let edges = source.publications(nodes);
+    let whole = source.span();
+    let each: Vec<(EdgeId, Vec<Span>)> = edges.iter().map(|e| (*e, source.sending(*e))).collect();
+    let spans = each.iter().flat_map(|(_, s)| s.iter().copied()).collect();
+    let sends = merged(spans, silence(whole));
+    let mut sent = vec![0.0; source.mission.activity.cells.len()];
+    for (edge, _) in each.iter().filter(|(_, spans)| !spans.is_empty()) {
+        for (sum, count) in sent.iter_mut().zip(source.sent(*edge)) {
+            *sum += count;
+        }
+    }
+    let hz = each
+        .iter()
+        .filter_map(|(edge, spans)| rate(&source.sent(*edge), spans));
+    let lives = lives(source, nodes, &sends);
+    let mut bars = bars(source, &sends, &sent);
+    if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
+        && !life.ends
+        && life.span.end.since(bar.span.end) <= silence(whole)
+    {
+        // The recording ended between two messages.
+        bar.span.end = life.span.end;
+    }
+    Track {
+        name: Arc::clone(role),
+        nodes: nodes.to_vec(),
+        topic: None,
+        lives,
+        bars,
+        hz: hz.reduce(|a, b| a + b),
+    }
+}
+
+fn topic(source: &Source<'_>, id: TopicId) -> Track {
+    let whole = source.span();
+    let sends = merged(source.topic_sending(id), silence(whole));
+    let sent = source.topic_sent(id);
+    let all = sends.first().zip(sends.last()).map(|(first, last)| Span {
+        start: first.start,
+        end: last.end,
+    });
+    let life = |span: Span| capped(span, whole, false);
+    Track {
+        name: source.topic(id).into(),
+        nodes: Vec::new(),
+        topic: Some(id),
+        lives: all.into_iter().map(life).collect(),
+        hz: rate(&sent, &sends),
+        bars: bars(source, &sends, &sent),
+    }
+}
+
+pub(crate) fn silence(whole: Span) -> i64 {
+    SILENCE.0.max(whole.nanos() / SILENCE.1)
+}
+
+/// Messages per second while they came; `None` where there are fewer than two or no time passes.
+fn rate(sent: &[f64], spans: &[Span]) -> Option<f64> {
+    let seconds: f64 = spans.iter().map(|s| s.nanos() as f64 / 1e9).sum();
+    let count: f64 = sent.iter().sum();
+    (count >= 2.0 && seconds > 1e-3).then(|| count / seconds)
+}
+
+fn capped(span: Span, whole: Span, is_inferred: bool) -> Life {
+    let present = PRESENT.0.max(whole.nanos() / PRESENT.1);
+    Life {
+        span,
+        begins: span.start.since(whole.start) > present,
+        ends: whole.end.since(span.end) > whole.nanos() / CUT,
+        is_inferred,
+    }
+}
+
+/// The lives of some nodes that are one role: runs of cells, their ends sharpened by exact signs.
+fn lives(source: &Source<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<Life> {
+    let cells = &source.mission.activity.cells;
+    let known: Vec<Option<Degree>> = cells
+        .iter()
+        .map(|cell| {
+            let own = cell.graph.nodes.iter().filter(|n| nodes.contains(&n.id));
+            own.map(|n| n.degree).min()
+        })
+        .collect();
+    let elements = &source.mission.elements;
+    let of = |id: &NodeId| elements.nodes.get(*id as usize);
+    let firsts = nodes.iter().filter_map(of).filter_map(|n| n.first);
+    let lasts = nodes.iter().filter_map(of).filter_map(|n| n.last);
+    let starts: Vec<Stamp> = firsts.chain(sends.iter().map(|s| s.start)).collect();
+    let ends: Vec<Stamp> = lasts.chain(sends.iter().map(|s| s.end)).collect();
+    let step = source.mission.activity.step();
+    let whole = source.span();
+    let runs = source.runs(known.iter().map(Option::is_some));
+    let sharpened = runs.into_iter().map(|run| {
+        let near = |at: &&Stamp| at.since(run.start) >= 0 && at.since(run.start) <= step;
+        let start = starts.iter().filter(near).min().copied();
+        let near = |at: &&Stamp| run.end.since(**at) >= 0 && run.end.since(**at) <= step;
+        let end = ends.iter().filter(near).max().copied();
+        let span = Span {
+            start: start.unwrap_or(run.start),
+            end: end.unwrap_or(run.end),
+        };
+        let inside = cells
+            .iter()
+            .zip(&known)
+            .filter(|(c, _)| run.contains(c.span.start));
+        let (mut all, mut inferred) = (0, 0);
+        for (_, degree) in inside {
+            all += 1;
+            inferred += usize::from(degree.is_some_and(|d| d >= Degree::Inferred));
+        }
+        capped(span, whole, inferred * 2 > all && sends.is_empty())
+    });
+    sharpened.filter(|l| l.span.nanos() > 0).collect()
+}
+
+/// The bars of a row: its stretches of sending, cut where the rate makes a step.
+fn bars(source: &Source<'_>, sends: &[Span], sent: &[f64]) -> Vec<Bar> {
+    let mut all: Vec<Bar> = Vec::new();
+    for stretch in sends {
+        all.extend(steps(source, *stretch, sent));
+    }
+    let most = all.iter().map(|b| b.share).fold(0.0, f64::max);
+    for bar in &mut all {
+        bar.share = if most > 0.0 { bar.share / most } else { 1.0 };
+    }
+    all
+}
+
+/// One stretch of sending as pieces of one rate each; their `share` is that rate.
+pub(crate) fn steps(source: &Source<'_>, stretch: Span, sent: &[f64]) -> Vec<Bar> {
+    let cells = &source.mission.activity.cells;
+    let from = cells.partition_point(|c| c.span.end <= stretch.start);
+    let to = cells.partition_point(|c| c.span.start < stretch.end);
+    let cells = &cells[from.min(to)..to];
+    let sent = &sent[from.min(to)..to];
+    let seconds = |k: usize| overlap(cells[k].span, stretch).max(1) as f64 / 1e9;
+    let count: f64 = sent.iter().sum();
+    let reach = libm::ceil(ENOUGH / (count / cells.len().max(1) as f64).max(1e-6));
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most the cells"
+    )]
+    let reach = (reach.clamp(1.0, cells.len().max(1) as f64) as usize - 1) / 2;
+    let rates: Vec<f64> = (0..cells.len())
+        .map(|k| {
+            let around = k.saturating_sub(reach)..(k + reach + 1).min(cells.len());
+            let time: f64 = around.clone().map(seconds).sum();
+            (sent[around].iter().sum::<f64>() / time).max(1e-3)
+        })
+        .collect();
+    let all = source.mission.activity.cells.len();
+    let level = levels(&rates, all as f64 / STEP, (all / SHORTEST_STEP).max(1));
+    let mut at = 0;
+    let mut bars = Vec::new();
+    for run in level.chunk_by(|a, b| a.total_cmp(b).is_eq()) {
+        let end = at + run.len();
+        let time: f64 = (at..end).map(seconds).sum();
+        bars.push(Bar {
+            span: Span {
+                start: cells[at].span.start.max(stretch.start),
+                end: cells[end - 1].span.end.min(stretch.end),
+            },
+            share: sent[at..end].iter().sum::<f64>() / time,
+        });
+        at = end;
+    }
+    bars
+}
+
+fn overlap(a: Span, b: Span) -> i64 {
+    a.end.min(b.end).since(a.start.max(b.start))
+}

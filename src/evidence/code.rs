@@ -1,0 +1,172 @@
+//! What the source code of the robot declares: names come from the bag, edges from the code. Nothing is run.
+//!
+//! What a node does stands in its code almost always in plain sight; what the code does not say is which nodes ran. So a
+//! node that the bag names gets the publishers and subscribers that its code declares, where topic and type are recorded
+//! under exactly these names. Tried on 182 public repositories and 242 bags; [`matching`] says how right that is.
+
+mod cpp;
+mod declaration;
+mod files;
+mod git;
+pub(crate) mod matching;
+mod only;
+mod packages;
+mod python;
+mod texts;
+mod workspace;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use crate::base::error::Result;
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::Stamp;
+use crate::base::words;
+use crate::evidence::topology::launch;
+use declaration::FileCode;
+use files::{FileKind, Files, SourceFile};
+use workspace::{Instance, Placed, Workspace};
+
+/// Which code to read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceCode {
+    /// A workspace or repository.
+    pub folder: PathBuf,
+    /// As of when.
+    pub version: Version,
+    /// Whether the only place in the code that can be meant counts too, though the bag does not name its node.
+    pub infers: bool,
+}
+
+/// As of when code is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Version {
+    /// The last commit before the recording's end, where the folder is in a git repository; else the files as they lie.
+    #[default]
+    Recording,
+    /// A commit, branch or tag; `HEAD` is the newest.
+    Commit(String),
+    /// The files as they lie.
+    Worktree,
+}
+
+/// What was read of the source code.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Code {
+    instances: Vec<Instance>,
+    /// Every place in the code that declares something.
+    places: Vec<Placed>,
+    files: usize,
+    packages: usize,
+    /// Which commit was read, in words.
+    version: Option<String>,
+    infers: bool,
+    notices: Vec<Notice>,
+}
+
+/// Reads source code; `end` is the recording's end.
+///
+/// # Errors
+/// If the folder cannot be read, or a commit that was asked for is not there.
+pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
+    let (files, version, mut notices) = match git::files(&wanted.folder, &wanted.version, end)? {
+        git::Found::Commit { files, words } => (files, Some(words), Vec::new()),
+        git::Found::Lying { note } => {
+            let note = note.map(|text| Notice::new(NoticeKind::Note, text));
+            (
+                files::of_folder(&wanted.folder)?,
+                None,
+                note.into_iter().collect(),
+            )
+        }
+    };
+    if files.is_cut {
+        let text = format!(
+            "`{}` holds more than {} or {} of source code; the rest was not read",
+            wanted.folder.display(),
+            words::count(files::MOST_FILES, "file"),
+            words::bytes(files::MOST_BYTES as u64)
+        );
+        notices.push(Notice::new(NoticeKind::Note, text));
+    }
+    let workspace = workspace(&files);
+    Ok(Code {
+        instances: workspace.instances(),
+        places: workspace.places(),
+        files: files.list.len(),
+        packages: workspace.packages.len(),
+        version,
+        infers: wanted.infers,
+        notices,
+    })
+}
+
+fn workspace(files: &Files) -> Workspace {
+    let packages = packages::packages(&files.list);
+    let (mut code, mut launches) = (Vec::new(), Vec::new());
+    for (file, read) in files.list.iter().zip(in_parallel(&files.list)) {
+        match read {
+            FileRead::Code(found) => code.push((file.path.clone(), found)),
+            FileRead::Launch(nodes) => launches.push((file.path.clone(), nodes)),
+            FileRead::Nothing => {}
+        }
+    }
+    Workspace::new(packages, code, launches)
+}
+
+/// What one file tells.
+enum FileRead {
+    Code(FileCode),
+    Launch(Vec<launch::LaunchedNode>),
+    Nothing,
+}
+
+fn read_file(file: &SourceFile) -> FileRead {
+    match files::kind(&file.path) {
+        Some(FileKind::Python | FileKind::Script) => FileRead::Code(python::read(&file.text)),
+        Some(FileKind::Cpp) => FileRead::Code(cpp::read(&file.text)),
+        Some(FileKind::Launch) => {
+            let path = Path::new(&file.path);
+            // A launch file that cannot be read starts nothing.
+            let tree = launch::tree_of(path, &file.text).ok().flatten();
+            tree.map_or(FileRead::Nothing, |tree| {
+                FileRead::Launch(launch::nodes(path, &tree))
+            })
+        }
+        _ => FileRead::Nothing,
+    }
+}
+
+/// How many files are read at once: more do not help, for the largest file decides.
+const READERS: usize = 4;
+
+/// Reads all files, in their order.
+fn in_parallel(files: &[SourceFile]) -> Vec<FileRead> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            match files.get(at) {
+                Some(file) => done.push((at, read_file(file))),
+                None => return done,
+            }
+        }
+    };
+    let mut all: Vec<(usize, FileRead)> = std::thread::scope(|scope| {
+        let readers: Vec<_> = (0..READERS.min(files.len()))
+            .map(|_| scope.spawn(work))
+            .collect();
+        readers
+            .into_iter()
+            .flat_map(|reader| reader.join().unwrap_or_default())
+            .collect()
+    });
+    all.sort_by_key(|(at, _)| *at);
+    // Files of a reader that died are missing; the others keep their places.
+    let mut read: Vec<FileRead> = files.iter().map(|_| FileRead::Nothing).collect();
+    for (at, file) in all {
+        read[at] = file;
+    }
+    read
+}

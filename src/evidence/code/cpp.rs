@@ -1,0 +1,158 @@
+//! What C++ code declares: rclcpp and roscpp, actions, message filters, image transport, transforms.
+//!
+//! Macros are not expanded and headers not included: what a file says by itself is nearly all there is to say.
+
+mod look;
+mod made;
+mod names;
+mod take;
+mod text;
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+use super::declaration::{Class, FileCode};
+use super::texts::Texts;
+use crate::evidence::syntax::{Language, Node, Parsed, line, walk};
+use names::Names;
+
+/// Words of which a file that declares anything has at least one; others are not parsed. Classes count, for a node may
+/// derive from them.
+const TELLING: &[&str] = &[
+    "class ",
+    "struct ",
+    "ros::",
+    "rclcpp",
+    "Node",
+    "advertise",
+    "ubscribe",
+    "publisher",
+];
+
+/// Reads a file; nothing for one that is too tangled.
+pub(super) fn read(text: &str) -> FileCode {
+    if !TELLING.iter().any(|word| text.contains(word)) {
+        return FileCode::default();
+    }
+    let Some(parsed) = Parsed::new(Language::Cpp, text.to_owned()) else {
+        return FileCode::default();
+    };
+    let mut reader = Reader {
+        parsed: &parsed,
+        work: Cell::new(0),
+        names: Names::default(),
+        texts: Texts::default(),
+        handles: BTreeMap::new(),
+        members: BTreeMap::new(),
+        callbacks: BTreeMap::new(),
+        classes: vec![Class::default()],
+        places: BTreeMap::new(),
+        open: Vec::new(),
+    };
+    reader.visit_all(Reader::look);
+    reader.visit_all(Reader::take);
+    FileCode {
+        classes: reader.classes,
+        imports: BTreeMap::new(),
+    }
+}
+
+struct Reader<'a> {
+    parsed: &'a Parsed,
+    /// How many expressions were looked at for their texts.
+    work: Cell<usize>,
+    names: Names,
+    texts: Texts<'a>,
+    /// Node handles with the namespace that they stand for.
+    handles: BTreeMap<String, String>,
+    /// Variables with their types.
+    members: BTreeMap<String, Node<'a>>,
+    /// Functions with the type of their first parameter.
+    callbacks: BTreeMap<String, Node<'a>>,
+    classes: Vec<Class>,
+    /// The place of each class.
+    places: BTreeMap<String, usize>,
+    /// Where the classes around the element end, with their places.
+    open: Vec<(usize, usize)>,
+}
+
+impl<'a> Reader<'a> {
+    /// Visits every element, with `open` telling the classes around it.
+    fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
+        self.open.clear();
+        let root = self.parsed.root();
+        walk(root, &mut |node| {
+            while self
+                .open
+                .last()
+                .is_some_and(|(end, _)| *end <= node.start_byte())
+            {
+                self.open.pop();
+            }
+            if let Some(name) = self.class_of(node) {
+                let at = self.place(name, node);
+                self.open.push((node.end_byte(), at));
+            }
+            visit(self, node);
+            true
+        });
+    }
+
+    fn text(&self, node: Node<'_>) -> &'a str {
+        self.parsed.text(node)
+    }
+
+    fn field(&self, node: Node<'a>, name: &str) -> &'a str {
+        node.child_by_field_name(name).map_or("", |n| self.text(n))
+    }
+
+    fn class(&mut self) -> &mut Class {
+        let at = self.open.last().map_or(0, |(_, at)| *at);
+        &mut self.classes[at]
+    }
+
+    /// The class that an element defines, or a function of which it defines: `void Foo::run() {…}`.
+    fn class_of(&self, node: Node<'a>) -> Option<&'a str> {
+        match node.kind() {
+            "class_specifier" | "struct_specifier" => {
+                node.child_by_field_name("body")?;
+                let name = node.child_by_field_name("name")?;
+                let name = name.child_by_field_name("name").unwrap_or(name);
+                Some(self.text(name))
+            }
+            "function_definition" => {
+                let mut declarator = node.child_by_field_name("declarator")?;
+                while declarator.kind() != "function_declarator" {
+                    declarator = declarator
+                        .child_by_field_name("declarator")
+                        .or(declarator.named_child(0))?;
+                }
+                let name = declarator.child_by_field_name("declarator")?;
+                if name.kind() != "qualified_identifier" {
+                    return None;
+                }
+                let mut scopes = self.text(name).rsplit("::");
+                scopes
+                    .nth(1)
+                    .map(|class| class.split('<').next().unwrap_or_default().trim())
+            }
+            _ => None,
+        }
+    }
+
+    fn place(&mut self, name: &str, node: Node<'a>) -> usize {
+        if let Some(at) = self.places.get(name) {
+            return *at;
+        }
+        self.classes.push(Class {
+            name: name.to_owned(),
+            line: line(node),
+            ..Class::default()
+        });
+        self.places.insert(name.to_owned(), self.classes.len() - 1);
+        self.classes.len() - 1
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,114 @@
+//! Which functions and classes of the client libraries make publishers and subscribers.
+
+use super::super::declaration::Made;
+use crate::evidence::syntax::{Node, Parsed};
+
+/// What a call calls: `object.name<template>(…)`, `scope::name<template>(…)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Callee<'a> {
+    pub(super) name: &'a str,
+    /// Empty without.
+    pub(super) object: &'a str,
+    /// Empty without.
+    pub(super) scope: &'a str,
+    /// The first argument of the template; empty without.
+    pub(super) template: &'a str,
+}
+
+impl<'a> Callee<'a> {
+    pub(super) fn of(parsed: &'a Parsed, call: Node<'a>) -> Self {
+        let mut callee = Self::default();
+        let Some(mut function) = call.child_by_field_name("function") else {
+            return callee;
+        };
+        if function.kind() == "field_expression" {
+            callee.object = function
+                .child_by_field_name("argument")
+                .map_or("", |n| parsed.text(n));
+        }
+        // Names inside names: `a::b::c<T>`, `object.c<T>`.
+        for _ in 0..8 {
+            let field = |name| function.child_by_field_name(name);
+            function = match function.kind() {
+                "field_expression" => match field("field") {
+                    Some(inner) => inner,
+                    None => break,
+                },
+                "qualified_identifier" => {
+                    callee.scope = field("scope").map_or("", |n| parsed.text(n));
+                    match field("name") {
+                        Some(inner) => inner,
+                        None => break,
+                    }
+                }
+                "template_function" | "template_method" => {
+                    let arguments = field("arguments").and_then(|list| list.named_child(0));
+                    callee.template = arguments.map_or("", |n| parsed.text(n));
+                    match field("name") {
+                        Some(inner) => inner,
+                        None => break,
+                    }
+                }
+                _ => break,
+            };
+        }
+        callee.name = parsed.text(function);
+        callee
+    }
+}
+
+/// What a function makes.
+pub(super) fn by_function(callee: &Callee<'_>) -> Option<Made> {
+    let has_type = !callee.template.is_empty();
+    let is_transport = callee.scope.ends_with("image_transport");
+    Some(match callee.name {
+        "create_publisher" if is_transport => Made::ImagePublisher,
+        "create_subscription" if is_transport => Made::Subscriber,
+        "create_camera_publisher" | "advertiseCamera" => Made::CameraPublisher,
+        "create_camera_subscription" | "subscribeCamera" => Made::CameraSubscriber,
+        "create_publisher" | "advertise" if has_type => Made::Publisher,
+        // Only image transport advertises without a type.
+        "advertise" => Made::ImagePublisher,
+        "create_subscription" => Made::Subscriber,
+        "subscribe" if !callee.object.is_empty() => Made::Subscriber,
+        "waitForMessage" if has_type => Made::Moment,
+        "create_server" if callee.scope.ends_with("rclcpp_action") => Made::ActionServer2,
+        "create_client" if callee.scope.ends_with("rclcpp_action") => Made::ActionClient2,
+        _ => return None,
+    })
+}
+
+/// What a variable of this type makes as it is constructed, with the type in its template; pointers to it as well.
+pub(super) fn by_constructor(kind: &str) -> Option<(Made, &str)> {
+    let (before, inner) = kind.split_once('<')?;
+    let inner = inner.trim().strip_suffix('>')?;
+    let (scope, name) = before
+        .trim()
+        .rsplit_once("::")
+        .unwrap_or(("", before.trim()));
+    match (scope.rsplit("::").next().unwrap_or_default(), name) {
+        ("message_filters", "Subscriber") => Some((Made::Subscriber, inner)),
+        ("realtime_tools", "RealtimePublisher") => Some((Made::Publisher, inner)),
+        ("actionlib", "SimpleActionServer" | "ActionServer") => Some((Made::ActionServer1, inner)),
+        ("actionlib", "SimpleActionClient" | "ActionClient") => Some((Made::ActionClient1, inner)),
+        (_, "shared_ptr" | "unique_ptr" | "scoped_ptr") => by_constructor(inner),
+        _ => None,
+    }
+}
+
+/// What a class of transforms makes.
+pub(super) fn transform(scope: &str, name: &str) -> Option<Made> {
+    Some(match (scope, name) {
+        ("tf" | "tf2_ros", "TransformBroadcaster") => Made::Broadcaster,
+        ("tf2_ros", "StaticTransformBroadcaster") => Made::StaticBroadcaster,
+        ("tf" | "tf2_ros", "TransformListener") => Made::Listener,
+        _ => return None,
+    })
+}
+
+/// Whether a class of this name writes bags.
+pub(super) fn is_recorder(name: &str, full: &str) -> bool {
+    let full = full.trim_start_matches("::");
+    matches!(name, "SequentialWriter" | "Recorder")
+        || name == "Writer" && full.starts_with("rosbag2_cpp")
+}

@@ -1,0 +1,219 @@
+//! What source code declares: publishers, subscribers, nodes and their names, each with the place where it stands.
+
+use std::collections::BTreeMap;
+
+use crate::base::words;
+
+/// What a node does with a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Role {
+    Publishes,
+    Subscribes,
+}
+
+/// What a call makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Made {
+    Publisher,
+    Subscriber,
+    /// Waits for one message.
+    Moment,
+    /// A publisher of images with its compressed sisters.
+    ImagePublisher,
+    CameraPublisher,
+    CameraSubscriber,
+    /// An action of ROS 1.
+    ActionServer1,
+    ActionClient1,
+    /// An action of ROS 2.
+    ActionServer2,
+    ActionClient2,
+    Broadcaster,
+    StaticBroadcaster,
+    Listener,
+}
+
+/// One publisher or subscriber in the code.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Declaration {
+    pub(crate) role: Role,
+    /// The topic as written: `/x`, `x` in the node's namespace, `~/x` below the node; `None` if the code does not tell.
+    pub(crate) topic: Option<String>,
+    /// Types that may be meant, as `package/Name`; several only behind imports of everything.
+    pub(crate) types: Vec<String>,
+    /// 1..
+    pub(crate) line: usize,
+    /// The call in short: `create_publisher(String, 'chatter')`.
+    pub(crate) text: String,
+    /// Whether it lasts for one message only.
+    pub(crate) is_momentary: bool,
+}
+
+/// The code of a class, or of a file outside its classes (its name is empty). In C++ a class may be spread over files.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Class {
+    pub(crate) name: String,
+    /// The names of what it derives from, without namespaces.
+    pub(crate) bases: Vec<String>,
+    /// What it calls its node.
+    pub(crate) node_names: Vec<String>,
+    pub(crate) declarations: Vec<Declaration>,
+    /// The classes that may be made here, with the name that a new one is given where it stands at the call.
+    pub(crate) mentions: BTreeMap<String, Option<String>>,
+    /// Whether the class itself stands here, not only functions of it.
+    pub(crate) is_defined: bool,
+    /// Whether it writes bags.
+    pub(crate) is_recorder: bool,
+    /// Whether it logs.
+    pub(crate) logs: bool,
+    /// 1..
+    pub(crate) line: usize,
+}
+
+/// What a source file holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FileCode {
+    /// The code outside classes first.
+    pub(crate) classes: Vec<Class>,
+    /// Python: names and the modules that they are imported from, `.` for this package.
+    pub(crate) imports: BTreeMap<String, String>,
+}
+
+/// A call that makes something: its topic and types as far as the code tells.
+#[derive(Clone, Debug)]
+pub(super) struct Call {
+    pub(super) made: Made,
+    pub(super) topic: Option<String>,
+    pub(super) types: Vec<String>,
+    pub(super) line: usize,
+    pub(super) text: String,
+}
+
+impl Call {
+    /// The publishers and subscribers that it amounts to.
+    pub(super) fn declarations(&self) -> Vec<Declaration> {
+        use Role::{Publishes, Subscribes};
+        let one = |role, below: &str, change: &dyn Fn(&str) -> String| {
+            let topic = self.topic.as_ref().map(|topic| format!("{topic}{below}"));
+            self.declaration(role, topic, self.types.iter().map(|t| change(t)).collect())
+        };
+        let same = |t: &str| t.to_owned();
+        let fixed =
+            |role, below: &str, type_name: &str| one(role, below, &|_| type_name.to_owned());
+        let image = |role, below: &str, name: &str| {
+            let topic = self.topic.as_ref().map(|topic| format!("{topic}{below}"));
+            self.declaration(role, topic, vec![format!("sensor_msgs/{name}")])
+        };
+        let transform = |role, topic: &str| {
+            self.declaration(
+                role,
+                Some(topic.to_owned()),
+                vec!["tf2_msgs/TFMessage".to_owned()],
+            )
+        };
+        let info = || {
+            let topic = self
+                .topic
+                .as_ref()
+                .map(|topic| match topic.rsplit_once('/') {
+                    Some((folder, _)) => format!("{folder}/camera_info"),
+                    None => "camera_info".to_owned(),
+                });
+            move |role| {
+                self.declaration(
+                    role,
+                    topic.clone(),
+                    vec!["sensor_msgs/CameraInfo".to_owned()],
+                )
+            }
+        };
+        // Who publishes what an action tells, and what it is told.
+        let action1 = |tells, told| {
+            let suffix = |word: &'static str| move |t: &str| format!("{t}{word}");
+            vec![
+                one(tells, "/feedback", &suffix("Feedback")),
+                one(tells, "/result", &suffix("Result")),
+                fixed(tells, "/status", "actionlib_msgs/GoalStatusArray"),
+                one(told, "/goal", &suffix("Goal")),
+                fixed(told, "/cancel", "actionlib_msgs/GoalID"),
+            ]
+        };
+        let action2 = |tells| {
+            vec![
+                one(tells, "/_action/feedback", &|t| {
+                    format!("{t}_FeedbackMessage")
+                }),
+                fixed(tells, "/_action/status", "action_msgs/GoalStatusArray"),
+            ]
+        };
+        match self.made {
+            Made::Publisher => vec![one(Publishes, "", &same)],
+            Made::Subscriber | Made::Moment => vec![one(Subscribes, "", &same)],
+            Made::ImagePublisher => vec![
+                image(Publishes, "", "Image"),
+                image(Publishes, "/compressed", "CompressedImage"),
+                image(Publishes, "/compressedDepth", "CompressedImage"),
+            ],
+            Made::CameraPublisher => vec![
+                image(Publishes, "", "Image"),
+                image(Publishes, "/compressed", "CompressedImage"),
+                info()(Publishes),
+            ],
+            Made::CameraSubscriber => vec![image(Subscribes, "", "Image"), info()(Subscribes)],
+            Made::ActionServer1 => action1(Publishes, Subscribes),
+            Made::ActionClient1 => action1(Subscribes, Publishes),
+            Made::ActionServer2 => action2(Publishes),
+            Made::ActionClient2 => action2(Subscribes),
+            Made::Broadcaster => vec![transform(Publishes, "/tf")],
+            Made::StaticBroadcaster => vec![transform(Publishes, "/tf_static")],
+            Made::Listener => vec![
+                transform(Subscribes, "/tf"),
+                transform(Subscribes, "/tf_static"),
+            ],
+        }
+    }
+
+    fn declaration(&self, role: Role, topic: Option<String>, types: Vec<String>) -> Declaration {
+        Declaration {
+            role,
+            topic,
+            types,
+            line: self.line,
+            text: self.text.clone(),
+            is_momentary: self.made == Made::Moment,
+        }
+    }
+}
+
+/// The type that the parts of a name mean, as `package/Name`: `std_msgs msg String`, `std_msgs String`. `None` for names
+/// that hold no package.
+pub(super) fn type_of(parts: &[&str]) -> Option<String> {
+    let parts: Vec<&str> = parts.iter().copied().filter(|p| !p.is_empty()).collect();
+    let [.., package, name] = parts[..] else {
+        return None;
+    };
+    let is_kind = ["msg", "action", "srv"].contains(&package);
+    let package = if is_kind {
+        *parts.get(parts.len().checked_sub(3)?)?
+    } else {
+        package
+    };
+    Some(type_key(&format!("{package}/{name}")))
+}
+
+/// A type's name as it is compared: `std_msgs/msg/String` is `std_msgs/String`, and the old type of `/tf` is the new one.
+pub(crate) fn type_key(type_name: &str) -> String {
+    if type_name == "tf/tfMessage" {
+        return "tf2_msgs/TFMessage".to_owned();
+    }
+    match type_name.split('/').collect::<Vec<_>>()[..] {
+        [package, "msg" | "action", name] => format!("{package}/{name}"),
+        _ => type_name.to_owned(),
+    }
+}
+
+/// A text on one line, cut where it is long; a call may span lines.
+pub(super) fn short(text: &str) -> String {
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    words::shorten(&words, 100).into_owned()
+}

@@ -1,0 +1,258 @@
+//! The code of the recording's day out of git: the one place that runs a program, and why.
+//!
+//! Code changes between a recording and the day somebody looks at it; with the code of the day two thirds more edges are
+//! found. Git's own program reads the objects, for packs, alternates and object formats are its business. It is asked
+//! which commit, which files, and for their bytes, by commands that run no hook, filter, pager or file-system monitor, ask
+//! nobody and fetch nothing. It inherits the environment, less what would point it at another repository.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use super::Version;
+use super::files::{FileKind, Files, LONGEST, MOST_FILES, kind};
+use crate::base::error::{Error, Result};
+use crate::base::time::Stamp;
+
+/// What git knows of a folder.
+pub(super) enum Found {
+    /// The files of a commit, and which one it is, in words.
+    Commit { files: Files, words: String },
+    /// The files as they lie are to be read, with what is to be said about that.
+    Lying { note: Option<String> },
+}
+
+/// Commits of the day after a recording count too: who records changes first and commits afterwards.
+const DAY: i64 = 86_400;
+
+/// The files of the version that is wanted; `end` is the recording's end.
+///
+/// # Errors
+/// If a commit that was asked for is not there.
+pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Found> {
+    if *version == Version::Worktree {
+        return Ok(Found::Lying { note: None });
+    }
+    let lying = |note: Option<String>| Ok(Found::Lying { note });
+    let prefix = match ask(folder, &["rev-parse", "--show-prefix"]) {
+        Ok(prefix) => prefix,
+        Err(reason) => {
+            return match version {
+                Version::Commit(name) => Err(unknown(folder, name, &reason)),
+                _ if reason.contains("not a git repository") => lying(None),
+                _ => lying(Some(format!(
+                    "the code was read as it lies, for git refuses: {reason}"
+                ))),
+            };
+        }
+    };
+    let commit = if let Version::Commit(name) = version {
+        let wanted = format!("{name}^{{commit}}");
+        let found = ask(
+            folder,
+            &["rev-parse", "--verify", "--end-of-options", &wanted],
+        );
+        found.map_err(|reason| unknown(folder, name, &reason))?
+    } else {
+        let seconds = end.0.div_euclid(1_000_000_000).saturating_add(DAY);
+        let before = format!("--before=@{seconds}");
+        ask(folder, &["rev-list", "--max-count=1", &before, "HEAD"]).unwrap_or_default()
+    };
+    if commit.is_empty() {
+        return lying(Some(
+            "the code was read as it lies, for git holds no commit before the recording's end"
+                .to_owned(),
+        ));
+    }
+    match of_commit(folder, &commit, &prefix) {
+        Some(files) if !files.list.is_empty() => Ok(Found::Commit {
+            files,
+            words: words(folder, &commit, version),
+        }),
+        _ => lying(Some(format!(
+            "the code was read as it lies, for git holds no source code of this folder in commit {}",
+            short(&commit)
+        ))),
+    }
+}
+
+/// `code of 2025-12-03 (8e54c1a), the last commit before the recording's end`
+fn words(folder: &Path, commit: &str, version: &Version) -> String {
+    let told = ask(
+        folder,
+        &["rev-list", "--max-count=1", "--timestamp", commit],
+    )
+    .unwrap_or_default();
+    let seconds: i64 = told
+        .split(' ')
+        .next()
+        .and_then(|t| t.parse().ok())
+        .unwrap_or(0);
+    let day = Stamp(seconds.saturating_mul(1_000_000_000)).to_string();
+    let day = day.get(..10).unwrap_or_default();
+    let which = match version {
+        Version::Recording => ", the last commit before the recording's end",
+        _ => "",
+    };
+    format!("code of {day} ({}){which}", short(commit))
+}
+
+fn short(commit: &str) -> &str {
+    commit.get(..7).unwrap_or(commit)
+}
+
+fn unknown(folder: &Path, name: &str, reason: &str) -> Error {
+    Error::usage(
+        format!(
+            "git knows no commit `{name}` in `{}`: {reason}",
+            folder.display()
+        ),
+        "name a commit, branch or tag, or `worktree` for the files as they lie",
+    )
+}
+
+/// A git command that touches nothing and asks nobody.
+fn git(folder: &Path, words: &[&str]) -> Command {
+    let mut command = Command::new("git");
+    command.arg("-C").arg(folder);
+    for setting in [
+        "core.fsmonitor=false",
+        "core.hooksPath=/dev/null",
+        "core.untrackedCache=false",
+        "log.showSignature=false",
+    ] {
+        command.args(["-c", setting]);
+    }
+    command
+        .args(["--no-pager", "--no-optional-locks", "--no-replace-objects"])
+        .args(words);
+    for (name, value) in [
+        ("GIT_NO_LAZY_FETCH", "1"),
+        ("GIT_TERMINAL_PROMPT", "0"),
+        ("GIT_ALLOW_PROTOCOL", "none"),
+        ("LC_ALL", "C"),
+    ] {
+        command.env(name, value);
+    }
+    for name in [
+        "GIT_DIR",
+        "GIT_WORK_TREE",
+        "GIT_INDEX_FILE",
+        "GIT_OBJECT_DIRECTORY",
+        "GIT_ALTERNATE_OBJECT_DIRECTORIES",
+        "GIT_NAMESPACE",
+    ] {
+        command.env_remove(name);
+    }
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// The most bytes of an answer: the paths of half a million files.
+const LONGEST_ANSWER: u64 = 64 << 20;
+
+/// What git answers, without the new line at its end; else its first complaint.
+fn ask(folder: &Path, words: &[&str]) -> std::result::Result<String, String> {
+    let answer = git(folder, words)
+        .output()
+        .map_err(|e| format!("git does not start: {e}"))?;
+    if answer.status.success() {
+        return Ok(String::from_utf8_lossy(&answer.stdout)
+            .trim_end_matches('\n')
+            .to_owned());
+    }
+    let complaint = String::from_utf8_lossy(&answer.stderr);
+    let first = complaint.lines().next().unwrap_or("it fails");
+    Err(first.trim_start_matches("fatal: ").to_owned())
+}
+
+/// The files of a commit below `prefix` (which ends in a slash or is empty).
+fn of_commit(folder: &Path, commit: &str, prefix: &str) -> Option<Files> {
+    let tree = format!("{commit}:{prefix}");
+    let mut listing = git(folder, &["ls-tree", "-r", "-z", "-l", "--full-tree", &tree])
+        .stderr(Stdio::null())
+        .spawn()
+        .ok()?;
+    let mut list = Vec::new();
+    let read = listing
+        .stdout
+        .take()?
+        .take(LONGEST_ANSWER)
+        .read_to_end(&mut list);
+    // A listing that is too long is cut; the program ends when nobody reads on.
+    let is_cut = list.len() as u64 >= LONGEST_ANSWER;
+    let done = listing.wait().ok()?;
+    if read.is_err() || !done.success() && !is_cut {
+        return None;
+    }
+    let entries = list.split(|b| *b == 0).filter_map(entry);
+    let mut wanted: Vec<(String, String)> = entries.collect();
+    let is_cut = is_cut || wanted.len() > MOST_FILES;
+    wanted.truncate(MOST_FILES);
+    let mut files = bytes(folder, wanted)?;
+    files.is_cut |= is_cut;
+    Some(files)
+}
+
+/// The path and the object of a file that tells something: `100644 blob <id> <size>\t<path>`.
+fn entry(line: &[u8]) -> Option<(String, String)> {
+    let line = std::str::from_utf8(line).ok()?;
+    let (about, path) = line.split_once('\t')?;
+    let about: Vec<&str> = about.split_whitespace().collect();
+    let [mode, "blob", id, size] = about[..] else {
+        return None;
+    };
+    let is_file = mode.starts_with("100") && size.parse::<u64>().is_ok_and(|size| size <= LONGEST);
+    // A script without an ending is a program, by its mode.
+    let kind = kind(path).filter(|kind| *kind != FileKind::Script || mode == "100755");
+    (is_file && kind.is_some()).then(|| (path.to_owned(), id.to_owned()))
+}
+
+/// The bytes of objects, under their paths.
+fn bytes(folder: &Path, wanted: Vec<(String, String)>) -> Option<Files> {
+    let mut command = git(folder, &["cat-file", "--batch", "--buffer"]);
+    let mut running = command
+        .stdin(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .ok()?;
+    let mut input = running.stdin.take()?;
+    let mut output = BufReader::new(running.stdout.take()?);
+    let ids: String = wanted
+        .iter()
+        .flat_map(|(_, id)| [id.as_str(), "\n"])
+        .collect();
+    let files = std::thread::scope(|scope| {
+        // Both ends are pipes that fill up: what is asked is written while answers are read.
+        scope.spawn(move || input.write_all(ids.as_bytes()));
+        let mut files = Files::default();
+        for (path, _) in wanted {
+            match object(&mut output) {
+                Some(bytes) => files.add(path, &bytes),
+                None => break,
+            }
+        }
+        drop(output);
+        files
+    });
+    running.wait().ok()?;
+    Some(files)
+}
+
+/// The next answer: `<id> blob <size>`, a new line, the bytes, a new line.
+fn object(output: &mut impl std::io::BufRead) -> Option<Vec<u8>> {
+    let mut head = String::new();
+    output.take(1000).read_line(&mut head).ok()?;
+    let size: u64 = head.trim_end().rsplit(' ').next()?.parse().ok()?;
+    let mut bytes = Vec::new();
+    output
+        .take(size.min(LONGEST) + 1)
+        .read_to_end(&mut bytes)
+        .ok()?;
+    let is_whole = bytes.len() as u64 == size + 1;
+    bytes.pop();
+    is_whole.then_some(bytes)
+}

@@ -1,0 +1,383 @@
+//! Which edges of the code are drawn: those of nodes that the bag names, where topic and type are recorded under exactly
+//! these names.
+//!
+//! On 182 public repositories 179 of 184 edges were right so (97 %). With suffixes or patterns of names fewer were, and of
+//! everything that the best launch file would start only 63 %: what is wrong is nearly always that the node did not run.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Code;
+use super::declaration::{Role, type_key};
+use super::only;
+use super::workspace::{Instance, Placed};
+use crate::base::name::{is_player, is_recorder, last_part, namespace};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::words::{count, some_of};
+use crate::evidence::SOURCES;
+use crate::evidence::claim::{Degree, Name, SourceId};
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+
+/// An edge that the code declares for a node of the bag.
+#[derive(Clone, Debug)]
+pub(super) struct Match<'a> {
+    pub(super) role: Role,
+    pub(super) topic: Name,
+    pub(super) instance: &'a Instance,
+    pub(super) placed: &'a Placed,
+}
+
+/// The topics of the bag.
+pub(super) struct Recorded {
+    /// By name: the topic and its types.
+    topics: BTreeMap<String, (Name, BTreeSet<String>)>,
+    /// Topics whose messages name their publishers.
+    pub(super) told: BTreeSet<Name>,
+    /// What is known already, by more than a declaration.
+    proved: BTreeSet<Key>,
+}
+
+/// What came of reading the code.
+#[derive(Debug, Default)]
+pub(crate) struct Outcome {
+    /// How much was read and found.
+    pub(crate) notices: Vec<Notice>,
+    /// Places in the code that may belong to the bag and were not drawn, and what else is worth knowing; a line each.
+    pub(crate) undrawn: Vec<String>,
+}
+
+/// Adds what the code says of the nodes that the bag names, and the only places that can be meant if asked for.
+pub(crate) fn conclude(code: &Code, known: &mut Findings<'_>) -> Outcome {
+    let recorded = Recorded::of(known);
+    let named = named(known);
+    let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
+    for instance in &code.instances {
+        by_name
+            .entry(last_part(&instance.name))
+            .or_default()
+            .push(instance);
+    }
+    let (mut edges, mut nodes) = (0, 0);
+    let mut explained = BTreeSet::new();
+    let (mut remarks, mut without) = (BTreeSet::new(), Vec::new());
+    for (text, (node, words)) in &named {
+        let candidates = by_name
+            .get(last_part(text))
+            .or_else(|| by_name.get(without_numbers(last_part(text))));
+        let Some(candidates) = candidates else {
+            without.push(text.clone());
+            continue;
+        };
+        let matches = best(candidates, text, &recorded);
+        let mut drawn = 0;
+        for found in &matches {
+            drawn += usize::from(draw(code, known, &recorded, (*node, words), found));
+            explained.insert(found.instance.program.clone());
+        }
+        if let Some(found) = matches.first() {
+            remarks.extend(remarks_on(found.instance, text, &recorded));
+        }
+        edges += drawn;
+        nodes += usize::from(drawn > 0);
+    }
+    let known_nodes = named.keys().cloned().collect();
+    let logged = named.values().any(|(_, words)| words.contains("rosout"));
+    let bag = only::Bag {
+        recorded: &recorded,
+        explained: &explained,
+        named: &known_nodes,
+        logged,
+    };
+    let (inferred, undrawn) = only::conclude(code, known, &bag);
+    let mut notices = code.notices.clone();
+    notices.push(summary(code, (edges, nodes), inferred, &undrawn));
+    let mut lines: Vec<String> = undrawn
+        .iter()
+        .map(|(reason, text)| format!("{text}: {}", reason.words()))
+        .collect();
+    lines.extend(remarks);
+    if !without.is_empty() && !code.instances.is_empty() {
+        lines.push(format!(
+            "no code was found for {}",
+            some_of(&without, MOST_NAMES)
+        ));
+    }
+    Outcome {
+        notices,
+        undrawn: lines,
+    }
+}
+
+/// How many nodes without code are named.
+const MOST_NAMES: usize = 8;
+
+/// `412 files of 6 packages read (code of …); 22 edges for 4 named nodes; 6 places not drawn (4: …, 2: …)`
+fn summary(
+    code: &Code,
+    (edges, nodes): (usize, usize),
+    inferred: usize,
+    undrawn: &only::Undrawn,
+) -> Notice {
+    let version = code
+        .version
+        .as_ref()
+        .map_or(String::new(), |v| format!(" ({v})"));
+    let mut text = format!(
+        "{} of {} read{version}; {} for {}",
+        count(code.files, "file"),
+        count(code.packages, "package"),
+        count(edges, "edge"),
+        count(nodes, "named node")
+    );
+    if inferred > 0 {
+        text.extend(["; ", &count(inferred, "inferred edge")]);
+    }
+    if !undrawn.is_empty() {
+        let mut reasons: BTreeMap<only::Reason, usize> = BTreeMap::new();
+        for (reason, _) in undrawn {
+            *reasons.entry(*reason).or_default() += 1;
+        }
+        let reasons: Vec<String> = reasons
+            .iter()
+            .map(|(r, n)| format!("{n}: {}", r.words()))
+            .collect();
+        text.extend([
+            "; ",
+            &count(undrawn.len(), "place"),
+            " not drawn (",
+            &reasons.join(", "),
+            ")",
+        ]);
+        text.push_str("; `bagreel info --source` lists them");
+    }
+    Notice::new(NoticeKind::Note, text)
+}
+
+/// What is worth knowing about the code of a node that ran: topics that it names and the bag lacks, or has with another
+/// type.
+fn remarks_on(instance: &Instance, node: &str, recorded: &Recorded) -> Vec<String> {
+    let remark = |placed: &Placed| {
+        let declaration = &placed.declaration;
+        let name = remapped(
+            &resolved(node, declaration.topic.as_ref()?),
+            node,
+            &instance.remaps,
+        );
+        let place = format!("{}:{}", placed.path, declaration.line);
+        let types = declaration.types.join(" or ");
+        match recorded.topics.get(&name) {
+            None => {
+                let does = if declaration.role == Role::Publishes {
+                    "publishes"
+                } else {
+                    "subscribes"
+                };
+                Some(format!(
+                    "{node} {does} {name} by its code ({place}), which is not recorded: record it too"
+                ))
+            }
+            Some((_, kinds))
+                if !types.is_empty() && !declaration.types.iter().any(|t| kinds.contains(t)) =>
+            {
+                let kinds: Vec<&str> = kinds.iter().map(String::as_str).collect();
+                Some(format!(
+                    "{name} is {} in the bag and {types} in the code of {node} ({place})",
+                    kinds.join(" and ")
+                ))
+            }
+            Some(_) => None,
+        }
+    };
+    instance.declared.iter().filter_map(remark).collect()
+}
+
+impl Recorded {
+    fn of(known: &Findings<'_>) -> Self {
+        let mut all = Self {
+            topics: BTreeMap::new(),
+            told: BTreeSet::new(),
+            proved: known
+                .proofs
+                .iter()
+                .filter(|p| p.degree != Degree::Declared)
+                .map(|p| p.what)
+                .collect(),
+        };
+        for stream in known.streams {
+            let topic = known.text(stream.topic).to_string();
+            let (_, types) = all
+                .topics
+                .entry(topic)
+                .or_insert_with(|| (stream.topic, BTreeSet::new()));
+            types.insert(type_key(&stream.connection.type_name));
+            if stream.publisher.is_some() {
+                all.told.insert(stream.topic);
+            }
+        }
+        all
+    }
+
+    /// The recorded topic of this name, if one of the types is its own.
+    pub(super) fn topic(&self, name: &str, types: &[String]) -> Option<Name> {
+        let (topic, recorded) = self.topics.get(name)?;
+        types.iter().any(|t| recorded.contains(t)).then_some(*topic)
+    }
+}
+
+/// The nodes that the bag names by more than a declaration, by their names, with the words of what names them.
+fn named(known: &Findings<'_>) -> BTreeMap<String, (Name, BTreeSet<&'static str>)> {
+    let mut named: BTreeMap<String, (Name, BTreeSet<&str>)> = BTreeMap::new();
+    for proof in known.proofs.iter().filter(|p| p.degree != Degree::Declared) {
+        let node = match proof.what {
+            Key::Node(node) | Key::Publish(node, _) | Key::Subscribe(_, node) => node,
+            Key::Topic(_) => continue,
+        };
+        let text = known.text(node);
+        if !is_recorder(&text) && !is_player(&text) {
+            let (_, words) = named
+                .entry(text.to_string())
+                .or_insert((node, BTreeSet::new()));
+            words.extend(SOURCES.get(proof.source).map(|s| s.word));
+        }
+    }
+    named
+}
+
+/// `talker_4711_1600000000000` without what makes an anonymous name unique.
+fn without_numbers(name: &str) -> &str {
+    let cut = |name: &'_ str| -> Option<usize> {
+        let (rest, number) = name.rsplit_once('_')?;
+        (!number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())).then_some(rest.len())
+    };
+    let first = cut(name).map_or(name, |at| &name[..at]);
+    cut(first).map_or(name, |at| &name[..at])
+}
+
+/// What the most fitting of several programs that may be this node declares: the one with most of its topics recorded.
+/// Where several fit as well, what all of them declare.
+fn best<'a>(candidates: &[&'a Instance], node: &str, recorded: &Recorded) -> Vec<Match<'a>> {
+    let is_real = |i: &&&Instance| !i.is_test;
+    let real: Vec<&Instance> = candidates.iter().filter(is_real).copied().collect();
+    let candidates = if real.is_empty() { candidates } else { &real };
+    let matches = |i: &&'a Instance| matches(i, node, recorded);
+    let mut all: Vec<Vec<Match<'a>>> = candidates.iter().map(matches).collect();
+    let most = all.iter().map(Vec::len).max().unwrap_or(0);
+    all.retain(|matches| matches.len() == most && most > 0);
+    let Some((first, others)) = all.split_first() else {
+        return Vec::new();
+    };
+    let is_in = |m: &Match<'_>, all: &[Match<'_>]| {
+        all.iter().any(|o| (o.role, o.topic) == (m.role, m.topic))
+    };
+    let common = first
+        .iter()
+        .filter(|m| others.iter().all(|all| is_in(m, all)));
+    common.cloned().collect()
+}
+
+/// The edges of an instance that the bag's topics bear out, if it ran under this name; one per role and topic.
+pub(super) fn matches<'a>(
+    instance: &'a Instance,
+    node: &str,
+    recorded: &Recorded,
+) -> Vec<Match<'a>> {
+    let mut found: Vec<Match<'a>> = Vec::new();
+    for placed in instance.declared.iter() {
+        let Some(written) = &placed.declaration.topic else {
+            continue;
+        };
+        let name = remapped(&resolved(node, written), node, &instance.remaps);
+        let role = placed.declaration.role;
+        if let Some(topic) = recorded.topic(&name, &placed.declaration.types)
+            && !found.iter().any(|m| (m.role, m.topic) == (role, topic))
+        {
+            found.push(Match {
+                role,
+                topic,
+                instance,
+                placed,
+            });
+        }
+    }
+    found
+}
+
+/// The full name of a topic that a node of this name writes so.
+pub(super) fn resolved(node: &str, topic: &str) -> String {
+    let joined = match (topic.strip_prefix('/'), topic.strip_prefix('~')) {
+        (Some(absolute), _) => format!("/{absolute}"),
+        (_, Some(private)) => format!("{node}/{private}"),
+        _ => format!("{}/{topic}", namespace(node)),
+    };
+    let parts: Vec<&str> = joined.split('/').filter(|part| !part.is_empty()).collect();
+    format!("/{}", parts.join("/"))
+}
+
+fn remapped(topic: &str, node: &str, remaps: &[(String, String)]) -> String {
+    let found = remaps
+        .iter()
+        .rev()
+        .find(|(from, _)| resolved(node, from) == topic);
+    found.map_or_else(|| topic.to_owned(), |(_, to)| resolved(node, to))
+}
+
+/// Adds an edge, unless the bag knows it already or knows better; tells whether it was added.
+fn draw(
+    code: &Code,
+    known: &mut Findings<'_>,
+    recorded: &Recorded,
+    (node, words): (Name, &BTreeSet<&str>),
+    found: &Match<'_>,
+) -> bool {
+    let what = match found.role {
+        Role::Publishes => Key::Publish(node, found.topic),
+        Role::Subscribes => Key::Subscribe(found.topic, node),
+    };
+    let has_room = found.role == Role::Subscribes || has_room(known, recorded, found.topic);
+    if recorded.proved.contains(&what) || !has_room || known.denies(what) {
+        return false;
+    }
+    let proof = Proof {
+        what,
+        source: row("source"),
+        degree: Degree::Declared,
+        when: Validity::Like(Key::Node(node)),
+    };
+    known.because(proof, None, |_| sentence(code, found, words));
+    true
+}
+
+/// Whether a topic may have a publisher that is not known yet: its messages do not name theirs, and more publishers were
+/// offered than are known.
+fn has_room(known: &Findings<'_>, recorded: &Recorded, topic: Name) -> bool {
+    let publishers = known.publishers(topic).count();
+    let offered = known.offers(topic).map_or(1, |n| n.max(1) as usize);
+    !recorded.told.contains(&topic) && publishers < offered
+}
+
+/// `arm/servo.py:41  create_subscription(…); the node is named by rosout; launched at arm.launch.py:67; code of …`
+fn sentence(code: &Code, found: &Match<'_>, words: &BTreeSet<&str>) -> String {
+    let declaration = &found.placed.declaration;
+    let words: Vec<&str> = words.iter().copied().collect();
+    let mut text = format!(
+        "{}:{}  {}; the node is named by {}",
+        found.placed.path,
+        declaration.line,
+        declaration.text,
+        words.join(", ")
+    );
+    if declaration.is_momentary {
+        text.push_str("; for a moment");
+    }
+    if let Some((path, line)) = &found.instance.launched {
+        text.extend(["; launched at ", path, ":", &line.to_string()]);
+    }
+    if let Some(version) = &code.version {
+        text.extend(["; ", version]);
+    }
+    text
+}
+
+/// The place of a source in the table.
+pub(super) fn row(word: &str) -> SourceId {
+    SOURCES.iter().position(|s| s.word == word).unwrap_or(0)
+}

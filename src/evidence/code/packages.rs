@@ -1,0 +1,310 @@
+//! Packages of a workspace and their programs: which files or which class an executable is made of.
+
+use std::collections::BTreeMap;
+
+use super::files::{FileKind, SourceFile, kind};
+
+/// A package, by its `package.xml`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Package {
+    pub(super) name: String,
+    /// Its folder below the workspace, with a slash at the end; empty at the top.
+    pub(super) folder: String,
+    pub(super) programs: BTreeMap<String, Program>,
+}
+
+/// What an executable is made of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Program {
+    /// Source files, below the workspace.
+    Files(Vec<String>),
+    /// A component, by its class without namespaces.
+    Class(String),
+}
+
+/// All packages, sorted by folder, with the programs that their build files name.
+pub(super) fn packages(files: &[SourceFile]) -> Vec<Package> {
+    let of_kind = |wanted| files.iter().filter(move |f| kind(&f.path) == Some(wanted));
+    let mut all: Vec<Package> = of_kind(FileKind::Package).filter_map(package).collect();
+    all.sort_by(|a, b| a.folder.cmp(&b.folder));
+    let paths: Vec<&str> = files.iter().map(|f| f.path.as_str()).collect();
+    for file in of_kind(FileKind::Cmake) {
+        if let Some(at) = package_of(&all, &file.path) {
+            let made = cmake(file, &all[at].name, &paths);
+            all[at].programs.extend(made);
+        }
+    }
+    for file in of_kind(FileKind::Setup) {
+        if let Some(at) = package_of(&all, &file.path) {
+            let folder = all[at].folder.clone();
+            all[at].programs.extend(entry_points(&file.text, &folder));
+        }
+    }
+    all
+}
+
+/// The package that a file belongs to: the innermost folder with a `package.xml`.
+pub(super) fn package_of(all: &[Package], path: &str) -> Option<usize> {
+    let inside = (0..).zip(all).filter(|(_, p)| path.starts_with(&p.folder));
+    inside.max_by_key(|(_, p)| p.folder.len()).map(|(at, _)| at)
+}
+
+fn package(file: &SourceFile) -> Option<Package> {
+    let (_, after) = file.text.split_once("<name>")?;
+    let (name, _) = after.split_once("</name>")?;
+    Some(Package {
+        name: name.trim().to_owned(),
+        folder: folder(&file.path).to_owned(),
+        programs: BTreeMap::new(),
+    })
+}
+
+/// The folder of a file, with a slash at the end; empty at the top.
+fn folder(path: &str) -> &str {
+    path.rfind('/').map_or("", |at| &path[..=at])
+}
+
+/// `'name = package.module:function'` in `setup.py` and `setup.cfg`.
+fn entry_points(text: &str, folder: &str) -> Vec<(String, Program)> {
+    let pieces = text.split(['\n', '\'', '"', ',']);
+    let entry = |piece: &str| {
+        let (name, target) = piece.split_once('=')?;
+        let (module, _) = target.split_once(':')?;
+        let (name, module) = (name.trim(), module.trim());
+        let is_word = |word: &str| {
+            !word.is_empty()
+                && word
+                    .chars()
+                    .all(|c| c.is_alphanumeric() || "_-.".contains(c))
+        };
+        let file = format!("{folder}{}.py", module.replace('.', "/"));
+        (is_word(name) && is_word(module)).then(|| (name.to_owned(), Program::Files(vec![file])))
+    };
+    pieces.filter_map(entry).collect()
+}
+
+/// The most variables and sources of a `CMakeLists.txt` that are kept.
+const MOST: usize = 10_000;
+
+/// The most text that the variables of a `CMakeLists.txt` may grow to, in bytes.
+const MOST_TEXT: usize = 4 << 20;
+
+/// The executables that a `CMakeLists.txt` makes.
+fn cmake(file: &SourceFile, package: &str, paths: &[&str]) -> Vec<(String, Program)> {
+    let here = folder(&file.path);
+    let mut variables = BTreeMap::from([("PROJECT_NAME".to_owned(), package.to_owned())]);
+    let mut programs = Vec::new();
+    let mut left = MOST_TEXT;
+    for (command, words) in commands(&file.text) {
+        let words: Vec<String> = words
+            .iter()
+            .flat_map(|w| put_in(w, &variables, &mut left))
+            .take(MOST)
+            .collect();
+        let (Some(first), rest) = (words.first(), words.get(1..).unwrap_or_default()) else {
+            continue;
+        };
+        match command.to_lowercase().as_str() {
+            "project" => {
+                variables.insert("PROJECT_NAME".to_owned(), first.clone());
+            }
+            "set" => {
+                variables.insert(first.clone(), rest.join(";"));
+            }
+            "file" if first.starts_with("GLOB") => {
+                let found = rest
+                    .iter()
+                    .skip(1)
+                    .flat_map(|pattern| glob(pattern, here, paths));
+                let value: Vec<String> = found.take(MOST).collect();
+                variables.insert(rest.first().cloned().unwrap_or_default(), value.join(";"));
+            }
+            "rclcpp_components_register_node" => programs.extend(component(rest)),
+            name if name.ends_with("add_executable") || name == "add_rostest_gtest" => {
+                let sources = rest
+                    .iter()
+                    .filter(|w| w.contains('.'))
+                    .map(|w| located(here, w));
+                programs.push((first.clone(), Program::Files(sources.collect())));
+            }
+            _ => {}
+        }
+    }
+    programs
+}
+
+/// `rclcpp_components_register_node(library PLUGIN "package::Class" EXECUTABLE name)`
+fn component(words: &[String]) -> Option<(String, Program)> {
+    let behind = |key: &str| {
+        words
+            .iter()
+            .position(|w| w == key)
+            .and_then(|at| words.get(at + 1))
+    };
+    let class = behind("PLUGIN")?.rsplit("::").next()?.to_owned();
+    Some((behind("EXECUTABLE")?.clone(), Program::Class(class)))
+}
+
+/// A source file below the workspace.
+fn located(here: &str, source: &str) -> String {
+    let source = [
+        "${CMAKE_CURRENT_SOURCE_DIR}/",
+        "${PROJECT_SOURCE_DIR}/",
+        "./",
+    ]
+    .iter()
+    .fold(source, |source, start| {
+        source.strip_prefix(start).unwrap_or(source)
+    });
+    format!("{here}{source}")
+}
+
+/// The files that `src/*.cpp` means, relative to `here`.
+fn glob(pattern: &str, here: &str, paths: &[&str]) -> Vec<String> {
+    let Some((start, end)) = pattern.split_once('*') else {
+        return vec![pattern.to_owned()];
+    };
+    let start = located(here, start);
+    let matching = paths
+        .iter()
+        .filter(|p| p.starts_with(&start) && p.ends_with(end.trim_start_matches('*')));
+    matching
+        .take(MOST)
+        .filter_map(|p| p.strip_prefix(here))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// A word with its variables put in, lists taken apart; what is not known stays as written.
+fn put_in(word: &str, variables: &BTreeMap<String, String>, left: &mut usize) -> Vec<String> {
+    let mut done = String::new();
+    let mut rest = word;
+    while let Some((before, after)) = rest.split_once("${") {
+        let Some((name, behind)) = after.split_once('}') else {
+            break;
+        };
+        done.push_str(before);
+        match variables.get(name) {
+            Some(value) if value.len() <= *left => {
+                *left -= value.len();
+                done.push_str(value);
+            }
+            _ => done.extend(["${", name, "}"]),
+        }
+        rest = behind;
+    }
+    done.push_str(rest);
+    done.split(';')
+        .filter(|w| !w.is_empty())
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Every `command(words …)`, comments left out.
+fn commands(text: &str) -> Vec<(&str, Vec<&str>)> {
+    let mut found = Vec::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('(') {
+        let line = before.rsplit('\n').next().unwrap_or_default();
+        if line.contains('#') {
+            rest = after.split_once('\n').map_or("", |(_, next)| next);
+            continue;
+        }
+        let end = closing(after);
+        let inside = &after[..end];
+        let words = inside
+            .lines()
+            .map(|line| line.split('#').next().unwrap_or_default());
+        let words = words
+            .flat_map(|line| line.split([' ', '\t', '"', '(', ')', '\r']))
+            .filter(|w| !w.is_empty());
+        found.push((line.trim(), words.collect()));
+        rest = after.get(end + 1..).unwrap_or_default();
+    }
+    found
+}
+
+/// Where the parenthesis that is open at the start closes.
+fn closing(text: &str) -> usize {
+    let mut open = 1_usize;
+    let end = text.char_indices().find(|(_, c)| {
+        match c {
+            '(' => open += 1,
+            ')' => open -= 1,
+            _ => {}
+        }
+        open == 0
+    });
+    end.map_or(text.len(), |(at, _)| at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn workspace(files: &[(&str, &str)]) -> Vec<Package> {
+        let file = |(path, text): &(&str, &str)| SourceFile {
+            path: (*path).to_owned(),
+            text: (*text).to_owned(),
+        };
+        packages(&files.iter().map(file).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn executables_of_cmake_know_their_sources() {
+        let all = workspace(&[
+            ("a/package.xml", "<package><name> arm </name></package>"),
+            ("a/src/one.cpp", ""),
+            ("a/src/two.cpp", ""),
+            (
+                "a/CMakeLists.txt",
+                "project(arm)\n# add_executable(no no.cpp)\nset(SRC src/one.cpp src/two.cpp) # both\n\
+                 file(GLOB ALL src/*.cpp)\nadd_executable(${PROJECT_NAME}_node ${SRC})\nament_auto_add_executable(all ${ALL})\n\
+                 rclcpp_components_register_node(lib PLUGIN \"arm::Gripper\" EXECUTABLE gripper)\n",
+            ),
+        ]);
+        let both = vec!["a/src/one.cpp".to_owned(), "a/src/two.cpp".to_owned()];
+        assert_eq!(all[0].name, "arm");
+        assert_eq!(all[0].programs["arm_node"], Program::Files(both.clone()));
+        assert_eq!(all[0].programs["all"], Program::Files(both));
+        assert_eq!(
+            all[0].programs["gripper"],
+            Program::Class("Gripper".to_owned())
+        );
+        assert_eq!(all[0].programs.len(), 3);
+    }
+
+    #[test]
+    fn entry_points_of_python_know_their_module() {
+        let setup = "setup(name='p', entry_points={'console_scripts': ['talk = p.nodes.talker:main', \"hear=p.hear:main\"]})";
+        let all = workspace(&[
+            ("w/p/package.xml", "<name>p</name>"),
+            ("w/p/setup.py", setup),
+        ]);
+        assert_eq!(
+            all[0].programs["talk"],
+            Program::Files(vec!["w/p/p/nodes/talker.py".to_owned()])
+        );
+        assert_eq!(
+            all[0].programs["hear"],
+            Program::Files(vec!["w/p/p/hear.py".to_owned()])
+        );
+    }
+
+    #[test]
+    fn a_file_belongs_to_the_innermost_package() {
+        let all = workspace(&[
+            ("package.xml", "<name>out</name>"),
+            ("in/package.xml", "<name>in</name>"),
+        ]);
+        assert_eq!(all[package_of(&all, "in/src/x.cpp").unwrap()].name, "in");
+        assert_eq!(all[package_of(&all, "x.py").unwrap()].name, "out");
+    }
+
+    #[test]
+    fn variables_that_grow_come_to_an_end() {
+        let grow: String = (0..40).flat_map(|_| ["set(A ${A}${A}${A}x)\n"]).collect();
+        let all = workspace(&[("package.xml", "<name>p</name>"), ("CMakeLists.txt", &grow)]);
+        assert!(all[0].programs.is_empty());
+    }
+}

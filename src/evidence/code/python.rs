@@ -1,0 +1,415 @@
+//! What Python code declares: rclpy and rospy, actions, message filters, transforms, of Python 2 and 3.
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+use super::declaration::{Call, Class, FileCode, Made, short, type_of};
+use super::texts::{DEEPEST, LONGEST, Texts, most_work};
+use crate::evidence::syntax::{Language, Node, Parsed, children, line, walk};
+
+/// Reads a file; nothing for one that is too tangled.
+pub(super) fn read(text: &str) -> FileCode {
+    let Some(parsed) = Parsed::new(Language::Python, text.to_owned()) else {
+        return FileCode::default();
+    };
+    let mut reader = Reader {
+        parsed: &parsed,
+        work: Cell::new(0),
+        imports: BTreeMap::new(),
+        wildcards: Vec::new(),
+        texts: Texts::default(),
+        classes: vec![Class::default()],
+        open: Vec::new(),
+    };
+    reader.visit_all(Reader::look);
+    reader.visit_all(Reader::take);
+    FileCode {
+        classes: reader.classes,
+        imports: reader.imports,
+    }
+}
+
+struct Reader<'a> {
+    parsed: &'a Parsed,
+    /// How many expressions were looked at for their texts.
+    work: Cell<usize>,
+    /// Names and what they stand for in full: `String` for `std_msgs.msg.String`.
+    imports: BTreeMap<String, String>,
+    /// Modules of which everything is imported.
+    wildcards: Vec<String>,
+    texts: Texts<'a>,
+    classes: Vec<Class>,
+    /// Where the classes around the element end, with their places.
+    open: Vec<(usize, usize)>,
+}
+
+impl<'a> Reader<'a> {
+    /// Visits every element, with `open` telling the classes around it.
+    fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
+        self.open.clear();
+        let mut next = 1;
+        let root = self.parsed.root();
+        walk(root, &mut |node| {
+            while self
+                .open
+                .last()
+                .is_some_and(|(end, _)| *end <= node.start_byte())
+            {
+                self.open.pop();
+            }
+            if node.kind() == "class_definition" {
+                self.open.push((node.end_byte(), next));
+                next += 1;
+            }
+            visit(self, node);
+            true
+        });
+    }
+
+    fn text(&self, node: Node<'_>) -> &'a str {
+        self.parsed.text(node)
+    }
+
+    fn class(&mut self) -> &mut Class {
+        let at = self
+            .open
+            .last()
+            .map_or(0, |(_, at)| *at)
+            .min(self.classes.len() - 1);
+        &mut self.classes[at]
+    }
+
+    /// First pass: classes, imports, and what names stand for.
+    fn look(&mut self, node: Node<'a>) {
+        match node.kind() {
+            "class_definition" => self.define(node),
+            "import_statement" => self.import(node, ""),
+            "import_from_statement" => {
+                let module = node
+                    .child_by_field_name("module_name")
+                    .map_or("", |n| self.text(n));
+                self.import(node, module);
+            }
+            "assignment" => {
+                let sides = ["left", "right"].map(|side| node.child_by_field_name(side));
+                if let [Some(left), Some(right)] = sides {
+                    self.texts.set(self.text(left), right);
+                }
+            }
+            "default_parameter" | "typed_default_parameter" => {
+                let sides = ["name", "value"].map(|side| node.child_by_field_name(side));
+                if let [Some(name), Some(value)] = sides {
+                    self.texts.set(self.text(name), value);
+                }
+            }
+            "call" => {
+                let given = self.arguments(node);
+                let is_parameter =
+                    ["declare_parameter", "get_param"].contains(&self.called(node).0);
+                if let (true, [name, value, ..]) = (is_parameter, &given.positional[..])
+                    && let Some(name) = self.string(*name)
+                {
+                    self.texts.set_parameter(&name, *value);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn define(&mut self, node: Node<'a>) {
+        let field = |name| node.child_by_field_name(name);
+        let bases = field("superclasses").map(children).unwrap_or_default();
+        let last = |node: Node<'a>| {
+            self.text(node)
+                .rsplit('.')
+                .next()
+                .unwrap_or_default()
+                .to_owned()
+        };
+        self.classes.push(Class {
+            name: field("name").map_or("", |n| self.text(n)).to_owned(),
+            bases: bases
+                .into_iter()
+                .filter(|b| b.kind() != "keyword_argument")
+                .map(last)
+                .collect(),
+            is_defined: true,
+            line: line(node),
+            ..Class::default()
+        });
+    }
+
+    fn import(&mut self, node: Node<'a>, module: &str) {
+        if children(node)
+            .iter()
+            .any(|child| child.kind() == "wildcard_import")
+        {
+            self.wildcards.push(module.to_owned());
+        }
+        let mut cursor = node.walk();
+        for name in node.children_by_field_name("name", &mut cursor) {
+            let field = |field| name.child_by_field_name(field).map(|n| self.text(n));
+            let (full, alias) = match name.kind() {
+                "aliased_import" => (field("name").unwrap_or_default(), field("alias")),
+                _ => (self.text(name), None),
+            };
+            // `import a.b` binds `a`.
+            let bound = alias.or_else(|| {
+                if module.is_empty() {
+                    full.split('.').next()
+                } else {
+                    Some(full)
+                }
+            });
+            let stands_for = match (module.is_empty(), alias) {
+                (true, None) => bound.unwrap_or_default().to_owned(),
+                (true, Some(_)) => full.to_owned(),
+                (false, _) if module.ends_with('.') => format!("{module}{full}"),
+                (false, _) => format!("{module}.{full}"),
+            };
+            self.imports
+                .insert(bound.unwrap_or_default().to_owned(), stands_for);
+        }
+    }
+
+    /// Second pass: calls.
+    fn take(&mut self, node: Node<'a>) {
+        if node.kind() != "call" {
+            return;
+        }
+        let (name, object) = self.called(node);
+        let full = self.full(if object.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{object}.{name}")
+        });
+        let given = self.arguments(node);
+        let first = given.positional.iter().find_map(|n| self.string(*n));
+        if name.chars().next().is_some_and(char::is_uppercase) {
+            self.class().mentions.insert(name.to_owned(), first.clone());
+        }
+        self.remark(name, object, &full, &given);
+        if let Some(made) = made(name, &full) {
+            let call = Call {
+                made,
+                topic: self.topic(&given),
+                types: self.types(&given),
+                line: line(node),
+                text: short(&format!(
+                    "{name}{}",
+                    node.child_by_field_name("arguments")
+                        .map_or("", |n| self.text(n))
+                )),
+            };
+            self.class().declarations.extend(call.declarations());
+        }
+    }
+
+    /// Names of nodes, logging, and bags that are written.
+    fn remark(&mut self, name: &str, object: &str, full: &str, given: &Given<'a>) {
+        let is_init = name == "__init__"
+            && (object.starts_with("super(") || object == "Node" || object.ends_with(".Node"));
+        let is_node = ["rclpy.create_node", "rclpy.node.Node", "rospy.init_node"].contains(&full);
+        if is_init || is_node {
+            let named = ["node_name", "name"]
+                .iter()
+                .find_map(|name| given.named(name));
+            let named = named.into_iter().chain(given.positional.iter().copied());
+            let node_name = named.into_iter().find_map(|n| self.string(n));
+            self.class().node_names.extend(node_name);
+        }
+        let is_writer =
+            name == "SequentialWriter" || full == "rosbag.Bag" && given.positional.len() > 1;
+        self.class().is_recorder |= is_writer;
+        self.class().logs |= name == "get_logger" || full.starts_with("rospy.log");
+    }
+
+    /// The name that a call calls, and what stands before its dot.
+    fn called(&self, call: Node<'a>) -> (&'a str, &'a str) {
+        let Some(function) = call.child_by_field_name("function") else {
+            return ("", "");
+        };
+        let field = |name| {
+            function
+                .child_by_field_name(name)
+                .map_or("", |n| self.text(n))
+        };
+        match function.kind() {
+            "identifier" => (self.text(function), ""),
+            "attribute" => (field("attribute"), field("object")),
+            _ => ("", ""),
+        }
+    }
+
+    fn arguments(&self, call: Node<'a>) -> Given<'a> {
+        let mut given = Given::default();
+        let list = call.child_by_field_name("arguments");
+        for argument in list.map(children).unwrap_or_default() {
+            let field = |name| argument.child_by_field_name(name);
+            match (argument.kind(), field("name"), field("value")) {
+                ("keyword_argument", Some(name), Some(value)) => {
+                    given.named.push((self.text(name), value));
+                }
+                _ => given.positional.push(argument),
+            }
+        }
+        given
+    }
+
+    /// A name with its first part put in full.
+    fn full(&self, name: String) -> String {
+        let (first, rest) = name.split_once('.').unwrap_or((&name, ""));
+        match self.imports.get(first) {
+            Some(full) if rest.is_empty() => full.clone(),
+            Some(full) => format!("{full}.{rest}"),
+            None => name,
+        }
+    }
+
+    /// The topic among the arguments: the one of that name, else the first text.
+    fn topic(&self, given: &Given<'a>) -> Option<String> {
+        let named = ["topic", "name", "topic_name", "action_name", "ns"]
+            .iter()
+            .find_map(|name| given.named(name));
+        let topic = match named {
+            Some(named) => self.string(named),
+            None => given.positional.iter().find_map(|n| self.string(*n)),
+        };
+        topic.filter(|topic| !topic.is_empty())
+    }
+
+    /// The type among the arguments.
+    fn types(&self, given: &Given<'a>) -> Vec<String> {
+        let named = [
+            "msg_type",
+            "data_class",
+            "topic_type",
+            "action_type",
+            "ActionSpec",
+        ];
+        let named = named.iter().find_map(|name| given.named(name));
+        let all = named.into_iter().chain(given.positional.iter().copied());
+        all.map(|n| self.type_name(n))
+            .find(|types| !types.is_empty())
+            .unwrap_or_default()
+    }
+
+    fn type_name(&self, node: Node<'a>) -> Vec<String> {
+        if !["identifier", "attribute"].contains(&node.kind()) {
+            return Vec::new();
+        }
+        let written = self.text(node);
+        let full = self.full(written.to_owned());
+        let parts: Vec<&str> = full.split('.').collect();
+        let is_type = parts.len() >= 3 && ["msg", "action"].contains(&parts[parts.len() - 2]);
+        if is_type {
+            return type_of(&parts).into_iter().collect();
+        }
+        let is_bare =
+            !written.contains('.') && full == written && written.starts_with(char::is_uppercase);
+        let modules = self.wildcards.iter().filter(|m| {
+            is_bare && ["msg", "action"].contains(&m.rsplit('.').next().unwrap_or_default())
+        });
+        let name =
+            |module: &String| type_of(&module.split('.').chain([written]).collect::<Vec<_>>());
+        modules.filter_map(name).collect()
+    }
+
+    fn string(&self, node: Node<'a>) -> Option<String> {
+        self.string_at(node, 0).filter(|text| text.len() <= LONGEST)
+    }
+
+    /// The text that an expression stands for.
+    fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
+        self.work.set(self.work.get() + 1);
+        if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {
+            return None;
+        }
+        let field = |name| node.child_by_field_name(name);
+        let again = |node| {
+            self.string_at(node, depth + 1)
+                .filter(|text| text.len() <= LONGEST)
+        };
+        match node.kind() {
+            "string" => {
+                let part = |part: Node<'a>| match part.kind() {
+                    "string_content" => Some(self.text(part).to_owned()),
+                    "interpolation" => again(part.child_by_field_name("expression")?),
+                    _ => Some(String::new()),
+                };
+                children(node).into_iter().map(part).collect()
+            }
+            "concatenated_string" => children(node).into_iter().map(again).collect(),
+            "parenthesized_expression" => again(node.named_child(0)?),
+            "binary_operator" if self.text(field("operator")?) == "+" => {
+                Some(again(field("left")?)? + &again(field("right")?)?)
+            }
+            "identifier" => again(self.texts.get(self.text(node))?),
+            "attribute" => match self.texts.get(self.text(node)) {
+                Some(value) => again(value),
+                // `….get_parameter('x').value`, `….get_parameter_value().string_value`
+                None => {
+                    again(field("object").filter(|n| ["call", "attribute"].contains(&n.kind()))?)
+                }
+            },
+            "call" => {
+                let (name, object) = self.called(node);
+                let given = self.arguments(node);
+                match name {
+                    "get_param" | "declare_parameter" => again(*given.positional.get(1)?),
+                    "get_parameter" => {
+                        let name = again(*given.positional.first()?)?;
+                        again(self.texts.parameter(&name)?)
+                    }
+                    "get_parameter_value" => {
+                        again(field("function")?.child_by_field_name("object")?)
+                    }
+                    "str" if object.is_empty() => again(*given.positional.first()?),
+                    _ => None,
+                }
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The arguments of a call.
+#[derive(Default)]
+struct Given<'a> {
+    positional: Vec<Node<'a>>,
+    named: Vec<(&'a str, Node<'a>)>,
+}
+
+impl<'a> Given<'a> {
+    fn named(&self, name: &str) -> Option<Node<'a>> {
+        self.named
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map(|(_, node)| *node)
+    }
+}
+
+/// What a call makes, by its name and its name in full.
+fn made(name: &str, full: &str) -> Option<Made> {
+    let module = full.split('.').next().unwrap_or_default();
+    Some(match (name, module) {
+        ("create_publisher" | "create_lifecycle_publisher", _) | ("Publisher", "rospy") => {
+            Made::Publisher
+        }
+        ("create_subscription", _) | ("Subscriber", "rospy" | "message_filters") => {
+            Made::Subscriber
+        }
+        ("wait_for_message", _) => Made::Moment,
+        ("SimpleActionServer" | "ActionServer", "actionlib") => Made::ActionServer1,
+        ("SimpleActionClient" | "ActionClient", "actionlib") => Made::ActionClient1,
+        ("ActionServer", "rclpy") => Made::ActionServer2,
+        ("ActionClient", "rclpy") => Made::ActionClient2,
+        ("TransformBroadcaster", "tf" | "tf2_ros") => Made::Broadcaster,
+        ("StaticTransformBroadcaster", "tf2_ros") => Made::StaticBroadcaster,
+        ("TransformListener", "tf" | "tf2_ros") => Made::Listener,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests;

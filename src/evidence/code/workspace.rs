@@ -1,0 +1,463 @@
+//! All of a workspace together: whose class a name means, what belongs to a node, which nodes its programs and launch
+//! files start.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::declaration::{Class, Declaration, FileCode};
+use super::packages::{Package, Program, package_of};
+use crate::evidence::topology::launch::LaunchedNode;
+
+/// What was read of a workspace.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    pub(super) packages: Vec<Package>,
+    pub(super) files: Vec<CodeFile>,
+    /// Launch files by their paths, with the nodes that each may start.
+    pub(super) launches: Vec<(String, Vec<LaunchedNode>)>,
+    /// The parts of each class, by its name.
+    by_name: BTreeMap<String, Vec<Part>>,
+}
+
+/// A source file.
+#[derive(Debug)]
+pub(super) struct CodeFile {
+    pub(super) path: String,
+    pub(super) package: Option<usize>,
+    pub(super) code: FileCode,
+}
+
+/// A class of a file, or the code outside its classes: file, place.
+type Part = (usize, usize);
+
+/// A declaration with its file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Placed {
+    /// Below the workspace.
+    pub(crate) path: String,
+    pub(crate) declaration: Declaration,
+}
+
+/// A node that the workspace may start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Instance {
+    /// Its name without namespace.
+    pub(crate) name: String,
+    /// Its namespace, where a launch file gives one; empty at the root.
+    pub(crate) namespace: Option<String>,
+    pub(crate) remaps: Vec<(String, String)>,
+    /// The launch file and the line that start it.
+    pub(crate) launched: Option<(String, usize)>,
+    /// What tells it from other programs of the same node name: the file and the class.
+    pub(crate) program: (String, String),
+    /// What its program declares.
+    pub(crate) declared: Arc<[Placed]>,
+    /// Whether it only belongs to tests.
+    pub(crate) is_test: bool,
+    /// Whether its program logs.
+    pub(crate) logs: bool,
+}
+
+/// A node in the code.
+#[derive(Clone, Debug)]
+struct CodeNode {
+    names: Vec<String>,
+    program: (String, String),
+    declared: Arc<[Placed]>,
+    logs: bool,
+}
+
+/// Classes that make a class that derives from them a node.
+const NODES: &[&str] = &["LifecycleNode", "ManagedNode", "Node", "Nodelet"];
+
+/// The most parts that one node may be made of.
+const MOST_PARTS: usize = 300;
+
+/// The most declarations of one node, and of all nodes together: a hundred times what the largest robots have.
+const MOST_DECLARED: usize = 1000;
+const MOST_OF_ALL: usize = 500_000;
+
+/// A name of more classes than this says nothing outside its own file.
+const MOST_NAMESAKES: usize = 500;
+
+/// The most programs that launch files may start.
+const MOST_PROGRAMS: usize = 5_000;
+
+/// The most nodes that a workspace may start.
+const MOST_INSTANCES: usize = 20_000;
+
+impl Workspace {
+    pub(super) fn new(
+        packages: Vec<Package>,
+        files: Vec<(String, FileCode)>,
+        launches: Vec<(String, Vec<LaunchedNode>)>,
+    ) -> Self {
+        let mut all = Self {
+            packages,
+            launches,
+            ..Self::default()
+        };
+        let telling = files
+            .into_iter()
+            .filter(|(_, code)| !code.classes.is_empty());
+        for (path, code) in telling {
+            for (place, class) in code
+                .classes
+                .iter()
+                .enumerate()
+                .filter(|(_, c)| !c.name.is_empty())
+            {
+                let part = (all.files.len(), place);
+                all.by_name
+                    .entry(class.name.clone())
+                    .or_default()
+                    .push(part);
+            }
+            all.files.push(CodeFile {
+                package: package_of(&all.packages, &path),
+                path,
+                code,
+            });
+        }
+        all
+    }
+
+    /// Every declaration of files that are no tests, whoever it belongs to.
+    pub(super) fn places(&self) -> Vec<Placed> {
+        let files = self.files.iter().filter(|file| !is_test(&file.path));
+        let declared = files.flat_map(|file| {
+            let all = file.code.classes.iter().flat_map(|c| &c.declarations);
+            all.map(|declaration| Placed {
+                path: file.path.clone(),
+                declaration: declaration.clone(),
+            })
+        });
+        declared.collect()
+    }
+
+    /// Every node that may be started, as written and as launched.
+    pub(super) fn instances(&self) -> Vec<Instance> {
+        let mut all = Vec::new();
+        let mut declared = 0;
+        for (file, code) in self.files.iter().enumerate() {
+            if declared > MOST_OF_ALL || all.len() > MOST_INSTANCES {
+                break;
+            }
+            let mut nodes: Vec<CodeNode> = self.free_node(&[file]).into_iter().collect();
+            let given = code.code.classes.iter().flat_map(|c| &c.mentions);
+            let given: BTreeMap<&str, &String> = given
+                .filter_map(|(class, name)| Some((class.as_str(), name.as_ref()?)))
+                .collect();
+            for (place, class) in code.code.classes.iter().enumerate() {
+                if class.is_defined && self.is_node((file, place), 0) {
+                    nodes.push(self.class_node((file, place)));
+                }
+            }
+            for (class, name) in given {
+                let parts = self.meant(class, file);
+                if let Some(part) = parts.first().filter(|p| self.is_node(**p, 0)) {
+                    let mut node = self.class_node(*part);
+                    // A text at the call may be anything; the name counts where the class has none of its own.
+                    if node.names.is_empty() {
+                        node.names.push(name.clone());
+                        nodes.push(node);
+                    }
+                }
+            }
+            for node in nodes {
+                declared += node.declared.len();
+                all.extend(node.names.iter().map(|name| as_written(&node, name)));
+            }
+        }
+        let mut programs = BTreeMap::new();
+        for (path, launched) in &self.launches {
+            for node in launched.iter().take(MOST_INSTANCES) {
+                let key = (node.package.clone(), node.program.clone());
+                let nodes = programs
+                    .entry(key)
+                    .or_insert_with(|| self.program(&node.package, &node.program));
+                all.extend(as_launched(path, node, nodes));
+                if all.len() > MOST_INSTANCES || programs.len() > MOST_PROGRAMS {
+                    return all;
+                }
+            }
+        }
+        all
+    }
+
+    /// The nodes of an executable, a component or a nodelet of a package.
+    fn program(&self, package: &str, program: &str) -> Vec<CodeNode> {
+        let packages = (0..).zip(&self.packages).filter(|(_, p)| p.name == package);
+        for (at, found) in packages {
+            match found.programs.get(program) {
+                Some(Program::Files(paths)) => {
+                    let is_own = |f: &usize| paths.contains(&self.files[*f].path);
+                    let files: Vec<usize> = (0..self.files.len()).filter(is_own).collect();
+                    return self.nodes_of(&files);
+                }
+                Some(Program::Class(class)) => return self.component(class, at),
+                None => {}
+            }
+            let last = program.rsplit(['/', ':']).next().unwrap_or(program);
+            let is_script = |f: &usize| {
+                let file = &self.files[*f];
+                let name = file.path.rsplit('/').next().unwrap_or_default();
+                file.package == Some(at)
+                    && (name == program || name.strip_suffix(".py") == Some(program))
+            };
+            let scripts: Vec<usize> = (0..self.files.len()).filter(is_script).collect();
+            if !scripts.is_empty() {
+                return self.nodes_of(&scripts);
+            }
+            let nodes = self.component(last, at);
+            if !nodes.is_empty() {
+                return nodes;
+            }
+        }
+        Vec::new()
+    }
+
+    fn component(&self, class: &str, package: usize) -> Vec<CodeNode> {
+        let parts = self.by_name.get(class).into_iter().flatten();
+        let own = parts
+            .copied()
+            .find(|part| self.file(*part).package == Some(package) && self.class(*part).is_defined);
+        own.map(|part| self.class_node(part)).into_iter().collect()
+    }
+
+    /// The nodes that a program of these files starts: that of its own code, and the classes of nodes that it makes.
+    fn nodes_of(&self, files: &[usize]) -> Vec<CodeNode> {
+        let mut nodes: Vec<CodeNode> = self.free_node(files).into_iter().collect();
+        let free = files.iter().map(|file| (*file, 0)).collect();
+        let (_, made) = self.belonging(free);
+        nodes.extend(made.into_iter().map(|part| self.class_node(part)));
+        nodes
+    }
+
+    /// The node of the code outside classes.
+    fn free_node(&self, files: &[usize]) -> Option<CodeNode> {
+        let free: Vec<Part> = files.iter().map(|file| (*file, 0)).collect();
+        // rospy knows one node per process, wherever it is named.
+        let all = files
+            .iter()
+            .flat_map(|f| (0..self.files[*f].code.classes.len()).map(|place| (*f, place)));
+        let names = all.filter(|part| part.1 == 0 || !self.is_node(*part, 0));
+        let names: BTreeSet<String> = names
+            .flat_map(|part| self.class(part).node_names.clone())
+            .collect();
+        let path = self.files[*files.first()?].path.clone();
+        let (parts, _) = self.belonging(free);
+        let node = self.node(&parts, names, (path, String::new()));
+        (!node.names.is_empty() || !node.declared.is_empty()).then_some(node)
+    }
+
+    fn class_node(&self, part: Part) -> CodeNode {
+        let (parts, _) = self.belonging(self.parts(part));
+        // The class's own name for its node beats those of its bases.
+        let own = self
+            .parts(part)
+            .into_iter()
+            .flat_map(|p| self.class(p).node_names.clone())
+            .collect::<BTreeSet<_>>();
+        let names = if own.is_empty() {
+            let of_bases = parts.iter().filter(|p| self.is_node(**p, 0));
+            of_bases
+                .flat_map(|p| self.class(*p).node_names.clone())
+                .collect()
+        } else {
+            own
+        };
+        self.node(
+            &parts,
+            names,
+            (self.file(part).path.clone(), self.class(part).name.clone()),
+        )
+    }
+
+    fn node(&self, parts: &[Part], names: BTreeSet<String>, program: (String, String)) -> CodeNode {
+        let is_recorder = parts.iter().any(|part| self.class(*part).is_recorder);
+        let placed = |part: &Part| {
+            let path = &self.file(*part).path;
+            let declared = self.class(*part).declarations.iter().cloned();
+            declared
+                .map(|declaration| Placed {
+                    path: path.clone(),
+                    declaration,
+                })
+                .collect::<Vec<_>>()
+        };
+        CodeNode {
+            // A text that is no name of a node was given for something else.
+            names: names
+                .into_iter()
+                .filter(|n| !n.is_empty() && !n.contains(char::is_whitespace))
+                .collect(),
+            program,
+            // What writes bags subscribes what it was told, which the code does not say.
+            declared: if is_recorder {
+                Arc::default()
+            } else {
+                parts.iter().flat_map(placed).take(MOST_DECLARED).collect()
+            },
+            logs: parts.iter().any(|part| self.class(*part).logs),
+        }
+    }
+
+    /// The parts that belong to the node of these parts, sorted: its bases, and the classes that it makes and that are no
+    /// nodes themselves. Those that are come second.
+    fn belonging(&self, parts: Vec<Part>) -> (Vec<Part>, Vec<Part>) {
+        let mut open = parts;
+        let (mut own, mut others) = (BTreeSet::new(), BTreeSet::new());
+        while let Some(part) = open.pop() {
+            if own.len() >= MOST_PARTS || !own.insert(part) {
+                continue;
+            }
+            let class = self.class(part);
+            for base in &class.bases {
+                open.extend(self.meant(base, part.0));
+            }
+            for name in class.mentions.keys() {
+                let other = self.meant(name, part.0);
+                match other.first().filter(|first| self.is_node(**first, 0)) {
+                    Some(first) => {
+                        others.insert(*first);
+                    }
+                    None => open.extend(other),
+                }
+            }
+        }
+        let defined = others
+            .into_iter()
+            .filter(|p| self.class(*p).is_defined && !own.contains(p));
+        (own.iter().copied().collect(), defined.collect())
+    }
+
+    /// The parts of the class that a name means in a file: of this file, of the module that it is imported from, of this
+    /// package, or the only one in the workspace.
+    fn meant(&self, name: &str, file: usize) -> Vec<Part> {
+        let Some(all) = self.by_name.get(name) else {
+            return Vec::new();
+        };
+        if all.len() > MOST_NAMESAKES {
+            let from = all.partition_point(|part| part.0 < file);
+            let own = all[from..].iter().take_while(|part| part.0 == file);
+            return own
+                .copied()
+                .filter(|p| self.class(*p).is_defined)
+                .take(1)
+                .collect();
+        }
+        let defined = || all.iter().copied().filter(|p| self.class(*p).is_defined);
+        let here = &self.files[file];
+        let import = here
+            .code
+            .imports
+            .get(name)
+            .map(|full| full.rsplit_once('.').map_or("", |(module, _)| module));
+        let module =
+            import.map(|module| format!("{}.py", module.trim_start_matches('.').replace('.', "/")));
+        let is_imported = |p: &Part| {
+            module
+                .as_ref()
+                .is_some_and(|m| is_path_end(&self.file(*p).path, m))
+        };
+        let in_package = |p: &Part| here.package.is_some() && self.file(*p).package == here.package;
+        let in_file = defined().find(|p| p.0 == file);
+        let chosen =
+            in_file.or_else(|| only(defined().filter(|p| is_imported(p) && in_package(p))));
+        let chosen = chosen.or_else(|| only(defined().filter(is_imported)));
+        let chosen = chosen.or_else(|| only(defined().filter(in_package)));
+        let chosen = chosen.or_else(|| only(defined()));
+        chosen.map(|part| self.parts(part)).unwrap_or_default()
+    }
+
+    /// A class with the functions of it that stand in other files of its package.
+    fn parts(&self, part: Part) -> Vec<Part> {
+        let package = self.file(part).package;
+        let others = self
+            .by_name
+            .get(&self.class(part).name)
+            .into_iter()
+            .flatten();
+        let others =
+            others.filter(|p| !self.class(**p).is_defined && self.file(**p).package == package);
+        std::iter::once(part).chain(others.copied()).collect()
+    }
+
+    /// Whether a class is a node, by what it derives from.
+    fn is_node(&self, part: Part, depth: usize) -> bool {
+        depth < 8
+            && self.class(part).bases.iter().any(|base| {
+                let meant = self.meant(base, part.0);
+                match meant.first() {
+                    Some(first) if *first != part => self.is_node(*first, depth + 1),
+                    _ => NODES.contains(&base.as_str()),
+                }
+            })
+    }
+
+    fn file(&self, part: Part) -> &CodeFile {
+        &self.files[part.0]
+    }
+
+    fn class(&self, part: Part) -> &Class {
+        &self.files[part.0].code.classes[part.1]
+    }
+}
+
+/// The one thing there is; `None` for none or several.
+fn only<T>(mut all: impl Iterator<Item = T>) -> Option<T> {
+    let first = all.next();
+    if all.next().is_none() { first } else { None }
+}
+
+fn is_path_end(path: &str, end: &str) -> bool {
+    path.strip_suffix(end)
+        .is_some_and(|before| before.is_empty() || before.ends_with('/'))
+}
+
+fn as_written(node: &CodeNode, name: &str) -> Instance {
+    Instance {
+        name: name.trim_start_matches('/').to_owned(),
+        namespace: None,
+        remaps: Vec::new(),
+        launched: None,
+        program: node.program.clone(),
+        declared: Arc::clone(&node.declared),
+        is_test: is_test(&node.program.0),
+        logs: node.logs,
+    }
+}
+
+/// A node as a launch file starts it. Its name there beats the code's, where the program starts one node only.
+fn as_launched(path: &str, launched: &LaunchedNode, nodes: &[CodeNode]) -> Vec<Instance> {
+    let mut all = Vec::new();
+    for node in nodes {
+        let names = match &launched.name {
+            Some(name) if nodes.len() == 1 => std::slice::from_ref(name),
+            _ => &node.names[..],
+        };
+        for name in names {
+            all.push(Instance {
+                namespace: Some(launched.namespace.clone()),
+                remaps: launched.remaps.clone(),
+                launched: Some((path.to_owned(), launched.line)),
+                is_test: is_test(path) || is_test(&node.program.0),
+                ..as_written(node, name)
+            });
+        }
+    }
+    all
+}
+
+/// Whether a file belongs to tests.
+fn is_test(path: &str) -> bool {
+    let (folders, name) = path.rsplit_once('/').unwrap_or(("", path));
+    let stem = name.split('.').next().unwrap_or_default();
+    folders
+        .split('/')
+        .any(|f| ["test", "tests"].contains(&f) || f.starts_with("integration_test"))
+        || stem.starts_with("test_")
+        || stem.ends_with("_test")
+        || name.split('.').next_back() == Some("test")
+}

@@ -1,0 +1,353 @@
+//! Messages taken apart into the columns of a table: a column per field, those of messages inside named with dots, and
+//! a list for each array around a field.
+//!
+//! A payload is read by the definition in its bag (<http://wiki.ros.org/msg>,
+//! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>). Arrays of bytes are bytes. Times are two
+//! fields, `sec` and `nanosec`, in ROS 1 as they are in ROS 2.
+
+mod definition;
+
+use std::ops::Range;
+
+use super::cursor::{Cursor, Malformed};
+use crate::bag::{Connection, Encoding};
+use crate::base::table::{Batch, Column, Kind, Values};
+use definition::{Array, Definition, Field};
+
+/// Messages inside messages deeper than this are hostile.
+const DEEPEST: usize = 16;
+/// More columns than this are hostile: messages in use have some hundred.
+const MOST_COLUMNS: usize = 2000;
+
+/// What a field that is no message holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Primitive {
+    /// A number or a truth value, and its size in bytes.
+    Number(Kind, usize),
+    Text,
+}
+
+/// The next thing to do with a payload.
+#[derive(Clone, Debug, PartialEq)]
+enum Step {
+    One(usize, Primitive),
+    /// A list of bytes is one value.
+    Bytes(usize, Array),
+    /// The list that ends on `level` of each of `columns`.
+    List {
+        count: Array,
+        columns: Range<usize>,
+        level: usize,
+        /// The fewest bytes that an element takes.
+        least: usize,
+        element: Vec<Self>,
+    },
+    /// CDR writes a message without fields as one byte.
+    Nothing,
+}
+
+/// A definition, ready to take messages apart.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Decoder {
+    encoding: Encoding,
+    steps: Vec<Step>,
+    columns: Vec<(String, Kind, usize)>,
+    /// Whether the message has no fields at all.
+    is_empty: bool,
+}
+
+impl Decoder {
+    /// The decoder of a connection's messages.
+    ///
+    /// # Errors
+    /// Why its messages cannot be decoded.
+    pub(crate) fn new(connection: &Connection) -> Result<Self, String> {
+        if let Encoding::Other(name) = &connection.encoding {
+            return Err(format!("they are encoded as `{name}`"));
+        }
+        let text = connection.definition.as_deref().unwrap_or_default();
+        let definition = Definition::parse(text, &connection.type_name)?;
+        let mut plan = Plan {
+            definition: &definition,
+            is_cdr: connection.encoding == Encoding::Cdr,
+            columns: Vec::new(),
+            fields: 0,
+        };
+        let fields = &definition.messages[0].fields;
+        let (steps, _) = plan.message(0, "", 0, 0)?;
+        Ok(Self {
+            encoding: connection.encoding.clone(),
+            steps,
+            is_empty: fields.is_empty(),
+            columns: plan.columns,
+        })
+    }
+
+    /// A column for each field, in the order of the definition, whose names are none of `taken`.
+    pub(crate) fn columns(&self, taken: &[&str]) -> impl Iterator<Item = Column> {
+        let mut names: Vec<String> = Vec::new();
+        self.columns.iter().map(move |(name, kind, levels)| {
+            let mut name = name.clone();
+            while taken.contains(&name.as_str()) || names.contains(&name) {
+                name.push('_');
+            }
+            names.push(name.clone());
+            Column::full(name, *kind, *levels)
+        })
+    }
+
+    /// Adds a payload's values to the columns from `first` on. Where that fails they are left half-filled.
+    ///
+    /// # Errors
+    /// If the payload has another layout.
+    pub(crate) fn decode(
+        &self,
+        data: &[u8],
+        batch: &mut Batch,
+        first: usize,
+    ) -> Result<(), Malformed> {
+        let mut payload = Cursor::new(&self.encoding, data)?;
+        if !self.is_empty {
+            run(&self.steps, &mut payload, &mut batch.columns[first..])?;
+        }
+        payload.finish()
+    }
+}
+
+/// A plan being made.
+struct Plan<'a> {
+    definition: &'a Definition,
+    is_cdr: bool,
+    columns: Vec<(String, Kind, usize)>,
+    /// How many fields were visited.
+    fields: usize,
+}
+
+impl Plan<'_> {
+    /// The steps of a message inside `levels` lists, and the fewest bytes that it takes.
+    fn message(
+        &mut self,
+        message: usize,
+        prefix: &str,
+        levels: usize,
+        depth: usize,
+    ) -> Result<(Vec<Step>, usize), String> {
+        let definition = self.definition;
+        let fields = &definition.messages[message].fields;
+        if depth > DEEPEST {
+            return Err("its definition holds itself".to_owned());
+        }
+        if fields.is_empty() && self.is_cdr {
+            return Ok((vec![Step::Nothing], 1));
+        }
+        let (mut steps, mut least) = (Vec::new(), 0_usize);
+        for field in fields {
+            let name = format!("{prefix}{}", field.name);
+            let (more, bytes) = self.field(message, field, &name, levels, depth)?;
+            steps.extend(more);
+            least = least.saturating_add(bytes);
+        }
+        Ok((steps, least))
+    }
+
+    fn field(
+        &mut self,
+        message: usize,
+        field: &Field,
+        name: &str,
+        levels: usize,
+        depth: usize,
+    ) -> Result<(Vec<Step>, usize), String> {
+        self.fields += 1;
+        if self.fields > MOST_COLUMNS {
+            return Err(format!(
+                "its definition has more than {MOST_COLUMNS} fields"
+            ));
+        }
+        let count = field.array;
+        let bytes = |least: usize| match count {
+            Array::Fixed(count) => least.saturating_mul(count),
+            _ => 4,
+        };
+        if count == Array::No {
+            return self.one(message, &field.kind, name, levels, depth);
+        }
+        if ["uint8", "byte", "char", "octet"].contains(&field.kind.as_str()) {
+            let step = Step::Bytes(self.columns.len(), count);
+            self.columns.push((name.to_owned(), Kind::Bytes, levels));
+            return Ok((vec![step], bytes(1)));
+        }
+        let start = self.columns.len();
+        let (element, least) = self.one(message, &field.kind, name, levels + 1, depth)?;
+        let list = Step::List {
+            count,
+            columns: start..self.columns.len(),
+            level: levels,
+            least,
+            element,
+        };
+        Ok((vec![list], bytes(least)))
+    }
+
+    /// A field, or an element of its array.
+    fn one(
+        &mut self,
+        message: usize,
+        kind: &str,
+        name: &str,
+        levels: usize,
+        depth: usize,
+    ) -> Result<(Vec<Step>, usize), String> {
+        let number = |kind, size| Ok((Primitive::Number(kind, size), size));
+        let primitive = match kind {
+            "bool" => number(Kind::Flag, 1),
+            "int8" => number(Kind::I8, 1),
+            // ROS 1 says that `byte` is signed; ROS 2 has it unsigned, and so has everybody in practice.
+            "uint8" | "char" | "byte" | "octet" => number(Kind::U8, 1),
+            "int16" => number(Kind::I16, 2),
+            "uint16" => number(Kind::U16, 2),
+            "int32" => number(Kind::I32, 4),
+            "uint32" => number(Kind::U32, 4),
+            "int64" => number(Kind::I64, 8),
+            "uint64" => number(Kind::U64, 8),
+            "float32" => number(Kind::F32, 4),
+            "float64" => number(Kind::F64, 8),
+            "string" => Ok((Primitive::Text, 4)),
+            "wstring" => Err("wide strings are not decoded".to_owned()),
+            "time" | "duration" if !self.is_cdr => {
+                let sec = if kind == "time" { "uint32" } else { "int32" };
+                let nanosec = if kind == "time" { "uint32" } else { "int32" };
+                let (mut steps, _) =
+                    self.one(message, sec, &format!("{name}.sec"), levels, depth)?;
+                let nanosec =
+                    self.one(message, nanosec, &format!("{name}.nanosec"), levels, depth)?;
+                steps.extend(nanosec.0);
+                return Ok((steps, 8));
+            }
+            _ => {
+                let inner = self.definition.find(message, kind)?;
+                return self.message(inner, &format!("{name}."), levels, depth + 1);
+            }
+        };
+        let (primitive, least) = primitive?;
+        let column = self.columns.len();
+        let kind = match primitive {
+            Primitive::Number(kind, _) => kind,
+            Primitive::Text => Kind::Text,
+        };
+        self.columns.push((name.to_owned(), kind, levels));
+        Ok((vec![Step::One(column, primitive)], least))
+    }
+}
+
+fn run(steps: &[Step], payload: &mut Cursor<'_>, columns: &mut [Column]) -> Result<(), Malformed> {
+    for step in steps {
+        match step {
+            Step::One(column, Primitive::Number(_, size)) => {
+                numbers(payload, 1, *size, &mut columns[*column].values)?;
+            }
+            Step::One(column, Primitive::Text) => text(payload, &mut columns[*column].values)?,
+            Step::Bytes(column, count) => {
+                let count = many(payload, *count, 1)?;
+                let bytes = payload.bytes(count)?;
+                if let Values::Texts(to) = &mut columns[*column].values {
+                    to.push(bytes);
+                }
+            }
+            Step::List {
+                count,
+                columns: own,
+                level,
+                least,
+                element,
+            } => {
+                let count = many(payload, *count, *least)?;
+                list(element, count, *least, payload, columns)?;
+                for column in &mut columns[own.clone()] {
+                    column.end_list(*level, count);
+                }
+            }
+            Step::Nothing => payload.u8().map(drop)?,
+        }
+    }
+    Ok(())
+}
+
+/// How many elements an array has; never more than the payload has room for.
+fn many(payload: &mut Cursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
+    match count {
+        Array::Told => payload.length(least),
+        Array::Fixed(count) if count.saturating_mul(least.max(1)) > payload.remaining() => {
+            Err(payload.wrong("a whole array"))
+        }
+        Array::Fixed(count) => Ok(count),
+        Array::No => Ok(1),
+    }
+}
+
+fn list(
+    element: &[Step],
+    count: usize,
+    least: usize,
+    payload: &mut Cursor<'_>,
+    columns: &mut [Column],
+) -> Result<(), Malformed> {
+    match element {
+        [Step::One(column, Primitive::Number(_, size))] => {
+            numbers(payload, count, *size, &mut columns[*column].values)
+        }
+        // Elements without a byte hold nothing, however many a hostile payload has of them.
+        _ if least == 0 => Ok(()),
+        _ => (0..count).try_for_each(|_| run(element, payload, columns)),
+    }
+}
+
+fn text(payload: &mut Cursor<'_>, to: &mut Values) -> Result<(), Malformed> {
+    let text = payload.text()?;
+    if let Values::Texts(to) = to {
+        match std::str::from_utf8(text) {
+            Ok(_) => to.push(text),
+            Err(_) => to.push(String::from_utf8_lossy(text).as_bytes()),
+        }
+    }
+    Ok(())
+}
+
+/// Adds `count` numbers of `size` bytes each.
+fn numbers(
+    payload: &mut Cursor<'_>,
+    count: usize,
+    size: usize,
+    to: &mut Values,
+) -> Result<(), Malformed> {
+    let is_big = payload.is_big_endian();
+    let data = payload.numbers(count, size)?;
+    macro_rules! add {
+        ($to:expr, $number:ty) => {{
+            let (all, _) = data.as_chunks::<{ size_of::<$number>() }>();
+            if is_big {
+                $to.extend(all.iter().map(|b| <$number>::from_be_bytes(*b)));
+            } else {
+                $to.extend(all.iter().map(|b| <$number>::from_le_bytes(*b)));
+            }
+        }};
+    }
+    match to {
+        Values::Flag(to) => to.extend(data.iter().map(|b| *b != 0)),
+        Values::U8(to) => to.extend_from_slice(data),
+        Values::I8(to) => add!(to, i8),
+        Values::I16(to) => add!(to, i16),
+        Values::U16(to) => add!(to, u16),
+        Values::I32(to) => add!(to, i32),
+        Values::U32(to) => add!(to, u32),
+        Values::I64(to) => add!(to, i64),
+        Values::U64(to) => add!(to, u64),
+        Values::F32(to) => add!(to, f32),
+        Values::F64(to) => add!(to, f64),
+        Values::Texts(_) => {}
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,133 @@
+//! The text of a message definition as fields, with the messages inside it.
+
+/// A field of a message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Field {
+    pub(super) name: String,
+    /// Its type without array and bounds, as written: `float64`, `Point`, `geometry_msgs/Point`.
+    pub(super) kind: String,
+    pub(super) array: Array,
+}
+
+/// Whether a field is an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Array {
+    No,
+    /// Of this length.
+    Fixed(usize),
+    /// Of the length that the payload says.
+    Told,
+}
+
+/// A message: its package, its own name, its fields.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Message {
+    package: String,
+    name: String,
+    pub(super) fields: Vec<Field>,
+}
+
+/// A definition, the outermost message first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Definition {
+    pub(super) messages: Vec<Message>,
+}
+
+impl Definition {
+    /// Reads the definition of `type_name`. The definition of a message without fields is empty, so an empty text is
+    /// believed only of types that are known to be so.
+    ///
+    /// # Errors
+    /// What keeps it from being used.
+    pub(super) fn parse(text: &str, type_name: &str) -> Result<Self, String> {
+        let is_empty = text.lines().all(|l| without_comment(l).is_empty());
+        if is_empty && !type_name.ends_with("/Empty") {
+            return Err("the bag holds no definition of its type".to_owned());
+        }
+        if text.contains("module ") && text.contains("struct ") {
+            return Err("its definition is written in IDL, which is not decoded".to_owned());
+        }
+        let mut messages = vec![Message::new(type_name)];
+        for line in text.lines() {
+            let line = without_comment(line);
+            if let Some(name) = line.strip_prefix("MSG:") {
+                messages.push(Message::new(name.trim()));
+            } else if let (Some(field), Some(message)) = (field(line)?, messages.last_mut()) {
+                message.fields.push(field);
+            }
+        }
+        Ok(Self { messages })
+    }
+
+    /// The place of the message that `kind` means in the message at place `from`: of that package, of the same
+    /// package, of any.
+    ///
+    /// # Errors
+    /// If the definition does not hold it.
+    pub(super) fn find(&self, from: usize, kind: &str) -> Result<usize, String> {
+        let wanted = Message::new(kind);
+        let own = &self.messages[from].package;
+        let package = if wanted.package.is_empty() {
+            own
+        } else {
+            &wanted.package
+        };
+        let inside = || self.messages.iter().enumerate().skip(1);
+        let found = inside()
+            .find(|(_, m)| m.name == wanted.name && m.package == *package)
+            .or_else(|| inside().find(|(_, m)| m.name == wanted.name));
+        found
+            .map(|(at, _)| at)
+            .ok_or_else(|| format!("its definition lacks the type `{kind}`"))
+    }
+}
+
+impl Message {
+    /// `std_msgs/Header`, `std_msgs/msg/Header` or `Header`, without fields yet.
+    fn new(name: &str) -> Self {
+        let mut parts = name.split('/');
+        let last = parts.next_back().unwrap_or_default();
+        Self {
+            package: parts.next().unwrap_or_default().to_owned(),
+            name: last.to_owned(),
+            fields: Vec::new(),
+        }
+    }
+}
+
+fn without_comment(line: &str) -> &str {
+    line.split('#').next().unwrap_or_default().trim()
+}
+
+/// The field of a line; `None` for a constant, a separator or nothing.
+fn field(line: &str) -> Result<Option<Field>, String> {
+    let Some((kind, rest)) = line.split_once(char::is_whitespace) else {
+        return Ok(None);
+    };
+    let rest = rest.trim_start();
+    let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_'));
+    let (name, tail) = rest.split_at(end.unwrap_or(rest.len()));
+    if name.is_empty() || tail.trim_start().starts_with('=') {
+        return Ok(None);
+    }
+    let (kind, array) = kind.split_at(kind.find('[').unwrap_or(kind.len()));
+    let kind = kind.split("<=").next().unwrap_or(kind);
+    Ok(Some(Field {
+        name: name.to_owned(),
+        kind: kind.to_owned(),
+        array: length(array)?,
+    }))
+}
+
+/// The length in `[]`, `[<=3]` or `[3]`.
+fn length(array: &str) -> Result<Array, String> {
+    match array.strip_prefix('[').and_then(|a| a.strip_suffix(']')) {
+        None if array.is_empty() => Ok(Array::No),
+        Some(inner) if inner.is_empty() || inner.starts_with("<=") => Ok(Array::Told),
+        Some(inner) => inner
+            .parse()
+            .map(Array::Fixed)
+            .map_err(|_| format!("its definition has an array `{array}`")),
+        None => Err(format!("its definition has an array `{array}`")),
+    }
+}

@@ -1,0 +1,113 @@
+//! Payloads by hand against their columns.
+
+use super::*;
+use crate::bag::ConnectionId;
+
+fn connection(type_name: &str, definition: &str, encoding: Encoding) -> Connection {
+    Connection {
+        id: ConnectionId(0),
+        topic: "/t".into(),
+        type_name: type_name.into(),
+        definition: Some(definition.into()),
+        type_hash: None,
+        publisher: None,
+        latching: false,
+        qos: None,
+        encoding,
+    }
+}
+
+fn decoded(connection: &Connection, data: &[u8]) -> Result<Batch, String> {
+    let decoder = Decoder::new(connection)?;
+    let mut batch = Batch::of(decoder.columns(&["time_ns"]));
+    decoder
+        .decode(data, &mut batch, 0)
+        .map_err(|e| e.to_string())?;
+    batch.rows = 1;
+    Ok(batch)
+}
+
+/// The table as CSV.
+fn csv(connection: &Connection, data: &[u8]) -> String {
+    let batch = decoded(connection, data).unwrap();
+    let mut rows = crate::base::csv::Rows::new(Vec::new(), &batch).unwrap();
+    rows.write(&batch).unwrap();
+    String::from_utf8(rows.finish().unwrap()).unwrap()
+}
+
+#[test]
+fn fields_of_messages_inside_have_dots_and_arrays_are_lists() {
+    let definition = "time stamp\nbool FLAG=1\nPart[] parts\nfloat32[2] two\nuint8[] raw\nint8 last # end\n\
+                      ===\nMSG: a/Part\nuint16 n\nstring[] names\nb/Deep deep\n===\nMSG: b/Deep\nint64 x\n";
+    let mut data: Vec<u8> = Vec::new();
+    data.extend([1, 0, 0, 0, 2, 0, 0, 0]);
+    data.extend([2, 0, 0, 0]);
+    data.extend([7, 0, 1, 0, 0, 0, 2, 0, 0, 0, b'h', b'i']);
+    data.extend((-5_i64).to_le_bytes());
+    data.extend([8, 0, 0, 0, 0, 0]);
+    data.extend(6_i64.to_le_bytes());
+    data.extend(1.5_f32.to_le_bytes());
+    data.extend(f32::INFINITY.to_le_bytes());
+    data.extend([3, 0, 0, 0, 9, 8, 7, 255]);
+    let text = csv(&connection("a/Top", definition, Encoding::Ros1), &data);
+    let expected = "stamp.sec,stamp.nanosec,parts.n,parts.names,parts.deep.x,two,raw,last\n\
+                    1,2,\"[7,8]\",\"[[\"\"hi\"\"],[]]\",\"[-5,6]\",\"[1.5,Infinity]\",\"[9,8,7]\",-1\n";
+    assert_eq!(text, expected);
+}
+
+#[test]
+fn cdr_is_aligned_and_an_empty_message_is_a_byte() {
+    let definition = "b/Nothing nothing\nfloat64[] list\nuint8 last\n===\nMSG: b/Nothing\n";
+    let little = [
+        0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f, 5,
+    ];
+    let big = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0x3f, 0xf0, 0, 0, 0, 0, 0, 0, 5,
+    ];
+    for data in [little, big] {
+        let text = csv(&connection("b/msg/Top", definition, Encoding::Cdr), &data);
+        assert_eq!(text, "list,last\n[1],5\n");
+    }
+}
+
+#[test]
+fn a_field_named_like_a_column_of_ours_gets_a_tail() {
+    let batch = decoded(
+        &connection("a/T", "int8 time_ns\nint8 time_ns\n", Encoding::Ros1),
+        &[1, 2],
+    );
+    let names: Vec<_> = batch.unwrap().columns.into_iter().map(|c| c.name).collect();
+    assert_eq!(names, ["time_ns_", "time_ns__"]);
+}
+
+#[test]
+fn what_cannot_be_decoded_says_why() {
+    let why = |definition: &str, encoding| {
+        decoded(&connection("a/T", definition, encoding), &[]).unwrap_err()
+    };
+    assert!(why("", Encoding::Ros1).contains("no definition"));
+    assert!(why("X x\n", Encoding::Ros1).contains("lacks the type `X`"));
+    assert!(why("T t\n===\nMSG: a/T\nT t\n", Encoding::Ros1).contains("holds itself"));
+    assert!(why("int8 x\n", Encoding::Other("json".to_owned())).contains("`json`"));
+    assert!(why("module a { struct T { long x; }; };", Encoding::Cdr).contains("IDL"));
+}
+
+#[test]
+fn hostile_payloads_end_early() {
+    let fails = |definition: &str, data: &[u8]| {
+        decoded(&connection("a/T", definition, Encoding::Ros1), data).is_err()
+    };
+    assert!(fails("float64[] x\n", &[255, 255, 255, 255]));
+    assert!(fails("float64[4294967295] x\n", &[0; 64]));
+    assert!(fails("int8 x\n", &[1, 2]), "bytes are left");
+    // Many elements without a byte each: told at once, not one by one.
+    let nothing = "E[] e\n===\nMSG: a/E\nF[100] f\n===\nMSG: a/F\n";
+    let mut data = vec![0; 1 << 20];
+    data[..4].copy_from_slice(&(1_u32 << 19).to_le_bytes());
+    assert!(fails(nothing, &data));
+    // A definition that doubles on every level.
+    let level = |k: u32| format!("===\nMSG: a/L{k}\nL{0} a\nL{0} b\n", k + 1);
+    let doubling: Vec<String> = (0..20).map(level).collect();
+    let doubling = doubling.concat();
+    assert!(fails(&format!("L0 x\n{doubling}"), &[]));
+}

@@ -1,0 +1,82 @@
+//! The union of all windows as one graph in `GraphML` (<http://graphml.graphdrawing.org>).
+
+use super::encoder::AtOnce;
+use super::spells::{Part, parts};
+use super::{Encoder, Sequence};
+use crate::base::error::Result;
+use crate::draw::paint::xml::Xml;
+use crate::export::target::Target;
+use crate::mission::Mission;
+
+/// Begins the graph.
+///
+/// # Errors
+/// A name with `{n}`.
+pub(crate) fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    AtOnce::start(target, || (text(sequence.data), Vec::new()))
+}
+
+/// What is said of nodes and edges: name and type. Times are seconds from the mission's start.
+const KEYS: [(&str, &str); 7] = [
+    ("label", "string"),
+    ("kind", "string"),
+    ("degree", "string"),
+    ("evidence", "string"),
+    ("messages", "long"),
+    ("first_s", "double"),
+    ("last_s", "double"),
+];
+
+fn text(mission: &Mission) -> String {
+    let (nodes, edges) = parts(mission);
+    let mut xml = Xml::with_capacity(1 << 16);
+    xml.raw("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+    xml.open("graphml")
+        .attribute("xmlns", "http://graphml.graphdrawing.org/xmlns");
+    for (name, kind) in KEYS {
+        xml.open("key")
+            .attribute("id", name)
+            .attribute("for", "all")
+            .attribute("attr.name", name)
+            .attribute("attr.type", kind)
+            .close();
+    }
+    xml.open("graph").attribute("edgedefault", "directed");
+    for node in &nodes {
+        xml.open("node").attribute("id", &node.id);
+        inside(&mut xml, mission, node);
+    }
+    for edge in &edges {
+        let (source, target) = &edge.ends;
+        xml.open("edge")
+            .attribute("id", &edge.id)
+            .attribute("source", source)
+            .attribute("target", target);
+        inside(&mut xml, mission, edge);
+    }
+    xml.close().close().raw("\n");
+    xml.finish()
+}
+
+/// What is known of a node or edge, and its end.
+fn inside(xml: &mut Xml, mission: &Mission, part: &Part) {
+    let second = |at| (mission.offset(at) as f64 / 1e9).to_string();
+    let values = [
+        Some(part.label.clone()),
+        Some(part.kind.to_owned()),
+        Some(part.degree.word().to_owned()),
+        Some(part.evidence.clone()),
+        part.messages.map(|n| n.to_string()),
+        part.spells.first().map(|span| second(span.start)),
+        part.spells.last().map(|span| second(span.end)),
+    ];
+    for ((key, _), value) in KEYS.iter().zip(values) {
+        if let Some(value) = value {
+            xml.open("data").attribute("key", key).text(&value).close();
+        }
+    }
+    xml.close().raw("\n");
+}

@@ -1,0 +1,169 @@
+//! Tables as Apache Parquet: one column of Arrow per column, compressed by zstd.
+//!
+//! Stamps are timestamps of nanoseconds in UTC, numbers keep their width, lists are lists.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+
+use ::parquet::arrow::ArrowWriter;
+use ::parquet::arrow::arrow_writer::ArrowWriterOptions;
+use ::parquet::basic::{Compression, ZstdLevel};
+use ::parquet::file::metadata::KeyValue;
+use ::parquet::file::properties::WriterProperties;
+use arrow_array::types::{
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
+    UInt32Type, UInt64Type,
+};
+use arrow_array::{
+    ArrayRef, ArrowPrimitiveType, BinaryArray, BooleanArray, ListArray, PrimitiveArray,
+    RecordBatch, StringArray, TimestampNanosecondArray,
+};
+use arrow_buffer::{Buffer, NullBuffer, OffsetBuffer, ScalarBuffer};
+use arrow_schema::{DataType, Field, Schema, TimeUnit};
+
+use crate::base::table::{Batch, Column, Kind, Texts, Values};
+
+/// How many rows a group has at most: its columns are held in memory, packed, until it is written.
+const MOST_ROWS: usize = 1 << 20;
+/// How many bytes of packed columns are held in memory before their group is written.
+const MOST_HELD: usize = 16 << 20;
+
+/// A table being written.
+pub(crate) struct Rows<W: Write + Send> {
+    writer: ArrowWriter<W>,
+    schema: Arc<Schema>,
+}
+
+impl<W: Write + Send> Rows<W> {
+    /// Begins a table with the columns of `batch`; `facts` are kept in the file's metadata.
+    pub(crate) fn new(to: W, batch: &Batch, facts: &[(&str, &str)]) -> io::Result<Self> {
+        let schema = Arc::new(Schema::new(
+            batch.columns.iter().map(field).collect::<Vec<_>>(),
+        ));
+        let facts = facts
+            .iter()
+            .map(|(key, value)| KeyValue::new((*key).to_owned(), (*value).to_owned()));
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::ZSTD(ZstdLevel::default()))
+            .set_max_row_group_row_count(Some(MOST_ROWS))
+            .set_created_by("bagreel".to_owned())
+            .set_key_value_metadata(Some(facts.collect()))
+            .build();
+        let options = ArrowWriterOptions::new().with_properties(properties);
+        let writer = ArrowWriter::try_new_with_options(to, Arc::clone(&schema), options);
+        Ok(Self {
+            writer: writer.map_err(io::Error::other)?,
+            schema,
+        })
+    }
+
+    /// Writes all rows of `batch`.
+    pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
+        if batch.rows == 0 {
+            return Ok(());
+        }
+        let columns = batch.columns.iter().map(array).collect::<Result<_, _>>();
+        let rows = columns.and_then(|c| RecordBatch::try_new(Arc::clone(&self.schema), c));
+        let rows = rows.map_err(io::Error::other)?;
+        self.writer.write(&rows).map_err(io::Error::other)?;
+        if self.held() > MOST_HELD {
+            self.unload()?;
+        }
+        Ok(())
+    }
+
+    /// How many bytes of packed columns it holds in memory.
+    pub(crate) fn held(&self) -> usize {
+        self.writer.in_progress_size()
+    }
+
+    /// Ends the group of rows that is held in memory.
+    pub(crate) fn unload(&mut self) -> io::Result<()> {
+        self.writer.flush().map_err(io::Error::other)
+    }
+
+    /// Ends the table.
+    pub(crate) fn finish(self) -> io::Result<W> {
+        self.writer.into_inner().map_err(io::Error::other)
+    }
+}
+
+fn field(column: &Column) -> Field {
+    let mut kind = data_type(column.kind);
+    for _ in &column.lists {
+        kind = DataType::List(element(kind));
+    }
+    Field::new(column.name.as_ref(), kind, column.valid.is_some())
+}
+
+fn element(kind: DataType) -> Arc<Field> {
+    Arc::new(Field::new("element", kind, false))
+}
+
+fn data_type(kind: Kind) -> DataType {
+    match kind {
+        Kind::Flag => DataType::Boolean,
+        Kind::I8 => DataType::Int8,
+        Kind::U8 => DataType::UInt8,
+        Kind::I16 => DataType::Int16,
+        Kind::U16 => DataType::UInt16,
+        Kind::I32 => DataType::Int32,
+        Kind::U32 => DataType::UInt32,
+        Kind::I64 => DataType::Int64,
+        Kind::U64 => DataType::UInt64,
+        Kind::F32 => DataType::Float32,
+        Kind::F64 => DataType::Float64,
+        Kind::Text => DataType::Utf8,
+        Kind::Bytes => DataType::Binary,
+        Kind::Time => DataType::Timestamp(TimeUnit::Nanosecond, Some("UTC".into())),
+    }
+}
+
+type Made<T> = Result<T, arrow_schema::ArrowError>;
+
+fn array(column: &Column) -> Made<ArrayRef> {
+    let mut array = values(column)?;
+    for ends in column.lists.iter().rev() {
+        let kind = element(array.data_type().clone());
+        array = Arc::new(ListArray::try_new(kind, offsets(ends), array, None)?);
+    }
+    Ok(array)
+}
+
+fn values(column: &Column) -> Made<ArrayRef> {
+    let known = column.valid.clone().map(NullBuffer::from);
+    Ok(match (&column.values, column.kind) {
+        (Values::Flag(v), _) => Arc::new(BooleanArray::new(v.clone().into(), known)),
+        (Values::I64(v), Kind::Time) => {
+            Arc::new(TimestampNanosecondArray::new(v.clone().into(), known).with_timezone("UTC"))
+        }
+        (Values::I8(v), _) => numbers::<Int8Type>(v, known),
+        (Values::U8(v), _) => numbers::<UInt8Type>(v, known),
+        (Values::I16(v), _) => numbers::<Int16Type>(v, known),
+        (Values::U16(v), _) => numbers::<UInt16Type>(v, known),
+        (Values::I32(v), _) => numbers::<Int32Type>(v, known),
+        (Values::U32(v), _) => numbers::<UInt32Type>(v, known),
+        (Values::I64(v), _) => numbers::<Int64Type>(v, known),
+        (Values::U64(v), _) => numbers::<UInt64Type>(v, known),
+        (Values::F32(v), _) => numbers::<Float32Type>(v, known),
+        (Values::F64(v), _) => numbers::<Float64Type>(v, known),
+        (Values::Texts(v), Kind::Bytes) => {
+            Arc::new(BinaryArray::try_new(offsets(&v.ends), held(v), known)?)
+        }
+        (Values::Texts(v), _) => Arc::new(StringArray::try_new(offsets(&v.ends), held(v), known)?),
+    })
+}
+
+fn numbers<T: ArrowPrimitiveType>(values: &[T::Native], known: Option<NullBuffer>) -> ArrayRef {
+    Arc::new(PrimitiveArray::<T>::new(values.to_vec().into(), known))
+}
+
+fn held(texts: &Texts) -> Buffer {
+    Buffer::from_slice_ref(&texts.bytes)
+}
+
+/// Ends as Arrow has them: with the 0 at which the first begins.
+fn offsets(ends: &[i32]) -> OffsetBuffer<i32> {
+    let all: Vec<i32> = std::iter::once(0).chain(ends.iter().copied()).collect();
+    OffsetBuffer::new(ScalarBuffer::from(all))
+}

@@ -1,0 +1,121 @@
+//! The mission as tidy tables, as CSV or Parquet: one description of what they hold, two ways to write it.
+//!
+//! Column names are in snake case and reserved in no dialect of SQL; what is empty is unknown.
+
+pub(crate) mod folder;
+mod mission;
+pub(crate) mod writer;
+
+use super::{Encoder, Written};
+use crate::base::error::{Error, Result};
+use crate::base::table::{Batch, Cell};
+use crate::export::sequence::Sequence;
+use crate::export::sink::Sink;
+use crate::export::target::{Target, is_special};
+use crate::mission::Mission;
+use mission::{TABLES, Table};
+pub use writer::TableFormat;
+use writer::Writer;
+
+struct Tables<'a> {
+    mission: &'a Mission,
+    target: Target,
+    format: TableFormat,
+}
+
+/// Begins the tables as CSV.
+///
+/// # Errors
+/// As [`check`].
+pub(crate) fn start_csv<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    start(sequence, target, TableFormat::Csv)
+}
+
+/// Begins the tables as Parquet.
+///
+/// # Errors
+/// As [`start_csv`].
+#[cfg(feature = "parquet")]
+pub(crate) fn start_parquet<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    start(sequence, target, TableFormat::Parquet)
+}
+
+/// Whether several files can be made of this name.
+///
+/// # Errors
+/// [`Error::Usage`] for standard output, devices, and a name with `{n}`.
+pub(crate) fn check(target: &Target) -> Result<()> {
+    let what = match target {
+        Target::Stdout => "standard output is one".to_owned(),
+        Target::Path(path) if is_special(path) => format!("`{}` is one", path.display()),
+        Target::Path(_) => return target.must_be_one("the tables hold all windows"),
+    };
+    Err(Error::usage(
+        format!("the tables are several files, {what}"),
+        "name a file: `-o x.csv` writes `x.edges.csv` and others",
+    ))
+}
+
+/// The files of all tables in the format of this word.
+pub(crate) fn files(target: &Target, word: &str) -> Vec<Target> {
+    let file = |table: &Table| target.with_word(table.word, word);
+    TABLES.iter().map(file).collect()
+}
+
+fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+    format: TableFormat,
+) -> Result<Box<dyn Encoder + 'a>> {
+    check(target)?;
+    Ok(Box::new(Tables {
+        mission: sequence.data,
+        target: target.clone(),
+        format,
+    }))
+}
+
+impl Encoder for Tables<'_> {
+    fn finish(self: Box<Self>) -> Result<Written> {
+        let each = TABLES.iter().zip(files(&self.target, self.format.word()));
+        let write =
+            |(table, file): (&Table, Target)| write(self.mission, table, &file, self.format);
+        // All of them are whole before the first one gets its name.
+        let sinks: Vec<Sink> = each.map(write).collect::<Result<_>>()?;
+        let mut written = Written::to(&self.target);
+        for sink in sinks {
+            written.add(sink.commit()?);
+        }
+        Ok(written)
+    }
+}
+
+/// How many rows are gathered before they are written.
+const MOST_ROWS: usize = 4096;
+
+fn write(mission: &Mission, table: &Table, target: &Target, format: TableFormat) -> Result<Sink> {
+    let sink = Sink::create(target, None)?;
+    let failed = Error::io("write", sink.path());
+    let write = || {
+        let mut batch = Batch::new(table.columns);
+        let mut writer = Writer::new(format, sink, &batch, &[])?;
+        let mut result = Ok(());
+        (table.fill)(mission, &mut |row: &[Cell<'_>]| {
+            batch.push(row);
+            if batch.rows >= MOST_ROWS && result.is_ok() {
+                result = writer.write(&batch);
+                batch.clear();
+            }
+        });
+        result?;
+        writer.write(&batch)?;
+        writer.finish()
+    };
+    write().map_err(failed)
+}

@@ -1,0 +1,142 @@
+//! A folder of tables while they are written: out of sight until all of them are whole, and few files open at a time.
+
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use crate::base::error::{Error, Result};
+use crate::base::leftovers::Leftover;
+
+/// Files that appear together in a folder. Dropped without [`Folder::commit`], they leave no trace.
+#[derive(Debug)]
+pub(crate) struct Folder {
+    path: PathBuf,
+    hidden: TempDir,
+    /// Removed when a signal ends us too.
+    _left: Leftover,
+    names: Vec<String>,
+}
+
+impl Folder {
+    /// Files that will appear in the folder `path`, which is made if it is not there.
+    ///
+    /// # Errors
+    /// Where the system refuses.
+    pub(crate) fn create(path: &Path) -> Result<Self> {
+        fs::create_dir_all(path).map_err(Error::io("make the folder", path))?;
+        let mut builder = tempfile::Builder::new();
+        let hidden = builder
+            .prefix(".bagreel-")
+            .suffix(".part")
+            .tempdir_in(path)
+            .map_err(Error::io("write into", path))?;
+        Ok(Self {
+            path: path.to_owned(),
+            _left: Leftover::at(hidden.path()),
+            hidden,
+            names: Vec::new(),
+        })
+    }
+
+    /// A new file that will be called `name`, which no other one is.
+    pub(crate) fn file(&mut self, name: String) -> Part {
+        let path = self.hidden.path().join(&name);
+        self.names.push(name);
+        Part(path)
+    }
+
+    /// Gives all files their names, replacing those that were there.
+    ///
+    /// # Errors
+    /// Where the system refuses.
+    pub(crate) fn commit(self) -> Result<()> {
+        for name in &self.names {
+            let to = self.path.join(name);
+            let given = fs::rename(self.hidden.path().join(name), &to);
+            given.map_err(Error::io("write", &to))?;
+        }
+        Ok(())
+    }
+}
+
+/// One of its files. It is open only while bytes are added, since a bag may have more topics than a process may have
+/// files; write much at a time.
+#[derive(Debug)]
+pub(crate) struct Part(PathBuf);
+
+impl Write for Part {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut file = File::options().create(true).append(true).open(&self.0)?;
+        file.write_all(bytes)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// The longest name of a file, in bytes, that every system takes, its ending left out.
+const LONGEST: usize = 200;
+
+/// The name of a topic's file: `/base/scan` is `base.scan`. What is neither letter, digit, `_` nor `-` is written as its
+/// bytes, `%2E`, so that no name leaves the folder; different topics differ but for the slash in front.
+pub(crate) fn file_stem(topic: &str) -> String {
+    let mut stem = String::new();
+    for byte in topic.strip_prefix('/').unwrap_or(topic).bytes() {
+        match byte {
+            b'/' => stem.push('.'),
+            b if b.is_ascii_alphanumeric() || b == b'_' || b == b'-' => stem.push(char::from(b)),
+            b => {
+                // Writing to a string cannot fail.
+                let _ = write!(stem, "%{b:02X}");
+            }
+        }
+    }
+    stem.truncate(LONGEST);
+    // Neither hidden nor without a name.
+    if stem.is_empty() || stem.starts_with('.') {
+        stem.insert(0, '_');
+    }
+    stem
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_topic_leaves_the_folder() {
+        assert_eq!(file_stem("/base/scan"), "base.scan");
+        assert_eq!(
+            file_stem("/../../etc/x y"),
+            "_%2E%2E.%2E%2E.etc.x%20y".trim_start_matches('_')
+        );
+        assert_eq!(file_stem("//a"), "_.a");
+        assert_eq!(file_stem("/"), "_");
+        assert_eq!(file_stem(&"/a".repeat(500)).len(), LONGEST);
+    }
+
+    #[test]
+    fn files_appear_together_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |word: &[u8]| {
+            let mut folder = Folder::create(&dir.path().join("t")).unwrap();
+            for name in ["a", "b"] {
+                let mut part = folder.file(name.to_owned());
+                part.write_all(word).unwrap();
+                part.write_all(b"!").unwrap();
+            }
+            folder
+        };
+        drop(write(b"lost"));
+        assert_eq!(fs::read_dir(dir.path().join("t")).unwrap().count(), 0);
+        write(b"old").commit().unwrap();
+        write(b"new").commit().unwrap();
+        assert_eq!(fs::read(dir.path().join("t/b")).unwrap(), b"new!");
+        assert_eq!(fs::read_dir(dir.path().join("t")).unwrap().count(), 2);
+    }
+}

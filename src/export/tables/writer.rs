@@ -1,0 +1,129 @@
+//! Where the rows of a table go: CSV or Parquet, into anything that takes bytes.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::base::csv;
+use crate::base::error::{Error, Result};
+use crate::base::table::Batch;
+#[cfg(feature = "parquet")]
+use crate::export::parquet;
+
+/// How a table is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableFormat {
+    /// Comma-separated values, stamps as nanoseconds since 1970.
+    Csv,
+    /// Apache Parquet, stamps as timestamps.
+    #[cfg(feature = "parquet")]
+    Parquet,
+}
+
+impl TableFormat {
+    /// All of them.
+    pub const ALL: &'static [Self] = &[
+        Self::Csv,
+        #[cfg(feature = "parquet")]
+        Self::Parquet,
+    ];
+
+    /// Its word on the command line and the ending of its files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            #[cfg(feature = "parquet")]
+            Self::Parquet => "parquet",
+        }
+    }
+
+    /// The format of this word.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another word.
+    pub fn parse(word: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|f| f.word() == word);
+        found.copied().ok_or_else(|| {
+            let all: Vec<&str> = Self::ALL.iter().map(|f| f.word()).collect();
+            Error::usage(
+                format!("`{word}` is not a format of tables"),
+                format!("formats: {}", all.join(", ")),
+            )
+        })
+    }
+}
+
+/// A whole small table as bytes.
+///
+/// # Errors
+/// [`Error::Io`] if the format cannot hold it.
+pub(crate) fn whole(format: TableFormat, table: &Batch) -> Result<Vec<u8>> {
+    let write = || {
+        let mut writer = Writer::new(format, Vec::new(), table, &[])?;
+        writer.write(table)?;
+        writer.finish()
+    };
+    write().map_err(Error::io("write", Path::new("-")))
+}
+
+/// A table being written.
+pub(crate) enum Writer<W: Write + Send> {
+    Csv(Box<csv::Rows<W>>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<parquet::Rows<W>>),
+}
+
+impl<W: Write + Send> Writer<W> {
+    /// Begins a table with the columns of `batch`; `facts` about it are kept where the format has a place for them.
+    pub(crate) fn new(
+        format: TableFormat,
+        to: W,
+        batch: &Batch,
+        facts: &[(&str, &str)],
+    ) -> io::Result<Self> {
+        let _ = facts;
+        match format {
+            TableFormat::Csv => Ok(Self::Csv(Box::new(csv::Rows::new(to, batch)?))),
+            #[cfg(feature = "parquet")]
+            TableFormat::Parquet => {
+                let rows = parquet::Rows::new(to, batch, facts)?;
+                Ok(Self::Parquet(Box::new(rows)))
+            }
+        }
+    }
+
+    /// Writes all rows of `batch`, whose columns are those that the table began with.
+    pub(crate) fn write(&mut self, batch: &Batch) -> io::Result<()> {
+        match self {
+            Self::Csv(rows) => rows.write(batch),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(rows) => rows.write(batch),
+        }
+    }
+
+    /// How many bytes of packed rows it holds in memory.
+    pub(crate) fn held(&self) -> usize {
+        match self {
+            Self::Csv(_) => 0,
+            #[cfg(feature = "parquet")]
+            Self::Parquet(rows) => rows.held(),
+        }
+    }
+
+    /// Writes the rows that it holds in memory.
+    pub(crate) fn unload(&mut self) -> io::Result<()> {
+        match self {
+            Self::Csv(_) => Ok(()),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(rows) => rows.unload(),
+        }
+    }
+
+    /// Ends the table and gives back what it was written to.
+    pub(crate) fn finish(self) -> io::Result<W> {
+        match self {
+            Self::Csv(rows) => rows.finish(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(rows) => rows.finish(),
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! The lines that put a figure into `LaTeX`, beside the picture that is written with them.
+
+use super::{AtOnce, Encoder};
+use crate::base::error::{Error, Result};
+use crate::export::sequence::Sequence;
+use crate::export::target::Target;
+
+/// Writes the lines.
+///
+/// # Errors
+/// [`Error::Usage`] without a figure, and for a name with `{n}`.
+pub(crate) fn start<'a>(
+    sequence: &'a Sequence<'a>,
+    target: &Target,
+) -> Result<Box<dyn Encoder + 'a>> {
+    let Some(latex) = sequence.latex else {
+        return Err(needs_figure(target));
+    };
+    AtOnce::start(target, move || (latex.to_owned(), Vec::new()))
+}
+
+/// Why these lines cannot be written.
+pub(crate) fn needs_figure(target: &Target) -> Error {
+    Error::usage(
+        format!("`{}` puts a figure into LaTeX", target.path().display()),
+        "say which: `--figure lives`, `map` or `steps`, with `-o fig.pdf` beside it",
+    )
+}

@@ -1,0 +1,150 @@
+//! The messages themselves as tables: a row per message, or a table per topic with every field decoded.
+
+mod fields;
+mod messages;
+
+use super::read::known_span;
+use super::{Stage, Watch};
+use crate::bag::{
+    self, Connection, ConnectionId, Input, Message, OpenOptions, Reader, Report, Sink, Want,
+};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, Notices};
+use crate::base::time::{Moment, Span, Stamp};
+use crate::export::tables::TableFormat;
+use crate::export::target::Target;
+use crate::graph::window::{self, Division};
+use crate::view::NameFilter;
+
+/// The whole job of `bagreel extract`.
+#[derive(Clone, Debug)]
+pub struct Extract {
+    /// Bags, whose messages become one table, or one set of tables.
+    pub inputs: Vec<Input>,
+    /// A file; the folder of the tables with `fields`.
+    pub target: Target,
+    /// How tables are written.
+    pub format: TableFormat,
+    /// Whether messages are decoded.
+    pub fields: bool,
+    /// The topics to take.
+    pub topics: NameFilter,
+    /// Leave out what lies before.
+    pub start: Option<Moment>,
+    /// Leave out what lies after.
+    pub end: Option<Moment>,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, Default)]
+pub struct Extracted {
+    /// How many tables were written.
+    pub tables: usize,
+    /// How many rows they have together.
+    pub rows: u64,
+    /// Messages that could not be decoded.
+    pub undecoded: u64,
+    /// What is worth saying.
+    pub notices: Notices,
+}
+
+/// Reads bags and writes their messages as tables, which appear whole or not at all.
+///
+/// # Errors
+/// Where an input cannot be read at all, an output cannot be written, or times make no sense.
+pub fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
+    watch.stage(Stage::Read);
+    if job.fields {
+        fields::extract(job, watch)
+    } else {
+        messages::extract(job, watch)
+    }
+}
+
+impl Extract {
+    /// Every input, open.
+    fn open(&self) -> Result<Vec<Box<dyn Reader>>> {
+        let options = OpenOptions::default();
+        let inputs = self.inputs.iter();
+        inputs.map(|i| bag::open(i, &options)).collect()
+    }
+
+    /// The part of the bags that is asked for; `None` for all of it. Where no tail tells when they begin and end, they
+    /// are read for it.
+    fn range(&self, watch: &mut dyn Watch) -> Result<Option<Span>> {
+        if self.start.is_none() && self.end.is_none() {
+            return Ok(None);
+        }
+        let span = match known_span(&mut self.open_files()?)? {
+            Some(span) => Some(span),
+            None => self.measure(watch)?,
+        };
+        let division = Division {
+            start: self.start,
+            end: self.end,
+            ..Division::default()
+        };
+        span.map(|span| window::range(&division, span)).transpose()
+    }
+
+    /// As [`Extract::open`]; what flows by cannot be read twice.
+    fn open_files(&self) -> Result<Vec<Box<dyn Reader>>> {
+        let flows = |input: &Input| match input {
+            Input::Stdin => true,
+            Input::Path(path) => path.exists() && !path.is_file() && !path.is_dir(),
+        };
+        if self.inputs.iter().any(flows) {
+            return Err(Error::usage(
+                "a bag that flows by tells only at its end when it began and ended",
+                "save it to a file first, or leave `--start` and `--end` out",
+            ));
+        }
+        self.open()
+    }
+
+    fn measure(&self, watch: &mut dyn Watch) -> Result<Option<Span>> {
+        let mut bounds = Bounds(None);
+        for mut reader in self.open()? {
+            reader.read(None, &mut bounds)?;
+            stop(watch)?;
+        }
+        Ok(bounds.0)
+    }
+}
+
+/// The error for a user who broke off.
+fn stop(watch: &dyn Watch) -> Result<()> {
+    if watch.stopped() {
+        return Err(Error::Interrupted);
+    }
+    Ok(())
+}
+
+/// What is said of a bag of which something was lost.
+fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
+    use crate::base::notice::NoticeKind::Damaged;
+    let silent = !report.complete && !notices.any_loss();
+    silent.then(|| Notice::new(Damaged, format!("`{}` is not complete", report.name)))
+}
+
+/// The first and the last time of all messages.
+struct Bounds(Option<Span>);
+
+impl Sink for Bounds {
+    fn connection(&mut self, _: &Connection) -> Want {
+        Want::Stamps
+    }
+
+    fn stamps(&mut self, _: ConnectionId, stamps: &[Stamp], _: Option<&[u32]>) {
+        for at in stamps {
+            let end = at.plus(1);
+            let span = self.0.get_or_insert(Span { start: *at, end });
+            span.start = span.start.min(*at);
+            span.end = span.end.max(end);
+        }
+    }
+
+    fn message(&mut self, _: Message<'_>) {}
+
+    fn notice(&mut self, _: Notice) {}
+}

@@ -1,0 +1,164 @@
+//! A row per message, in order of time over all bags: what the index tells, without a payload.
+
+use super::{Extract, Extracted, of_report, stop};
+use crate::bag::{Connection, ConnectionId, Message, Sink as Takes, Want};
+use crate::base::error::{Error, Result};
+use crate::base::name::{NodeName, TopicName};
+use crate::base::notice::{Notice, Notices};
+use crate::base::table::{Batch, Cell, Kind};
+use crate::base::time::Stamp;
+use crate::evidence::times::{SeriesId, Stamps, Timed};
+use crate::export::sink::Sink;
+use crate::export::tables::writer::Writer;
+use crate::pipeline::Watch;
+use crate::view::NameFilter;
+use std::path::Path;
+use std::sync::Arc;
+
+/// The columns of the table.
+const COLUMNS: &[(&str, Kind)] = &[
+    ("time_ns", Kind::Time),
+    ("topic", Kind::Text),
+    ("type", Kind::Text),
+    ("publisher", Kind::Text),
+    ("size_bytes", Kind::I64),
+];
+
+/// How many rows are gathered before they are written.
+const MOST_ROWS: usize = 16 * 1024;
+
+/// Reads all times first, which takes little memory (what does not fit goes to an unnamed file), then writes them
+/// sorted: bags that overlap in time are one table in order.
+pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
+    let sink = Sink::create(&job.target, None)?;
+    let range = job.range(watch)?;
+    let mut taken = Taken::default();
+    for mut reader in job.open()? {
+        let mut one = OfBag {
+            taken: &mut taken,
+            filter: &job.topics,
+            sources: Vec::new(),
+            watch: &mut *watch,
+        };
+        let report = reader.read(range, &mut one)?;
+        taken.notices.extend(of_report(&report, &taken.notices));
+        stop(watch)?;
+    }
+    let rows = write(job, &mut taken, sink, watch)?;
+    Ok(Extracted {
+        tables: 1,
+        rows,
+        undecoded: 0,
+        notices: taken.notices,
+    })
+}
+
+/// Where messages come from: what stands in all rows of one connection.
+struct Source {
+    topic: TopicName,
+    type_name: Arc<str>,
+    publisher: Option<Arc<str>>,
+    /// Whether the sizes of its messages are known.
+    is_sized: bool,
+}
+
+/// The times of all messages taken.
+#[derive(Default)]
+struct Taken {
+    stamps: Stamps,
+    /// By place: the series of this number.
+    sources: Vec<Source>,
+    series: Vec<SeriesId>,
+    notices: Notices,
+}
+
+impl Taken {
+    fn add(&mut self, connection: &Connection, is_sized: bool) -> SeriesId {
+        self.sources.push(Source {
+            topic: connection.topic.clone(),
+            type_name: Arc::clone(&connection.type_name),
+            publisher: connection.publisher.as_ref().map(NodeName::shared),
+            is_sized,
+        });
+        let id = self.stamps.series();
+        self.series.push(id);
+        id
+    }
+}
+
+/// The series of a connection: of messages whose size is known, and of the others.
+type Series = Option<[SeriesId; 2]>;
+
+/// Takes in one bag.
+struct OfBag<'a> {
+    taken: &'a mut Taken,
+    filter: &'a NameFilter,
+    sources: Vec<Series>,
+    watch: &'a mut dyn Watch,
+}
+
+impl Takes for OfBag<'_> {
+    fn connection(&mut self, connection: &Connection) -> Want {
+        let is_wanted = self.filter.passes(connection.topic.as_str());
+        let mut series = |is_sized| self.taken.add(connection, is_sized);
+        self.sources
+            .push(is_wanted.then(|| [series(true), series(false)]));
+        if is_wanted { Want::Sizes } else { Want::Stamps }
+    }
+
+    fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+        let series = self.sources.get(connection.0 as usize);
+        if let Some(Some([sized, sizeless])) = series {
+            let series = if sizes.is_some() { *sized } else { *sizeless };
+            self.taken.stamps.add(series, stamps, sizes);
+        }
+    }
+
+    fn message(&mut self, _: Message<'_>) {}
+
+    fn notice(&mut self, notice: Notice) {
+        self.taken.notices.add(notice);
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        self.watch.progress(done, total);
+    }
+}
+
+/// Writes all rows in order of time, those of one time in the order of their connections.
+fn write(job: &Extract, taken: &mut Taken, sink: Sink, watch: &mut dyn Watch) -> Result<u64> {
+    let spool = |e| Error::io("read", Path::new("temporary file of times"))(e);
+    taken.stamps.finish().map_err(spool)?;
+    let failed = || Error::io("write", job.target.path());
+    let mut batch = Batch::new(COLUMNS);
+    let mut writer = Writer::new(job.format, sink, &batch, &[]).map_err(failed())?;
+    let (mut rows, mut result) = (0, Ok(()));
+    let sources = &taken.sources;
+    let each = |timed: Timed| {
+        if result.is_err() {
+            return;
+        }
+        batch.push(&row(&sources[timed.series], &timed));
+        rows += 1;
+        if batch.rows == MOST_ROWS {
+            let written = writer.write(&batch).map_err(failed());
+            result = written.and_then(|()| stop(watch));
+            batch.clear();
+        }
+    };
+    taken.stamps.merge(&taken.series, each).map_err(spool)?;
+    result?;
+    writer.write(&batch).map_err(failed())?;
+    writer.finish().map_err(failed())?.commit()?;
+    Ok(rows)
+}
+
+fn row<'a>(source: &'a Source, timed: &Timed) -> [Cell<'a>; 5] {
+    [
+        Cell::Time(timed.time),
+        Cell::text(source.topic.as_str()),
+        Cell::text(&*source.type_name),
+        Cell::known(source.publisher.as_deref(), Cell::text),
+        Cell::known(source.is_sized.then_some(timed.size), Cell::count),
+    ]
+}

@@ -1,0 +1,267 @@
+//! Figures for papers: exact on paper, never too small to read, nothing over anything.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The text of a figure as SVG, or what the command said against it.
+fn figure(bag: &Path, flags: &[&str]) -> Result<String, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let svg = folder.path().join("figure.svg");
+    let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args(["render", "--quiet"])
+        .arg(bag)
+        .args(flags)
+        .arg("-o")
+        .arg(&svg)
+        .output()
+        .unwrap();
+    if out.status.success() {
+        Ok(std::fs::read_to_string(svg).unwrap())
+    } else {
+        Err(String::from_utf8_lossy(&out.stderr).into_owned())
+    }
+}
+
+fn example() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag")
+}
+
+/// The width and height in millimetres that the page says.
+fn size_mm(svg: &str) -> (f64, f64) {
+    let of = |name: &str| {
+        let from = svg.find(&format!(" {name}=\"")).unwrap() + name.len() + 3;
+        svg[from..].split("mm\"").next().unwrap().parse().unwrap()
+    };
+    (of("width"), of("height"))
+}
+
+#[test]
+fn lives_tell_what_happened_in_words() {
+    let svg = figure(&example(), &["--figure", "lives"]).unwrap();
+    for expected in [
+        "8 nodes throughout",
+        "lidar_driver back after",
+        "topic changes hands",
+    ] {
+        assert!(svg.contains(expected), "{expected}");
+    }
+}
+
+/// Every figure of the example at both widths, and the height that it may have.
+const FIGURES: [(&str, &str, f64); 6] = [
+    ("lives", "88mm", 110.0),
+    ("lives", "181mm", 94.0),
+    ("map", "88mm", 121.0),
+    ("map", "181mm", 99.0),
+    ("steps", "88mm", 225.0),
+    ("steps", "181mm", STEPS),
+];
+/// Higher than the study's mock, whose panels were drawn over one another's arrowheads.
+const STEPS: f64 = 125.0;
+
+#[test]
+fn every_figure_is_as_wide_as_asked_and_no_higher_than_it_may_be() {
+    for (kind, width, most) in FIGURES {
+        let svg = figure(&example(), &["--figure", kind, "--width", width]).unwrap();
+        let (w, h) = size_mm(&svg);
+        let asked: f64 = width.trim_end_matches("mm").parse().unwrap();
+        assert!((w - asked).abs() < 0.1, "{kind} {width}: {w}");
+        assert!(h > 40.0 && h <= most, "{kind} {width}: {h} mm high");
+    }
+}
+
+#[test]
+fn at_most_a_tenth_of_the_topic_names_is_left_out_and_told() {
+    for width in ["88mm", "181mm"] {
+        let svg = figure(&example(), &["--figure", "map", "--width", width]).unwrap();
+        let words: Vec<&str> = svg
+            .split(['>', '<'])
+            .collect::<Vec<_>>()
+            .join(" ")
+            .leak()
+            .split_whitespace()
+            .collect();
+        let at = words
+            .windows(3)
+            .position(|w| w[1] == "of" && w[2].parse::<u32>().is_ok());
+        if let Some(at) = at {
+            let (lost, all): (u32, u32) =
+                (words[at].parse().unwrap(), words[at + 2].parse().unwrap());
+            assert!(lost * 10 <= all, "{width}: {lost} of {all}");
+        }
+    }
+}
+
+#[test]
+fn steps_show_what_was_asked_for_or_say_what_there_is() {
+    let svg = figure(&example(), &["--figure", "steps", "--steps", "3"]).unwrap();
+    assert!(svg.contains("2 → 3") && !svg.contains("3 → 4"));
+    assert!(svg.contains("plan: planner → replanner"));
+    assert!(svg.contains("5 smaller steps left out"));
+    let none = figure(&example(), &["--figure", "steps", "--steps", "8"]).unwrap_err();
+    assert!(none.contains("2 to 7"), "{none}");
+}
+
+#[test]
+fn phases_are_named_by_a_file_or_replaced_by_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("phases.txt");
+    let flags = ["--figure", "lives", "--phases", file.to_str().unwrap()];
+    std::fs::write(&file, "boot\nnavigation\n").unwrap();
+    assert!(
+        figure(&example(), &flags)
+            .unwrap()
+            .contains("navigation (+4)")
+    );
+    std::fs::write(&file, "0:00 early\n2:00 late\n").unwrap();
+    let svg = figure(&example(), &flags).unwrap();
+    assert!(svg.contains("late (+"), "two phases");
+    std::fs::write(&file, "2:00 late\n1:00 early\n").unwrap();
+    assert!(figure(&example(), &flags).unwrap_err().contains("line 2"));
+    std::fs::write(&file, "a\n".repeat(8)).unwrap();
+    assert!(
+        figure(&example(), &flags)
+            .unwrap_err()
+            .contains("more names")
+    );
+    let svg = figure(&example(), &["--figure", "lives", "--phases", "none"]).unwrap();
+    assert!(!svg.contains("(+4)"), "no phase is told");
+}
+
+/// A rectangle around each text, in pixels: letters of the bundled font are at least so wide.
+fn boxes(svg: &str) -> Vec<(f64, f64, f64, f64, String)> {
+    let of = |tag: &str, name: &str| -> Option<f64> {
+        let from = tag.find(&format!(" {name}=\""))? + name.len() + 3;
+        tag[from..].split('"').next()?.parse().ok()
+    };
+    let mut all = Vec::new();
+    for tag in svg.split("<text").skip(1) {
+        let (head, rest) = tag.split_once('>').unwrap();
+        let words = rest.split("</text>").next().unwrap().to_owned();
+        let (Some(x), Some(y), Some(size)) = (of(head, "x"), of(head, "y"), of(head, "font-size"))
+        else {
+            panic!("a text without a place: {head}");
+        };
+        let narrow = |c: char| "iljtfr.,:1I|/ ()'".contains(c);
+        let wide: f64 = words
+            .chars()
+            .map(|c| if narrow(c) { 0.25 } else { 0.48 })
+            .sum::<f64>()
+            * size;
+        let left = match () {
+            () if head.contains("text-anchor=\"middle\"") => x - wide / 2.0,
+            () if head.contains("text-anchor=\"end\"") => x - wide,
+            () => x,
+        };
+        all.push((left, y - 0.6 * size, left + wide, y, words));
+    }
+    all
+}
+
+#[test]
+fn no_text_stands_on_another() {
+    for (kind, width, _) in FIGURES {
+        let svg = figure(&example(), &["--figure", kind, "--width", width]).unwrap();
+        let all = boxes(&svg);
+        for (k, a) in all.iter().enumerate() {
+            for b in &all[k + 1..] {
+                let apart = a.2 <= b.0 || b.2 <= a.0 || a.3 <= b.1 || b.3 <= a.1;
+                assert!(apart, "{kind} {width}: `{}` and `{}`", a.4, b.4);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_figure_for_latex_says_what_it_shows_and_is_compiled_where_latex_is_at_hand() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args(["render", "--quiet", "--figure", "lives", "--bare"])
+        .arg(example())
+        .arg("-o")
+        .arg(at("lives.pdf"))
+        .arg("-o")
+        .arg(at("lives.tex"))
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{out:?}");
+    let tex = std::fs::read_to_string(at("lives.tex")).unwrap();
+    for expected in [
+        "\\includegraphics{lives.pdf}",
+        "warehouse.bag",
+        "2 (+4) from 0:38",
+        "cross: ends",
+    ] {
+        assert!(tex.contains(expected), "{expected}: {tex}");
+    }
+    let page = "\\documentclass{article}\\usepackage{graphicx}\\begin{document}\\input{lives}\\end{document}";
+    std::fs::write(at("page.tex"), page).unwrap();
+    let latex = Command::new("pdflatex")
+        .args(["-interaction=nonstopmode", "-halt-on-error", "page.tex"])
+        .current_dir(folder.path())
+        .output();
+    match latex {
+        Ok(done) => assert!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stdout)
+        ),
+        Err(_) => println!("skipped: `pdflatex` is not installed"),
+    }
+}
+
+/// Font sizes in points.
+fn sizes_pt(svg: &str) -> Vec<f64> {
+    let all = svg.split("font-size=\"").skip(1);
+    let px = all.map(|rest| rest.split('"').next().unwrap().parse::<f64>().unwrap());
+    px.map(|px| px * 0.75).collect()
+}
+
+#[test]
+fn no_text_is_below_six_points() {
+    for (kind, width, _) in FIGURES {
+        let svg = figure(&example(), &["--figure", kind, "--width", width]).unwrap();
+        let smallest = sizes_pt(&svg).into_iter().fold(f64::MAX, f64::min);
+        assert!(
+            (5.95..=7.0).contains(&smallest),
+            "{kind} {width}: {smallest}"
+        );
+    }
+    let svg = figure(&example(), &["--figure", "lives", "--text", "8pt"]).unwrap();
+    let smallest = sizes_pt(&svg).into_iter().fold(f64::MAX, f64::min);
+    assert!(smallest >= 6.95, "{smallest}");
+}
+
+#[test]
+fn what_does_not_fit_is_refused_with_what_would() {
+    let narrow = figure(&example(), &["--figure", "lives", "--width", "21mm"]).unwrap_err();
+    let enough = narrow
+        .split("--width ")
+        .nth(1)
+        .unwrap()
+        .split('`')
+        .next()
+        .unwrap();
+    assert!(
+        figure(&example(), &["--figure", "lives", "--width", enough]).is_ok(),
+        "{narrow}"
+    );
+    let nothing = figure(&example(), &["--figure", "lives", "--ns-filter", "/nobody"]);
+    let said = nothing.err().unwrap_or_default();
+    assert!(said.contains("nothing is left to draw"), "{said}");
+}
+
+#[test]
+fn options_that_say_nothing_to_a_figure_are_refused() {
+    for flags in [
+        &["--figure", "lives", "--strip", "3x2"][..],
+        &["--figure", "lives", "--style", "dark"],
+        &["--figure", "lives", "--steps", "3"],
+        &["--rows", "groups"],
+        &["--text", "8pt"],
+        &["--figure", "lives", "--text", "5pt"],
+    ] {
+        assert!(figure(&example(), flags).is_err(), "{flags:?}");
+    }
+}

@@ -1,0 +1,548 @@
+//! Source code beside a bag: names from the bag, edges from the code, as of the recording's day, and nothing is run.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::support::cdr::Cdr;
+use crate::support::mission::definition;
+use crate::support::{ORIGIN, Recording, mcap};
+
+/// A recording of ROS 2: these topics with their types, each offered by one publisher, and a log record of each node.
+fn bag(topics: &[(&str, &str)], nodes: &[&str]) -> Vec<u8> {
+    let mut bag = Recording::default();
+    let rosout = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
+    bag.publishers[rosout].definition = definition("rcl_interfaces/msg/Log");
+    for node in nodes {
+        let name = node.trim_start_matches('/').replace('/', ".");
+        // A node of this name starts in the middle.
+        let first = if name.ends_with("late") { 5 } else { 0 };
+        for second in first..10 {
+            let at = ORIGIN + second * 1_000_000_000;
+            let log = Cdr::default().time(at).u8(20).text(&name).text("up");
+            let log = log.text("x.cpp").text("f").u32(1).done();
+            bag.messages.push((rosout, at, log));
+        }
+    }
+    for (topic, type_name) in topics {
+        let place = bag.publisher("", topic, type_name);
+        bag.publishers[place]
+            .qos
+            .push_str("- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n");
+        bag.send(place, (0, 10_000), 500, &[0, 1, 0, 0, 1, 2, 3, 4]);
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    let options = mcap::Options {
+        profile: "ros2",
+        ..mcap::Options::default()
+    };
+    mcap::write(&bag, &options)
+}
+
+/// A folder with a bag and a workspace of these files.
+fn folder(topics: &[(&str, &str)], nodes: &[&str], files: &[(&str, &str)]) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("run.mcap"), bag(topics, nodes)).unwrap();
+    put(&folder.path().join("ws"), files);
+    folder
+}
+
+fn put(workspace: &Path, files: &[(&str, &str)]) {
+    for (path, text) in files {
+        let path = workspace.join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+}
+
+fn bagreel(folder: &Path, words: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command.current_dir(folder).args(words).output().unwrap()
+}
+
+/// Every edge that `info` knows with the workspace, as `node -> topic` or `topic -> node`; log topics left out.
+fn edges(folder: &Path, more: &[&str]) -> BTreeSet<String> {
+    let words = [
+        &["info", "run.mcap", "--format", "json", "--source", "ws"],
+        more,
+    ]
+    .concat();
+    let output = bagreel(folder, &words);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let info: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let mut edges = BTreeSet::new();
+    for topic in info["topics"].as_array().unwrap() {
+        let name = topic["name"].as_str().unwrap();
+        let all = |key: &str| topic[key].as_array().unwrap().clone();
+        if name != "/rosout" {
+            edges.extend(
+                all("publishers")
+                    .iter()
+                    .map(|n| format!("{} -> {name}", n.as_str().unwrap())),
+            );
+            edges.extend(
+                all("subscribers")
+                    .iter()
+                    .map(|n| format!("{name} -> {}", n.as_str().unwrap())),
+            );
+        }
+    }
+    edges
+}
+
+fn set(edges: &[&str]) -> BTreeSet<String> {
+    edges.iter().map(|e| (*e).to_owned()).collect()
+}
+
+const STRING: &str = "std_msgs/msg/String";
+const PACKAGE: (&str, &str) = ("p/package.xml", "<package><name>p</name></package>");
+
+/// A node in Python that publishes one topic and subscribes another.
+fn node(name: &str, publishes: &str, subscribes: &str) -> String {
+    format!(
+        "from std_msgs.msg import String\nclass N(Node):\n    def __init__(self):\n        super().__init__('{name}')\n        \
+         self.create_publisher(String, '{publishes}', 1)\n        \
+         self.create_subscription(String, '{subscribes}', self.cb, 1)\n\ndef main():\n    rclpy.spin(N())\n"
+    )
+}
+
+#[test]
+fn names_come_from_the_bag_and_edges_from_the_code() {
+    let folder = folder(
+        &[
+            ("/out", STRING),
+            ("/in", STRING),
+            ("/number", "std_msgs/msg/Int8"),
+        ],
+        &["/talker"],
+        &[
+            PACKAGE,
+            ("p/p/talker.py", &node("talker", "out", "/in")),
+            // Nobody names this node, and this topic has another type.
+            ("p/p/other.py", &node("other", "out", "number")),
+        ],
+    );
+    assert_eq!(
+        edges(folder.path(), &[]),
+        set(&["/talker -> /out", "/in -> /talker"])
+    );
+}
+
+#[test]
+fn a_launch_file_names_the_node_and_remaps_its_topics() {
+    let launch = "def generate_launch_description():\n    return LaunchDescription([Node(package='p', executable='run', name='front',\n        \
+                  namespace='r1', remappings=[('out', 'lidar'), ('/in', 'go')])])\n";
+    let setup = "setup(entry_points={'console_scripts': ['run = p.talker:main']})";
+    let folder = folder(
+        &[("/r1/lidar", STRING), ("/r1/go", STRING), ("/in", STRING)],
+        &["/r1/front"],
+        &[
+            PACKAGE,
+            ("p/setup.py", setup),
+            ("p/launch/all.launch.py", launch),
+            ("p/p/talker.py", &node("talker", "out", "/in")),
+        ],
+    );
+    assert_eq!(
+        edges(folder.path(), &[]),
+        set(&["/r1/front -> /r1/lidar", "/r1/go -> /r1/front"])
+    );
+    let why = bagreel(
+        folder.path(),
+        &[
+            "info",
+            "run.mcap",
+            "--source",
+            "ws",
+            "--why",
+            "/r1/front",
+            "/r1/lidar",
+        ],
+    );
+    let text = String::from_utf8_lossy(&why.stdout).replace("\\'", "'");
+    assert!(
+        text.contains(
+            "p/p/talker.py:5  create_publisher(String, 'out', 1); the node is named by rosout"
+        ),
+        "{text}"
+    );
+    assert!(
+        text.contains("launched at p/launch/all.launch.py:2"),
+        "{text}"
+    );
+}
+
+#[test]
+fn cpp_classes_are_found_through_cmake_headers_and_bases() {
+    let folder = folder(
+        &[("/out", STRING), ("/help", STRING), ("/base", STRING)],
+        &["/renamed"],
+        &[
+            PACKAGE,
+            ("p/CMakeLists.txt", "add_executable(exe src/main.cpp)\n"),
+            (
+                "p/src/main.cpp",
+                "#include \"arm.hpp\"\nint main() { rclcpp::spin(std::make_shared<Arm>()); }",
+            ),
+            (
+                "p/src/arm.cpp",
+                "Arm::Arm() : Base(\"arm\") { pub_ = create_publisher<std_msgs::msg::String>(\"out\", 1); helper_ = Helper(this); }",
+            ),
+            (
+                "p/include/arm.hpp",
+                "class Arm : public Base { Arm(); Helper helper_; };",
+            ),
+            (
+                "p/include/helper.hpp",
+                "class Helper { Helper(rclcpp::Node* n) { n->create_subscription<std_msgs::msg::String>(\"help\", 1, cb); } };",
+            ),
+            (
+                "p/include/base.hpp",
+                "class Base : public rclcpp::Node { Base(std::string n) : Node(n) { create_publisher<std_msgs::msg::String>(\"base\", 1); } };",
+            ),
+            (
+                "p/launch/x.launch.xml",
+                "<launch><node pkg=\"p\" exec=\"exe\" name=\"renamed\"/></launch>",
+            ),
+        ],
+    );
+    let expected = set(&["/renamed -> /out", "/help -> /renamed", "/renamed -> /base"]);
+    assert_eq!(edges(folder.path(), &[]), expected);
+}
+
+#[test]
+fn of_several_programs_of_one_name_the_one_counts_whose_topics_are_recorded() {
+    let folder = folder(
+        &[("/a", STRING), ("/b", STRING), ("/c", STRING)],
+        &["/n"],
+        &[
+            PACKAGE,
+            ("p/p/old.py", &node("n", "a", "gone")),
+            ("p/p/new.py", &node("n", "b", "c")),
+            ("p/test/test_n.py", &node("n", "a", "b")),
+        ],
+    );
+    assert_eq!(edges(folder.path(), &[]), set(&["/n -> /b", "/c -> /n"]));
+}
+
+#[test]
+fn the_code_of_the_recordings_day_is_read_out_of_git() {
+    let folder = folder(
+        &[("/old", STRING), ("/new", STRING)],
+        &["/n"],
+        &[PACKAGE, ("p/p/n.py", &node("n", "old", "x"))],
+    );
+    let workspace = folder.path().join("ws");
+    // The bag begins on 2024-01-01.
+    let commit = |day: &str| {
+        for words in [
+            &["add", "."][..],
+            &[
+                "-c",
+                "user.name=a",
+                "-c",
+                "user.email=a@b",
+                "commit",
+                "-qm",
+                "x",
+            ],
+        ] {
+            let mut git = Command::new("git");
+            git.current_dir(&workspace)
+                .args(words)
+                .env("GIT_AUTHOR_DATE", day)
+                .env("GIT_COMMITTER_DATE", day);
+            assert!(git.output().is_ok_and(|o| o.status.success()), "{words:?}");
+        }
+    };
+    if Command::new("git")
+        .arg("init")
+        .arg("-q")
+        .arg(&workspace)
+        .output()
+        .is_err()
+    {
+        println!("skipped: git is not there");
+        return;
+    }
+    commit("2023-12-24T12:00:00Z");
+    put(&workspace, &[("p/p/n.py", &node("n", "new", "x"))]);
+    commit("2024-03-01T12:00:00Z");
+    put(&workspace, &[("p/p/n.py", &node("n", "old", "new"))]);
+    assert_eq!(edges(folder.path(), &[]), set(&["/n -> /old"]));
+    assert_eq!(
+        edges(folder.path(), &["--source-at", "HEAD"]),
+        set(&["/n -> /new"])
+    );
+    assert_eq!(
+        edges(folder.path(), &["--source-at", "worktree"]),
+        set(&["/n -> /old", "/new -> /n"])
+    );
+    // A folder inside of the repository.
+    let inside = bagreel(folder.path(), &["info", "run.mcap", "--source", "ws/p"]);
+    let said = String::from_utf8_lossy(&inside.stderr).into_owned();
+    assert!(said.contains("code of 2023-12-24 ("), "{said}");
+    for (commit, says) in [
+        ("nowhere", "git knows no commit `nowhere`"),
+        ("--output=x", "git knows no commit"),
+    ] {
+        let at = format!("--source-at={commit}");
+        let refused = bagreel(folder.path(), &["info", "run.mcap", "--source", "ws", &at]);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(
+            String::from_utf8_lossy(&refused.stderr).contains(says),
+            "{refused:?}"
+        );
+    }
+}
+
+/// Everything that a repository could make git or us run leaves a file behind.
+#[cfg(unix)]
+#[test]
+fn a_hostile_repository_does_nothing() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = folder(
+        &[("/out", STRING)],
+        &["/n"],
+        &[PACKAGE, ("p/p/n.py", &node("n", "out", "x"))],
+    );
+    let workspace = folder.path().join("ws");
+    let trap = folder.path().join("trap");
+    fs::write(
+        &trap,
+        format!("#!/bin/sh\ntouch {}/sprung\n", folder.path().display()),
+    )
+    .unwrap();
+    fs::set_permissions(&trap, fs::Permissions::from_mode(0o755)).unwrap();
+    let trap_path = trap.display().to_string();
+    let git = |words: &[&str]| {
+        let done = Command::new("git")
+            .current_dir(&workspace)
+            .args(words)
+            .env("GIT_COMMITTER_DATE", "2023-12-24T12:00:00Z")
+            .output();
+        assert!(done.is_ok_and(|o| o.status.success()), "{words:?}");
+    };
+    if Command::new("git")
+        .arg("init")
+        .arg("-q")
+        .arg(&workspace)
+        .output()
+        .is_err()
+    {
+        println!("skipped: git is not there");
+        return;
+    }
+    std::os::unix::fs::symlink("/etc", workspace.join("out")).unwrap();
+    git(&["add", "."]);
+    git(&[
+        "-c",
+        "user.name=a",
+        "-c",
+        "user.email=a@b",
+        "commit",
+        "-qm",
+        "x",
+    ]);
+    for setting in [
+        "core.fsmonitor",
+        "core.sshCommand",
+        "core.pager",
+        "gpg.program",
+        "core.editor",
+        "filter.x.smudge",
+        "diff.external",
+        "alias.rev-list",
+    ] {
+        git(&["config", setting, &trap_path]);
+    }
+    for hook in [
+        "post-checkout",
+        "post-index-change",
+        "pre-commit",
+        "reference-transaction",
+    ] {
+        fs::copy(&trap, workspace.join(".git/hooks").join(hook)).unwrap();
+    }
+    fs::write(workspace.join(".git/info/attributes"), "*.py filter=x\n").unwrap();
+    let cmake = format!("execute_process(COMMAND {trap_path})\n");
+    let python = format!("import os\nos.system('{trap_path}')\n");
+    let launch = format!(
+        "{python}def generate_launch_description():\n    os.system('{trap_path}')\n    return LaunchDescription([])\n"
+    );
+    let macros = "#define A(x) A(A(x))\n".repeat(5000) + &"A(".repeat(20_000);
+    let files = [
+        ("p/CMakeLists.txt", cmake.as_str()),
+        ("p/setup.py", &python),
+        ("p/x.launch.py", &launch),
+        ("p/a.cpp", &macros),
+    ];
+    put(&workspace, &files);
+    for at in ["worktree", "HEAD"] {
+        assert_eq!(
+            edges(folder.path(), &["--source-at", at]),
+            set(&["/n -> /out"])
+        );
+    }
+    assert_eq!(edges(folder.path(), &[]), set(&["/n -> /out"]));
+    assert!(!folder.path().join("sprung").exists(), "something was run");
+}
+
+/// What `info` says with the workspace, on both streams.
+fn said(folder: &Path, more: &[&str]) -> String {
+    let output = bagreel(
+        folder,
+        &[&["info", "run.mcap", "--source", "ws"], more].concat(),
+    );
+    assert!(output.status.success());
+    [output.stdout, output.stderr]
+        .map(|text| String::from_utf8_lossy(&text).into_owned())
+        .concat()
+}
+
+#[test]
+fn the_only_place_that_can_be_meant_is_inferred_when_asked_for() {
+    let folder = folder(
+        &[("/out", STRING), ("/in", STRING)],
+        &[],
+        &[PACKAGE, ("p/p/talker.py", &node("talker", "out", "in"))],
+    );
+    assert_eq!(edges(folder.path(), &[]), set(&[]));
+    let text = said(folder.path(), &[]);
+    assert!(
+        text.contains(
+            "/talker publishes /out (p/p/talker.py:5  create_publisher(String, 'out', 1))"
+        ),
+        "{text}"
+    );
+    assert!(
+        text.contains("`--infer source` draws it") && text.contains("2 places not drawn"),
+        "{text}"
+    );
+    let inferred = set(&["/talker ? -> /out", "/in -> /talker ?"]);
+    assert_eq!(edges(folder.path(), &["--infer", "source"]), inferred);
+    let text = said(folder.path(), &["--infer", "source"]);
+    assert!(
+        text.contains("0 nodes, 0 publications, 0 subscriptions"),
+        "{text}"
+    );
+    let events = bagreel(
+        folder.path(),
+        &[
+            "events", "run.mcap", "--source", "ws", "--infer", "source", "-p", "1",
+        ],
+    );
+    assert!(
+        !String::from_utf8_lossy(&events.stdout).contains("talker"),
+        "{events:?}"
+    );
+}
+
+#[test]
+fn what_speaks_against_a_place_is_told() {
+    let logging = node("talker", "out", "in").replace(
+        "        self.create_pub",
+        "        self.get_logger().info('x')\n        self.create_pub",
+    );
+    let many = node("talker", "out", "in")
+        + &"        self.create_publisher(String, 'x', 1)\n".replace('x', "y");
+    let many = many.replace("def main", "class M(Node):\n    def __init__(self):\n        super().__init__('m')\n        self.create_publisher(String, 'out', 1)\n\ndef main");
+    let few = node("talker", "out", "gone").replace(
+        "\n\ndef",
+        "\n        self.create_publisher(String, 'more', 1)\n\ndef",
+    );
+    for (nodes, code, says) in [
+        (&["/other"][..], &logging, "its node would have logged"),
+        (&[], &many, "several places can be meant"),
+        (&[], &few, "most of its node's topics are not in the bag"),
+    ] {
+        let folder = folder(
+            &[("/out", STRING), ("/in", STRING)],
+            nodes,
+            &[PACKAGE, ("p/p/talker.py", code)],
+        );
+        let found = edges(folder.path(), &["--infer", "source"]);
+        assert!(!found.contains("/talker ? -> /out"), "{says}: {found:?}");
+        let text = said(folder.path(), &["--infer", "source"]);
+        assert!(text.contains(says), "{says}: {text}");
+    }
+}
+
+#[test]
+fn what_else_the_code_tells_is_listed() {
+    let more = "\n        self.create_publisher(String, 'lost', 1)\n\ndef";
+    let code = node("talker", "out", "in").replace("\n\ndef", more);
+    let folder = folder(
+        &[("/out", STRING), ("/in", "std_msgs/msg/Int8")],
+        &["/talker", "/stranger"],
+        &[PACKAGE, ("p/p/talker.py", &code)],
+    );
+    let text = said(folder.path(), &[]);
+    for says in [
+        "no code was found for /stranger",
+        "/in is std_msgs/Int8 in the bag and std_msgs/String in the code of /talker (p/p/talker.py:6)",
+        "/talker publishes /lost by its code (p/p/talker.py:7), which is not recorded: record it too",
+    ] {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+}
+
+#[test]
+fn events_do_not_tell_what_only_the_code_says() {
+    let folder = folder(
+        &[("/out", STRING), ("/in", STRING)],
+        &["/talker_late"],
+        &[
+            PACKAGE,
+            ("p/p/talker.py", &node("talker_late", "out", "in")),
+        ],
+    );
+    assert_eq!(edges(folder.path(), &[]).len(), 2);
+    let events = bagreel(
+        folder.path(),
+        &["events", "run.mcap", "--source", "ws", "-p", "1"],
+    );
+    let text = String::from_utf8_lossy(&events.stdout).into_owned();
+    assert!(text.contains("/talker_late"), "{text}");
+    assert!(
+        !text.contains("publishes") && !text.contains("subscribes"),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_cannot_apply_is_refused() {
+    let folder = folder(&[("/out", STRING)], &["/n"], &[PACKAGE]);
+    fs::write(
+        folder.path().join("x.json"),
+        "{\"schema\": \"bagreel.evolution/1\", \"windows\": []}",
+    )
+    .unwrap();
+    for (words, says) in [
+        (
+            &["info", "run.mcap", "--source", "nowhere"][..],
+            "cannot read `nowhere`",
+        ),
+        (&["info", "run.mcap", "--source-at", "HEAD"], "--source"),
+        (
+            &["info", "run.mcap", "--infer", "source"],
+            "`--infer source` has no source code",
+        ),
+        (&["info", "x.json", "--source", "ws"], "is an evolution"),
+    ] {
+        let output = bagreel(folder.path(), words);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            matches!(output.status.code(), Some(1 | 2)) && said.contains(says),
+            "{words:?}: {said}"
+        );
+    }
+}

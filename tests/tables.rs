@@ -1,0 +1,374 @@
+//! Messages and missions as tables: the command's files against each other and against counts known otherwise.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+
+fn bagreel(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+/// Runs the command, which must end with `code`; what it said.
+#[track_caller]
+fn ends(folder: &Path, args: &[&str], code: i32) -> String {
+    let output = bagreel(folder, args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
+/// The rows of a CSV file, its head first.
+fn csv(path: &Path) -> Vec<Vec<String>> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_path(path)
+        .unwrap();
+    let rows = reader.records().map(|row| row.unwrap());
+    rows.map(|row| row.iter().map(str::to_owned).collect())
+        .collect()
+}
+
+#[test]
+fn a_row_per_message_in_order_of_time() {
+    let dir = tempfile::tempdir().unwrap();
+    ends(dir.path(), &["extract", WAREHOUSE, "-o", "m.csv"], 0);
+    let rows = csv(&dir.path().join("m.csv"));
+    assert_eq!(
+        rows[0],
+        ["time_ns", "topic", "type", "publisher", "size_bytes"]
+    );
+    assert_eq!(rows.len(), 26_719 + 1);
+    let times: Vec<i64> = rows[1..].iter().map(|r| r[0].parse().unwrap()).collect();
+    assert!(times.is_sorted());
+    assert!(rows[1..].iter().all(|r| r[3].starts_with('/')));
+    assert!(rows[1..].iter().all(|r| r[4].parse::<u64>().is_ok()));
+}
+
+#[test]
+fn topics_and_times_choose_rows_with_their_sizes() {
+    let dir = tempfile::tempdir().unwrap();
+    let filter = ["--topic-filter", "/robot1/odom"];
+    let all = [&["extract", WAREHOUSE, "-o", "all.csv"], &filter[..]].concat();
+    ends(dir.path(), &all, 0);
+    let part = [
+        &[
+            "extract", WAREHOUSE, "-o", "part.csv", "--start", "60", "--end", "1:30",
+        ],
+        &filter[..],
+    ]
+    .concat();
+    ends(dir.path(), &part, 0);
+    let (all, part) = (
+        csv(&dir.path().join("all.csv")),
+        csv(&dir.path().join("part.csv")),
+    );
+    assert!(part.len() > 2 && part.len() < all.len());
+    let all: BTreeSet<_> = all.into_iter().collect();
+    assert!(part.iter().all(|row| all.contains(row)));
+    let said = ends(
+        dir.path(),
+        &["extract", WAREHOUSE, "-o", "x.csv", "--start", "1h"],
+        2,
+    );
+    assert!(said.contains("leave nothing"), "{said}");
+    assert!(!dir.path().join("x.csv").exists());
+}
+
+#[test]
+fn several_bags_are_one_table_in_order() {
+    let dir = tempfile::tempdir().unwrap();
+    ends(
+        dir.path(),
+        &["extract", WAREHOUSE, COURIER, "-o", "m.csv"],
+        0,
+    );
+    let rows = csv(&dir.path().join("m.csv"));
+    let times: Vec<i64> = rows[1..].iter().map(|r| r[0].parse().unwrap()).collect();
+    assert!(times.is_sorted());
+    let ros2 = rows.iter().find(|r| r[2] == "std_msgs/msg/String").unwrap();
+    assert_eq!(ros2[3], "", "ROS 2 bags do not say who publishes");
+}
+
+#[test]
+fn every_field_has_a_column() {
+    let dir = tempfile::tempdir().unwrap();
+    let args = ["extract", COURIER, "-o", "t", "--fields", "--format", "csv"];
+    ends(dir.path(), &args, 0);
+    let scan = csv(&dir.path().join("t/scan.csv"));
+    let head: Vec<&str> = scan[0].iter().map(String::as_str).collect();
+    assert_eq!(
+        &head[..4],
+        [
+            "time_ns",
+            "header.stamp.sec",
+            "header.stamp.nanosec",
+            "header.frame_id"
+        ]
+    );
+    let ranges = head.iter().position(|c| *c == "ranges").unwrap();
+    let ranges: Vec<f32> = serde_json::from_str(&scan[1][ranges]).unwrap();
+    assert_eq!(ranges.len(), 60);
+    let frame = &scan[1][3];
+    assert_eq!(frame, "laser");
+    // As many rows as messages, and nothing beside the tables.
+    ends(dir.path(), &["extract", COURIER, "-o", "m.csv"], 0);
+    let files: Vec<_> = fs::read_dir(dir.path().join("t"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
+    let rows: usize = files.iter().map(|path| csv(path).len() - 1).sum();
+    assert_eq!(rows, csv(&dir.path().join("m.csv")).len() - 1);
+}
+
+#[test]
+fn what_cannot_be_decoded_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut bag = crate::support::Recording::default();
+    let place = bag.publisher("/a", "/known", "std_msgs/String");
+    bag.publishers[place].definition = "string data\n".to_owned();
+    let other = bag.publisher("/a", "/unknown", "a/B");
+    bag.publishers[other].definition = "C c\n".to_owned();
+    for k in 0..10 {
+        let text = vec![2, 0, 0, 0, b'h', b'i'];
+        bag.messages.push((place, crate::support::ORIGIN + k, text));
+        bag.messages
+            .push((other, crate::support::ORIGIN + k, vec![1]));
+    }
+    bag.messages
+        .push((place, crate::support::ORIGIN + 20, vec![9]));
+    let bytes = crate::support::mcap::write(&bag, &crate::support::mcap::Options::default());
+    fs::write(dir.path().join("a.mcap"), bytes).unwrap();
+    let args = [
+        "extract", "a.mcap", "-o", "t", "--fields", "--format", "csv",
+    ];
+    let said = ends(dir.path(), &args, 3);
+    assert!(
+        said.contains("messages of `/unknown` (a/B) were left out: its definition lacks the type `C` (10 times)"),
+        "{said}"
+    );
+    assert!(
+        said.contains(
+            "messages of `/known` (std_msgs/String) were left out: they do not have the layout"
+        ),
+        "{said}"
+    );
+    assert_eq!(csv(&dir.path().join("t/known.csv")).len(), 10 + 1);
+    assert!(!dir.path().join("t/unknown.csv").exists());
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let refused = |args: &[&str], says: &str| {
+        let said = ends(dir.path(), &[&["extract", WAREHOUSE], args].concat(), 2);
+        assert!(said.contains(says), "{said}");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+    };
+    refused(&["-o", "x.gif"], "`gif` is not a format of tables");
+    refused(&["-o", "x"], "does not say its format");
+    refused(&["-o", "-", "--fields"], "standard output is one");
+    refused(&["-o", "{n}.csv"], "a file per window");
+    refused(&["-o", WAREHOUSE, "--format", "csv"], "overwrite an input");
+}
+
+/// A folder of recordings of every kind, mixed: a folder of rosbag2 with a stranger in it, parts without their
+/// metadata, loose files, broken ones, folders below.
+fn mixed(folder: &Path) {
+    let mcap = fs::read(COURIER).unwrap();
+    let put = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    };
+    put("loose.mcap", &mcap);
+    put("a.bag", b"#ROSBAG V2.0\n");
+    put("broken.db3", b"");
+    put("deep/er/b.bag", b"");
+    let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_0.mcap\n";
+    put("ros2/metadata.yaml", metadata.as_bytes());
+    put("ros2/run_0.mcap", &mcap);
+    put("ros2/stranger.bag", b"");
+    put("ros2/below/c.mcap", &mcap);
+    put("parts/run_0.mcap", &mcap);
+    put("parts/run_1.mcap", &mcap);
+    put("notes.txt", b"no bag");
+}
+
+#[test]
+fn a_survey_loses_no_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    mixed(dir.path());
+    let output = bagreel(dir.path(), &["info", ".", "--format", "csv"]);
+    fs::write(dir.path().join("survey.csv"), &output.stdout).unwrap();
+    let rows = csv(&dir.path().join("survey.csv"));
+    let paths: Vec<&str> = rows[1..].iter().map(|r| r[0].as_str()).collect();
+    let expected = [
+        "a.bag",
+        "broken.db3",
+        "deep/er/b.bag",
+        "loose.mcap",
+        "parts",
+        "ros2",
+        "ros2/below/c.mcap",
+        "ros2/stranger.bag",
+    ];
+    assert_eq!(paths, expected);
+    let error = rows[0].iter().position(|c| c == "error").unwrap();
+    let failed: Vec<&str> = rows[1..]
+        .iter()
+        .filter(|r| !r[error].is_empty())
+        .map(|r| r[0].as_str())
+        .collect();
+    assert_eq!(
+        failed,
+        ["a.bag", "broken.db3", "deep/er/b.bag", "ros2/stranger.bag"]
+    );
+    // A recording with nothing beside it is no survey.
+    let one = bagreel(dir.path(), &["info", "parts"]);
+    assert!(String::from_utf8(one.stdout).unwrap().contains("messages"));
+}
+
+#[test]
+fn a_recorder_is_no_subscriber() {
+    let dir = tempfile::tempdir().unwrap();
+    let counted = |nodes: &str| -> u64 {
+        let text = format!("Name,Publish,Subscribe\n{nodes}");
+        fs::write(dir.path().join("nodes.csv"), text).unwrap();
+        let topology = ["--topology", "nodes.csv", "--format", "json"];
+        let output = bagreel(dir.path(), &[&["info", COURIER][..], &topology].concat());
+        let info: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let degrees = info["subscribes_by_degree"].as_object().unwrap();
+        degrees.values().map(|n| n.as_u64().unwrap()).sum()
+    };
+    let recorder = counted("/record_12345,[],['/scan']\n");
+    let both = counted("/record_12345,[],['/scan']\n/listens,[],['/scan']\n");
+    assert_eq!(both, recorder + 1);
+    assert_eq!(recorder, counted("/record_12345,[],[]\n"));
+}
+
+#[test]
+fn graphs_of_other_tools_hold_every_element_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let outputs = ["-o", "x.gexf", "-o", "x.graphml", "-o", "x.json"];
+    ends(
+        dir.path(),
+        &[&["render", WAREHOUSE][..], &outputs].concat(),
+        0,
+    );
+    let read = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
+    let mission: serde_json::Value = serde_json::from_str(&read("x.json")).unwrap();
+    let names = |list: &str| -> BTreeSet<String> {
+        let windows = mission["windows"].as_array().unwrap();
+        let elements = windows.iter().flat_map(|w| w[list].as_array().unwrap());
+        let name = |e: &serde_json::Value, key: &str| e[key].as_str().unwrap_or("").to_owned();
+        elements
+            .map(|e| name(e, "name") + &name(e, "node") + " " + &name(e, "topic"))
+            .collect()
+    };
+    let nodes = names("nodes").len() + names("topics").len();
+    let edges = names("publishes").len() + names("subscribes").len();
+    for text in [read("x.gexf"), read("x.graphml")] {
+        assert_eq!(text.matches("<node id=").count(), nodes);
+        assert_eq!(text.matches("<edge id=").count(), edges);
+    }
+    let gexf = read("x.gexf");
+    assert!(gexf.matches("<spell ").count() >= nodes + edges);
+    // What comes after the first window has a spell that says so.
+    assert!(gexf.contains("<spell start=\"60\""), "{}", &gexf[..2000]);
+}
+
+#[cfg(feature = "parquet")]
+mod parquet {
+    use std::fs::File;
+
+    use ::parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+    use arrow_array::cast::AsArray as _;
+    use arrow_array::types::{Int64Type, TimestampNanosecondType};
+    use arrow_array::{RecordBatch, RecordBatchReader as _};
+    use arrow_schema::DataType;
+
+    use super::*;
+
+    fn read(path: &Path) -> Vec<RecordBatch> {
+        let file = File::open(path).unwrap();
+        let reader = ParquetRecordBatchReader::try_new(file, 1 << 20).unwrap();
+        reader.map(|batch| batch.unwrap()).collect()
+    }
+
+    #[test]
+    fn parquet_holds_what_csv_holds() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["m.csv", "m.parquet", "again.parquet"] {
+            ends(dir.path(), &["extract", WAREHOUSE, "-o", name], 0);
+        }
+        let bytes = |name: &str| fs::read(dir.path().join(name)).unwrap();
+        assert!(
+            bytes("m.parquet") == bytes("again.parquet"),
+            "same bag, same bytes"
+        );
+        let rows = csv(&dir.path().join("m.csv"));
+        let batches = read(&dir.path().join("m.parquet"));
+        assert_eq!(batches.len(), 1);
+        let column = |name: &str| batches[0].column_by_name(name).unwrap();
+        let times = column("time_ns").as_primitive::<TimestampNanosecondType>();
+        assert_eq!(times.timezone(), Some("UTC"));
+        let sizes = column("size_bytes").as_primitive::<Int64Type>();
+        let topics = column("topic").as_string::<i32>();
+        assert_eq!(times.len(), rows.len() - 1);
+        for (at, row) in rows[1..].iter().enumerate() {
+            assert_eq!(row[0], times.value(at).to_string());
+            assert_eq!(row[1], topics.value(at));
+            assert_eq!(row[4], sizes.value(at).to_string());
+        }
+    }
+
+    #[test]
+    fn fields_keep_their_types() {
+        let dir = tempfile::tempdir().unwrap();
+        ends(dir.path(), &["extract", COURIER, "-o", "t", "--fields"], 0);
+        let scan = read(&dir.path().join("t/scan.parquet")).remove(0);
+        let schema = scan.schema();
+        let kind = |name: &str| schema.field_with_name(name).unwrap().data_type().clone();
+        assert_eq!(kind("header.stamp.sec"), DataType::Int32);
+        assert_eq!(kind("range_max"), DataType::Float32);
+        assert!(
+            matches!(kind("ranges"), DataType::List(of) if *of.data_type() == DataType::Float32)
+        );
+        let tf = read(&dir.path().join("t/tf.parquet")).remove(0);
+        let schema = tf.schema();
+        let name = "transforms.transform.translation.x";
+        let kind = schema.field_with_name(name).unwrap().data_type();
+        assert!(matches!(kind, DataType::List(of) if *of.data_type() == DataType::Float64));
+    }
+
+    #[test]
+    fn a_mission_is_the_same_tables_in_both_formats() {
+        let dir = tempfile::tempdir().unwrap();
+        let args = ["render", WAREHOUSE, "-o", "x.csv", "-o", "x.parquet"];
+        ends(dir.path(), &args, 0);
+        for table in [
+            "edges", "topics", "nodes", "changes", "ledger", "phases", "bags",
+        ] {
+            let rows = csv(&dir.path().join(format!("x.{table}.csv")));
+            let file = File::open(dir.path().join(format!("x.{table}.parquet"))).unwrap();
+            let reader = ParquetRecordBatchReader::try_new(file, 1 << 20).unwrap();
+            let schema = reader.schema();
+            let names: Vec<&String> = schema.fields().iter().map(|f| f.name()).collect();
+            assert_eq!(names, rows[0].iter().collect::<Vec<_>>());
+            let count: usize = reader.map(|batch| batch.unwrap().num_rows()).sum();
+            assert_eq!(count, rows.len() - 1, "{table}");
+        }
+        let edges = read(&dir.path().join("x.edges.parquet")).remove(0);
+        let schema = edges.schema();
+        let start = schema.field_with_name("start_ns").unwrap().data_type();
+        assert!(matches!(start, DataType::Timestamp(..)), "{start}");
+    }
+}
