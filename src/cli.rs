@@ -23,9 +23,8 @@ use crate::evidence::topology;
 use crate::export::Output;
 use crate::graph;
 use crate::graph::window::{Division, Length};
-use crate::mission::Mission;
-use crate::mission::events::{LogFormat, LogOptions, log};
 use crate::mission::info::{SurveyRow, json, survey_text};
+use crate::mission::{Mission, events};
 use crate::pipeline::{
     Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
     survey_file,
@@ -73,7 +72,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Render(args) => render(&args, &mut terminal),
         Command::Info(args) => info(&args, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
-        Command::Events(args) => events(&args, &mut terminal),
+        Command::Events(args) => log(&args, &mut terminal),
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
             let mut text = Vec::new();
@@ -355,20 +354,20 @@ fn default_output(inputs: &[Input], is_figure: bool) -> String {
     format!("out/{}.{extension}", stem.replace('/', "_"))
 }
 
-fn events(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+fn log(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     let mission = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
-    let options = LogOptions {
+    let options = events::LogOptions {
         parts: args.parts,
         all: args.all,
         phases: args.phases,
     };
     let format = match args.format {
-        EventsFormat::Text => LogFormat::Text,
-        EventsFormat::Csv => LogFormat::Csv,
-        EventsFormat::Ndjson => LogFormat::Ndjson,
-        EventsFormat::Markdown => LogFormat::Markdown,
+        EventsFormat::Text => events::LogFormat::Text,
+        EventsFormat::Csv => events::LogFormat::Csv,
+        EventsFormat::Ndjson => events::LogFormat::Ndjson,
+        EventsFormat::Markdown => events::LogFormat::Markdown,
     };
-    terminal.results(&log(&mission, format, options))?;
+    terminal.results(&events::log(&mission, format, options))?;
     terminal.notices(&mission.notices);
     Ok(code(&mission))
 }

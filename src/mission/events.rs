@@ -163,12 +163,12 @@ fn escaped(text: &str) -> String {
 }
 
 const COLUMNS: [&str; 16] = [
-    "id",
+    "time_ns",
     "kind",
     "what",
     "name",
     "topic",
-    "time_ns",
+    "id",
     "earliest_ns",
     "latest_ns",
     "until_ns",
@@ -202,12 +202,12 @@ fn cells(mission: &Mission, id: EntryId, entry: &Entry) -> Vec<String> {
     };
     let (before, after) = values(mission, entry);
     vec![
-        id.to_string(),
+        entry.time.0.to_string(),
         entry.kind.word().to_owned(),
         entry.what.word().to_owned(),
         name.unwrap_or_default(),
         topic.unwrap_or_default(),
-        entry.time.0.to_string(),
+        id.to_string(),
         entry.earliest.0.to_string(),
         entry.latest.0.to_string(),
         entry.until.map_or_else(String::new, |t| t.0.to_string()),
@@ -238,10 +238,10 @@ fn values(mission: &Mission, entry: &Entry) -> (String, String) {
 
 fn phase_cells(at: usize, phase: &Phase) -> Vec<String> {
     let mut cells = vec![String::new(); COLUMNS.len()];
-    cells[0] = (at + 1).to_string();
+    cells[0] = phase.span.start.0.to_string();
     "phase".clone_into(&mut cells[1]);
     cells[3] = visible(&phase.name).into_owned();
-    cells[5] = phase.span.start.0.to_string();
+    cells[5] = (at + 1).to_string();
     cells[8] = phase.span.end.0.to_string();
     cells
 }
