@@ -73,3 +73,31 @@ fn a_window_without_a_headline_looks_like_the_one_before() {
         }
     }
 }
+
+#[test]
+fn a_node_that_restarts_keeps_its_arrows() {
+    let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
+    let mut reading = Reading {
+        inputs: vec![Input::Path(bag)],
+        ..Reading::default()
+    };
+    // Away from 4:06 to 4:13: gone when the window from 4:00 to 4:10 ends.
+    reading.division.length = bagreel::base::time::Period::parse("10").map_or(
+        reading.division.length,
+        bagreel::graph::window::Length::Fixed,
+    );
+    let mission = read(&reading, &mut Unwatched).unwrap();
+    let view = view(&mission, &ViewOptions::default()).0;
+    let item = |name: &str| {
+        let found = view.items.iter().position(|i| &*i.name == name).unwrap();
+        u32::try_from(found).unwrap()
+    };
+    let (lidar, scan) = (item("/robot2/lidar_driver"), item("/robot2/scan"));
+    for frame in &view.frames[20..30] {
+        let drawn = frame.arrows.iter().any(|shown| {
+            let arrow = &view.arrows[shown.id as usize];
+            (arrow.from, arrow.to) == (lidar, scan)
+        });
+        assert!(drawn, "window {}", frame.index);
+    }
+}

@@ -75,12 +75,16 @@ impl Turn {
         let mut arrows = Vec::new();
         for shown in now.into_iter().flatten() {
             let at = shown.id as usize;
-            let there = (self.before.arrows[at], self.after.arrows[at]);
             let told = self.news.arrows.get(&shown.id).cloned();
             let arrow = &viewed.arrows[at];
             let (Some(from), Some(to)) = (end(arrow.from), end(arrow.to)) else {
                 continue;
             };
+            // A node that restarts keeps its arrows, though it is away when the window ends.
+            let is_back = [from, to]
+                .iter()
+                .any(|end| end.mark == Some(Mark::Restarted));
+            let there = (self.before.arrows[at], self.after.arrows[at] || is_back);
             let told = told.or_else(|| with_ends(there, [from, to]));
             arrows.extend(marked(shown, there, told.as_ref()));
         }
