@@ -4,13 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use bagreel::bag::{Report, Tier, Want};
+use bagreel::bag::{OpenOptions, Report, Tier, Want};
 use bagreel::base::notice::NoticeKind;
 use bagreel::base::time::Stamp;
 use tempfile::TempDir;
 
 use crate::support::rosbag1::Pack;
-use crate::support::{self, Kept, ORIGIN, Recording, mcap, read, rosbag1, sqlite3};
+use crate::support::{self, Kept, ORIGIN, Recording, mcap, read, read_as, rosbag1, sqlite3};
 
 /// A folder with one file in it.
 fn placed(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
@@ -424,6 +424,31 @@ fn a_second_reader_that_stops_verifies_nothing() {
     assert_eq!(code, Some(3), "{told}");
     assert!(told.contains("could not be verified"), "{told}");
     assert!(!told.contains("a second reader counts the same"), "{told}");
+}
+
+#[test]
+fn a_record_longer_than_its_chunk_stops_the_second_reader() {
+    let options = mcap::Options {
+        compression: None,
+        ..mcap::Options::default()
+    };
+    let mut bytes = mcap::write(&short(), &options);
+    let truth = short().messages.len();
+    // The first message: its kind, eight bytes of length, the channel.
+    let channel = bytes
+        .windows(10)
+        .position(|w| w[0] == 5 && w[2..9] == [0; 7]);
+    let message = channel.unwrap_or_else(|| {
+        let long = bytes
+            .windows(10)
+            .position(|w| w[0] == 5 && w[3..9] == [0; 6]);
+        long.unwrap()
+    });
+    bytes[message + 3] = 0x7f;
+    let (_dir, path) = placed("x.mcap", &bytes);
+    let options = OpenOptions { verify: true };
+    let (report, kept) = read_as(&path, Want::Payload, None, &options).unwrap();
+    assert!(!report.complete && kept.stamps.len() < truth, "{report:?}");
 }
 
 #[test]

@@ -13,6 +13,7 @@ use crate::mission::Mission;
 pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Vec<Frame> {
     let speaker = Speaker::new(mission, viewed);
     let lives = Lives::new(mission);
+    let parts = mission.ledger.all_parts();
     let mut frames = Vec::with_capacity(mission.windows.len());
     for window in &mission.windows {
         let span = window.span;
@@ -22,7 +23,7 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
         let turn = Turn {
             before: Presence::of(viewed, &lives.before(span.start)),
             after: Presence::of(viewed, &lives.before(span.end)),
-            news: News::new(&mission.ledger, span, viewed),
+            news: News::new(&mission.ledger, &parts, span, viewed),
         };
         let items = turn.items(viewed, now.0);
         let arrows = turn.arrows(viewed, now.1, &items);

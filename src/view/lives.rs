@@ -35,7 +35,13 @@ impl<'a> Lives<'a> {
             turns: BTreeMap::new(),
             pauses: BTreeMap::new(),
         };
-        for entry in &mission.ledger.entries {
+        let entries = &mission.ledger.entries;
+        for entry in entries {
+            // A part is told with its whole, so that it comes and goes with it. What restarts keeps its parts.
+            let whole = entry.part_of.and_then(|id| entries.get(id as usize));
+            if whole.is_some_and(|whole| whole.kind == Kind::Restarted) {
+                continue;
+            }
             let begins = match entry.kind {
                 Kind::Started | Kind::Appeared => true,
                 Kind::Stopped | Kind::Vanished => false,
@@ -48,7 +54,10 @@ impl<'a> Lives<'a> {
                 _ => continue,
             };
             let turns = lives.turns.entry(entry.what).or_default();
-            turns.push((entry.time, begins));
+            turns.push((whole.unwrap_or(entry).time, begins));
+        }
+        for turns in lives.turns.values_mut() {
+            turns.sort_by_key(|turn| turn.0);
         }
         lives
     }

@@ -23,6 +23,9 @@ pub(crate) struct Told {
     pub(crate) entries: Vec<EntryId>,
 }
 
+/// The parts of each headline, by their places in the ledger.
+pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
+
 /// What is told in one window, by id.
 pub(crate) struct News {
     pub(crate) headlines: Vec<Headline>,
@@ -31,31 +34,30 @@ pub(crate) struct News {
 }
 
 impl News {
-    pub(crate) fn new(ledger: &Ledger, span: Span, viewed: &Viewed) -> Self {
+    /// `parts` are the parts of each headline. They are told with it, whenever they were seen.
+    pub(crate) fn new(ledger: &Ledger, parts: &Parts, span: Span, viewed: &Viewed) -> Self {
         let mut news = Self {
             headlines: Vec::new(),
             items: BTreeMap::new(),
             arrows: BTreeMap::new(),
         };
-        for (id, entry) in ledger.inside(span) {
-            let whole = entry.part_of.unwrap_or(id);
-            let Some(headline) = ledger.entries.get(whole as usize) else {
-                continue;
-            };
-            if headline.quiet || !viewed.sees(headline.what) {
+        for (id, entry) in ledger.headlines(span) {
+            if !viewed.sees(entry.what) {
                 continue;
             }
-            if entry.is_headline() {
-                news.headlines.push(Headline {
-                    entry: id,
-                    kind: entry.kind,
-                    what: entry.what,
-                    time: entry.time,
-                });
-            }
+            news.headlines.push(Headline {
+                entry: id,
+                kind: entry.kind,
+                what: entry.what,
+                time: entry.time,
+            });
+            news.tell(viewed, entry, id);
             // One that came back says so by itself.
-            if entry.is_headline() || headline.kind != Kind::Restarted {
-                news.tell(viewed, entry, whole);
+            let parts = parts.get(&id).filter(|_| entry.kind != Kind::Restarted);
+            for part in parts.into_iter().flatten() {
+                if let Some(part) = ledger.entries.get(*part as usize) {
+                    news.tell(viewed, part, id);
+                }
             }
         }
         news

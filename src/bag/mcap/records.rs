@@ -118,7 +118,7 @@ const MOST_PADDING: u64 = 4096;
 const CHUNK_HEAD: usize = 8 + 8 + 8 + 4;
 
 /// Takes what stands before a chunk's records.
-fn chunk(stream: &mut Stream<'_>, len: u64) -> Result<ChunkHead, Stop> {
+pub(super) fn chunk(stream: &mut Stream<'_>, len: u64) -> Result<ChunkHead, Stop> {
     let bytes = stream.peek(256)?;
     let total = bytes.len();
     let mut cursor = Cursor(bytes);

@@ -6,9 +6,10 @@ use mcap::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::{Described, Mcap};
+use super::{Described, Mcap, records};
 use crate::bag::adapters::Gather;
-use crate::bag::chunked::{Connections, Grammar as _, hand_over_slice, nameless};
+use crate::bag::chunked::{Connections, Grammar as _, hand_over_slice, nameless, pass};
+use crate::bag::decompress::Compression;
 use crate::bag::model::{Sink, Want};
 use crate::bag::source::{FAR, Source, Stream};
 use crate::base::time::Stamp;
@@ -30,6 +31,7 @@ struct Crate<'s> {
 /// # Errors
 /// Why it did not get to the end: a wrong checksum, a cut, or anything else that is not as the format has it.
 pub(super) fn read(source: &Source, sink: &mut dyn Sink) -> Result<(), String> {
+    bound(source)?;
     let mut from = Stream::of_file(source, 0, source.len(), FAR);
     let options = LinearReaderOptions::default()
         .with_validate_chunk_crcs(true)
@@ -47,6 +49,34 @@ pub(super) fn read(source: &Source, sink: &mut dyn Sink) -> Result<(), String> {
     let told = found.records(&mut reader, &mut from);
     found.gather.flush(found.sink);
     told
+}
+
+/// Walks the plain chunks as the crate will, and refuses what it could not bear: it subtracts the length of a record from
+/// what is left of the chunk before it compares them.
+fn bound(source: &Source) -> Result<(), String> {
+    let mut stream = Stream::of_file(source, 0, source.len(), FAR);
+    Mcap::begin(&mut stream);
+    while let Ok((kind, len)) = records::head(&mut stream) {
+        let end = stream.position().saturating_add(len);
+        if kind == op::CHUNK
+            && let Some(head) = records::chunk(&mut stream, len).ok()
+            && head.how == Some(Compression::None)
+        {
+            let end = stream.position() + head.packed;
+            while stream.position() < end {
+                let (_, len) = records::head(&mut stream).map_err(|stop| stop.to_string())?;
+                if len > end.saturating_sub(stream.position()) {
+                    return Err("a record is longer than its chunk".to_owned());
+                }
+                pass(&mut stream, len).map_err(|stop| stop.to_string())?;
+            }
+        }
+        let rest = end.saturating_sub(stream.position());
+        if pass(&mut stream, rest).is_err() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 impl Crate<'_> {

@@ -12,7 +12,9 @@ const TIGHTNESS: [f64; 5] = [3.6, 4.8, 6.5, 9.0, 12.0];
 /// Heights of the page that the engine is to fill, in widths.
 const ASPECTS: [f64; 2] = [0.45, 1.2];
 /// Where along an arrow its label is tried, best first.
-const STATIONS: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
+const STATIONS: [f64; 13] = [
+    0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82, 0.46, 0.54, 0.3, 0.7,
+];
 /// Pieces that a curve is measured in.
 const PIECES: usize = 8;
 /// A drawing in millimetres, its top left corner at (0, 0).
@@ -249,7 +251,7 @@ impl Placed {
         let mut taken: Vec<Rect> = self.boxes.iter().map(|b| b.grown(0.25)).collect();
         taken.extend(titles);
         let tips = self.routes.iter().filter_map(|r| r.last());
-        taken.extend(tips.map(|p| Rect::around(*p, Size::new(1.4, 1.4))));
+        taken.extend(tips.map(|p| Rect::around(*p, Size::new(1.0, 1.0))));
         let mut order: Vec<usize> = (0..labels.len()).collect();
         order.sort_by(|a, b| {
             length(&self.routes[*a])
