@@ -4,7 +4,7 @@ mod args;
 mod extract;
 mod look;
 mod stop;
-pub mod terminal;
+pub(crate) mod terminal;
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write as _;

@@ -18,8 +18,6 @@ use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
 use crate::view::{Frame, ItemKind, Mark, Shown, View};
 
-pub use names::escape_name;
-
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
 /// It draws with the system's sans, which may run wider than ours.
@@ -31,7 +29,7 @@ const LINE: f64 = 15.0;
 
 /// A view with what every DOT file of it shares: unique ids and, for the profile `rqt`, one layout.
 #[derive(Clone, Debug)]
-pub struct Drawing<'a> {
+pub(crate) struct Drawing<'a> {
     elements: &'a Elements,
     view: &'a View,
     style: Style,
@@ -43,7 +41,7 @@ pub struct Drawing<'a> {
 
 impl<'a> Drawing<'a> {
     /// Prepares a view; its colours for changes come from `style`.
-    pub fn new(mission: &'a Mission, view: &'a View, style: Style) -> Self {
+    pub(crate) fn new(mission: &'a Mission, view: &'a View, style: Style) -> Self {
         Self {
             elements: &mission.elements,
             view,
@@ -56,7 +54,7 @@ impl<'a> Drawing<'a> {
 
     /// Gives everything its place, with sizes by full names as `qt_dotgraph` writes them.
     #[must_use]
-    pub fn laid_out(mut self, fonts: &Fonts) -> Self {
+    pub(crate) fn laid_out(mut self, fonts: &Fonts) -> Self {
         self.plan = plan(self.view, fonts);
         let options = layout::Options {
             page: Size::new(1600.0, 900.0),
@@ -68,7 +66,7 @@ impl<'a> Drawing<'a> {
 
     /// One window, or the [`union`] of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
     /// Only the latter shows the `title`.
-    pub fn write(&self, frame: &Frame, title: &str) -> String {
+    pub(crate) fn write(&self, frame: &Frame, title: &str) -> String {
         match &self.layout {
             Some(layout) => rqt::write(self, layout, frame),
             None => plain::write(self, frame, title),

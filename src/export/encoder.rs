@@ -167,7 +167,7 @@ impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
 }
 
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
-pub type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
+pub(crate) type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
 
 /// Whether a format holds one drawing of the whole mission: a film strip or a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

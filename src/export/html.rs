@@ -24,7 +24,7 @@ const LOOK: &str = include_str!("../../styles/player.css");
 
 /// What a page is made of.
 #[derive(Clone, Copy, Debug)]
-pub struct Page<'a> {
+pub(crate) struct Page<'a> {
     /// The whole sequence.
     pub mission: &'a Mission,
     /// What is shown of it.
@@ -41,7 +41,7 @@ pub struct Page<'a> {
 
 impl Page<'_> {
     /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
-    pub fn write(&self) -> String {
+    pub(crate) fn write(&self) -> String {
         let runs = Runs::of(self.view, rate_label);
         let still = self.view.busiest();
         let fonts = fonts();

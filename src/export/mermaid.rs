@@ -9,7 +9,7 @@ use crate::draw::style::Style;
 use crate::view::{ArrowKind, Frame, ItemKind, Mark, Shown, View};
 
 /// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
-pub fn chart(view: &View, style: &Style, frame: &Frame) -> String {
+pub(crate) fn chart(view: &View, style: &Style, frame: &Frame) -> String {
     let mut out = String::from("flowchart LR\n");
     members(view, frame, &mut out, None, 1);
     let mut marked = String::new();

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// A colour: red, green, blue.
-pub type Rgb = [u8; 3];
+pub(crate) type Rgb = [u8; 3];
 
 /// How many of the most frequent colours are always in: more than a style has.
 const THEME: usize = 40;
@@ -15,16 +15,16 @@ const BITS: u32 = 4;
 
 /// A frame of opaque pixels as runs of equal ones: a drawing takes a fraction of its bytes.
 #[derive(Clone, Debug)]
-pub struct Packed(Vec<(Rgb, u32)>);
+pub(crate) struct Packed(Vec<(Rgb, u32)>);
 
 impl Packed {
     /// Packs RGBA bytes; transparency is not looked at.
-    pub fn new(rgba: &[u8]) -> Self {
+    pub(crate) fn new(rgba: &[u8]) -> Self {
         Self(runs(rgba).collect())
     }
 
     /// The RGBA bytes again, opaque.
-    pub fn rgba(&self) -> Vec<u8> {
+    pub(crate) fn rgba(&self) -> Vec<u8> {
         let length = |run: &(Rgb, u32)| run.1 as usize * 4;
         let mut rgba = Vec::with_capacity(self.0.iter().map(length).sum());
         for &([r, g, b], length) in &self.0 {
@@ -38,11 +38,11 @@ impl Packed {
 
 /// Counts the colours of the frames that a palette is made from. Frames may come in any order.
 #[derive(Clone, Debug, Default)]
-pub struct Census(HashMap<Rgb, u64>);
+pub(crate) struct Census(HashMap<Rgb, u64>);
 
 impl Census {
     /// Counts the pixels of one frame.
-    pub fn count(&mut self, frame: &Packed) {
+    pub(crate) fn count(&mut self, frame: &Packed) {
         for &(colour, length) in &frame.0 {
             *self.0.entry(colour).or_default() += u64::from(length);
         }
@@ -50,7 +50,7 @@ impl Census {
 
     /// At most `most` (2..=256) colours: exactly those counted if they are so few, otherwise the most frequent ones
     /// and then, again and again, the frequent one that is farthest from all chosen.
-    pub fn palette(self, most: usize) -> Palette {
+    pub(crate) fn palette(self, most: usize) -> Palette {
         let mut counted: Vec<(Rgb, u64)> = self.0.into_iter().collect();
         counted.sort_unstable_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
         let certain = if counted.len() <= most {
@@ -192,7 +192,7 @@ fn candidates(colours: &[Rgb], cell: usize) -> Vec<u8> {
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Area {
+pub(crate) struct Area {
     /// Columns from the left.
     pub x: usize,
     /// Rows from the top.
@@ -204,7 +204,7 @@ pub struct Area {
 }
 
 /// The smallest area that holds every difference between two frames of `width` columns; `None` if they are equal.
-pub fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
+pub(crate) fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
     let rows = || before.chunks_exact(width).zip(after.chunks_exact(width));
     let top = rows().position(|(a, b)| a != b)?;
     let bottom = rows().rposition(|(a, b)| a != b)?;
@@ -227,7 +227,7 @@ pub fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
 }
 
 /// The pixels of `area` in `after`, with `clear` where they equal `before`.
-pub fn patch(before: &[u8], after: &[u8], width: usize, area: Area, clear: u8) -> Vec<u8> {
+pub(crate) fn patch(before: &[u8], after: &[u8], width: usize, area: Area, clear: u8) -> Vec<u8> {
     let mut pixels = Vec::with_capacity(area.width * area.height);
     for row in area.y..area.y + area.height {
         let from = row * width + area.x;

@@ -9,7 +9,7 @@ use crate::mission::{Activity, Mission, Window};
 
 /// The evolution without what the view leaves out. Topics in groups and what is inside collapsed namespaces are seen,
 /// so they stay, under their own names; so do changes, as they were found in the whole graph.
-pub fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
+pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let viewed = Viewed::new(&mission.elements, options);
     let keep = Keep::new(&mission.elements, options, &viewed);
     let windows = mission.windows.iter();

@@ -3,7 +3,7 @@
 
 mod css;
 
-pub use css::{base, rules, states, variables};
+pub(crate) use css::{base, rules, states, variables};
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -20,7 +20,7 @@ use crate::view::{Mark, View};
 
 /// How much is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Detail {
+pub(crate) struct Detail {
     /// Coordinates to a tenth of a pixel, not whole pixels.
     pub is_fine: bool,
     /// Names, as attributes and for hovering.
@@ -29,7 +29,7 @@ pub struct Detail {
 
 /// A graph in SVG.
 #[derive(Debug)]
-pub struct Classes<'a> {
+pub(crate) struct Classes<'a> {
     view: &'a View,
     union: &'a Union,
     style: &'a Style,
@@ -37,7 +37,7 @@ pub struct Classes<'a> {
 }
 
 /// What stands inside the group of an element before and after its drawing.
-pub trait ElementLook {
+pub(crate) trait ElementLook {
     /// The words of its class attribute, after `node`, `topic` or `edge`.
     fn class(&self) -> String;
     /// What its live text says.
@@ -50,7 +50,7 @@ pub trait ElementLook {
 
 impl<'a> Classes<'a> {
     /// The stage of a view whose union is `union`.
-    pub fn new(view: &'a View, union: &'a Union, style: &'a Style, detail: Detail) -> Self {
+    pub(crate) fn new(view: &'a View, union: &'a Union, style: &'a Style, detail: Detail) -> Self {
         Self {
             view,
             union,
@@ -60,7 +60,7 @@ impl<'a> Classes<'a> {
     }
 
     /// The definitions of the badges that occur, `<symbol>`s without colours of their own.
-    pub fn signs(&self) -> String {
+    pub(crate) fn signs(&self) -> String {
         let parts = self.union.items.iter().chain(&self.union.arrows);
         let marks: BTreeSet<Mark> = parts.flat_map(|p| p.marks.iter().copied()).collect();
         let mut out = String::from("<defs>");
@@ -83,7 +83,7 @@ impl<'a> Classes<'a> {
     }
 
     /// The boxes around namespaces.
-    pub fn spaces(&self, out: &mut String) {
+    pub(crate) fn spaces(&self, out: &mut String) {
         for space in &self.union.spaces {
             out.push_str("<g class=\"namespace\">");
             self.pieces(out, space, None);
@@ -92,7 +92,7 @@ impl<'a> Classes<'a> {
     }
 
     /// The arrow at this place of the view.
-    pub fn arrow(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
+    pub(crate) fn arrow(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
         let (part, arrow) = (&self.union.arrows[at], &self.view.arrows[at]);
         let name = |id: u32| &*self.view.items[id as usize].name;
         let ends = [("from", name(arrow.from)), ("to", name(arrow.to))];
@@ -101,7 +101,7 @@ impl<'a> Classes<'a> {
     }
 
     /// The item at this place of the view.
-    pub fn item(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
+    pub(crate) fn item(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
         let (part, item) = (&self.union.items[at], &self.view.items[at]);
         self.element(
             out,
