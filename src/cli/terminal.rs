@@ -82,6 +82,10 @@ impl Terminal {
     ///
     /// # Errors
     /// [`Error::Io`] where not all of it could be written.
+    #[expect(
+        clippy::unused_self,
+        reason = "whoever holds the terminal may print and wait"
+    )]
     pub(crate) fn results(&mut self, text: &str) -> Result<()> {
         print(printable(text).as_bytes())
     }
@@ -110,6 +114,10 @@ impl Terminal {
     }
 
     /// Waits a moment before looking at a file again.
+    #[expect(
+        clippy::unused_self,
+        reason = "whoever holds the terminal may print and wait"
+    )]
     pub(crate) fn wait(&self) {
         std::thread::sleep(Duration::from_millis(200));
     }

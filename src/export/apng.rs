@@ -80,7 +80,7 @@ impl Encoder for Apng {
             None => self.begin(frame)?,
         };
         animation
-            .add(frame.indices, frame.frame_time.ms)
+            .add(frame.indices, frame.time.ms)
             .map_err(self.error())?;
         self.animation = Some(animation);
         Ok(())

@@ -30,7 +30,7 @@ pub struct Frame<'a> {
     /// The index of its window.
     pub index: usize,
     /// What it shows and for how long.
-    pub frame_time: FrameTime,
+    pub time: FrameTime,
     /// The drawing.
     pub scene: &'a Scene,
     /// The drawing as pixels; empty unless somebody needs them.

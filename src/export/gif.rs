@@ -73,9 +73,7 @@ impl Encoder for Gif {
         self.begin(frame)?;
         let failed = self.error();
         match &mut self.animation {
-            Some(animation) => animation
-                .add(frame.indices, frame.frame_time.ms)
-                .map_err(failed),
+            Some(animation) => animation.add(frame.indices, frame.time.ms).map_err(failed),
             None => Ok(()),
         }
     }

@@ -81,7 +81,7 @@ impl Encoder for Book<'_> {
     }
 
     fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
-        self.add(frame.scene, self.entry(frame.frame_time.window))
+        self.add(frame.scene, self.entry(frame.time.window))
     }
 
     fn finish(self: Box<Self>) -> Result<Written> {

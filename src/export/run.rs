@@ -102,7 +102,7 @@ impl<'a> OutputJob<'a> {
                     .frames
                     .get(drawn.frame_time.window)
                     .map_or(0, |f| f.index),
-                frame_time: drawn.frame_time,
+                time: drawn.frame_time,
                 scene: &drawn.scene,
                 pixels: &drawn.pixels,
                 palette,

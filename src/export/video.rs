@@ -225,7 +225,7 @@ impl Encoder for Video<'_> {
             Some(work) => work,
             None => self.begin(frame.pixels)?,
         };
-        if work.show(&frame.pixels.rgba, frame.frame_time.ms).is_err() {
+        if work.show(&frame.pixels.rgba, frame.time.ms).is_err() {
             return Err(self.complaint(&mut work));
         }
         self.work = Some(work);
