@@ -9,10 +9,9 @@ use crate::support::cdr::Cdr;
 use crate::support::{ORIGIN, Recording, mcap};
 
 fn example(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
-        .join(name);
-    path
+        .join(name)
 }
 
 fn told(bag: PathBuf) -> Info {
