@@ -79,7 +79,7 @@ pub const FORMATS: &[Format] = &[
     Format {
         word: "dot",
         what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
-        start: dot::encoder::start,
+        start: dot::start,
         ..DATA
     },
     Format {

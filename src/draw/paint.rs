@@ -1,6 +1,8 @@
 //! Painters of one shape: each turns a [`scene`](crate::draw::scene) into what can be written, and decides nothing.
 
+pub(crate) mod animated;
 pub(crate) mod classes;
+pub(crate) mod dot;
 #[cfg(feature = "pdf")]
 pub(crate) mod pdf;
 pub mod raster;

@@ -2,6 +2,8 @@
 
 use std::fmt::{self, Display, Write as _};
 
+use crate::base::words::is_invisible;
+
 /// XML under way. Values and texts are escaped as they are written; tags close themselves in order.
 #[derive(Debug, Default)]
 pub(crate) struct Xml {
@@ -37,6 +39,24 @@ impl Xml {
             // Writing to a string cannot fail.
             let _ = write!(self.out, " {key}=\"");
             let _ = write!(Escaped(&mut self.out), "{value}");
+            self.out.push('"');
+        }
+        self
+    }
+
+    /// The same for a name that reads back as itself; what would hide or turn round the page's own text is written as a
+    /// number.
+    pub(crate) fn name(&mut self, key: impl Display, name: &str) -> &mut Self {
+        if self.is_start {
+            let _ = write!(self.out, " {key}=\"");
+            let mut rest = name;
+            while let Some(at) = rest.find(|c: char| is_invisible(c) && !c.is_control()) {
+                escape(&mut self.out, &rest[..at]);
+                let hidden = rest[at..].chars().next().unwrap_or_default();
+                let _ = write!(self.out, "&#{};", u32::from(hidden));
+                rest = &rest[at + hidden.len_utf8()..];
+            }
+            escape(&mut self.out, rest);
             self.out.push('"');
         }
         self
@@ -113,7 +133,7 @@ impl fmt::Write for Escaped<'_> {
 }
 
 /// `text` for use between tags and in attributes; what XML cannot hold is spelled out.
-pub(crate) fn escape(out: &mut String, text: &str) {
+fn escape(out: &mut String, text: &str) {
     for c in text.chars() {
         match c {
             '&' => out.push_str("&amp;"),
