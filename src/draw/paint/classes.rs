@@ -127,7 +127,7 @@ impl<'a> Classes<'a> {
         xml.open("g").attribute("class", class.trim_end());
         if self.detail.has_names {
             for (key, value) in data {
-                xml.name(format_args!("data-{key}"), value);
+                xml.attribute(format_args!("data-{key}"), value);
             }
         }
         look.more(xml);

@@ -44,24 +44,6 @@ impl Xml {
         self
     }
 
-    /// The same for a name that reads back as itself; what would hide or turn round the page's own text is written as a
-    /// number.
-    pub(crate) fn name(&mut self, key: impl Display, name: &str) -> &mut Self {
-        if self.is_start {
-            let _ = write!(self.out, " {key}=\"");
-            let mut rest = name;
-            while let Some(at) = rest.find(|c: char| is_invisible(c) && !c.is_control()) {
-                escape(&mut self.out, &rest[..at]);
-                let hidden = rest[at..].chars().next().unwrap_or_default();
-                let _ = write!(self.out, "&#{};", u32::from(hidden));
-                rest = &rest[at + hidden.len_utf8()..];
-            }
-            escape(&mut self.out, rest);
-            self.out.push('"');
-        }
-        self
-    }
-
     /// Text inside the tag that is open.
     pub(crate) fn text(&mut self, text: &str) -> &mut Self {
         self.end_start();
@@ -132,7 +114,8 @@ impl fmt::Write for Escaped<'_> {
     }
 }
 
-/// `text` for use between tags and in attributes; what XML cannot hold is spelled out.
+/// `text` for use between tags and in attributes; what XML cannot hold is spelled out, and what would hide or turn round
+/// the page's own text is written as a number.
 fn escape(out: &mut String, text: &str) {
     for c in text.chars() {
         match c {
@@ -145,6 +128,9 @@ fn escape(out: &mut String, text: &str) {
             }
             '\0'..='\u{1f}' | '\u{7f}'..='\u{9f}' | '\u{fffe}' | '\u{ffff}' => {
                 let _ = write!(out, "\\u{{{:x}}}", u32::from(c));
+            }
+            c if is_invisible(c) => {
+                let _ = write!(out, "&#{};", u32::from(c));
             }
             _ => out.push(c),
         }
@@ -222,11 +208,11 @@ mod tests {
     fn whatever_is_written_stays_inside_its_quotes_and_tags() {
         let mut xml = Xml::default();
         xml.open("g").attribute("data-name", "\"><script>");
-        xml.open("text").text("</text>&\u{1}\n").close();
+        xml.open("text").text("</text>&\u{1}\n\u{202e}").close();
         xml.open("rect").attribute("x", tenth(1.0)).close_empty();
         assert_eq!(
             xml.finish(),
-            "<g data-name=\"&quot;&gt;&lt;script&gt;\"><text>&lt;/text&gt;&amp;\\u{1}&#10;</text><rect x=\"1\"/></g>"
+            "<g data-name=\"&quot;&gt;&lt;script&gt;\"><text>&lt;/text&gt;&amp;\\u{1}&#10;&#8238;</text><rect x=\"1\"/></g>"
         );
     }
 }
