@@ -35,7 +35,7 @@ use crate::base::error::{Error, Result};
 
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
-pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Start, Written};
+pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Pack, Packet, Start, Written};
 use sequence::Sequence;
 use target::Target;
 pub(crate) use tex::needs_figure;

@@ -177,7 +177,9 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
             ControlFlow::Continue(())
         }
     };
-    let written = run::run(&sequence, &job.outputs, &mut progress)?;
+    let steps = run::Steps::default();
+    let written = run::run(&sequence, &job.outputs, &steps, &mut progress)?;
+    watch.shares(&steps.shares());
     Ok(Rendered { mission, written })
 }
 
