@@ -101,6 +101,7 @@ impl Encoder for Apng {
 }
 
 /// What differs from the frame before; one pixel where nothing does, as every frame needs some.
+#[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
 fn pack(frame: &Frame<'_>) -> Result<Packet> {
     if frame.before.is_empty() {
         return Ok(Packet::Bytes(frame.indices.to_vec()));

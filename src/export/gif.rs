@@ -91,6 +91,7 @@ impl Encoder for Gif {
 }
 
 /// The frame as GIF compresses it: all of it, or the area that differs from the frame before.
+#[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
 fn pack(frame: &Frame<'_>) -> Result<Packet> {
     let width = frame.pixels.width as usize;
     let clear = clear(frame.palette);
