@@ -214,7 +214,9 @@ fn bundle(
     bundled.collapse.clone_from(&drawing.view.collapse);
     let nodes = mission.elements.nodes.iter().map(|n| n.name.as_str());
     let outermost: BTreeSet<&str> = nodes.filter_map(outermost).collect();
-    bundled.collapse.extend(outermost.into_iter().map(Arc::from));
+    bundled
+        .collapse
+        .extend(outermost.into_iter().map(Arc::from));
     let attempt = Attempt::new(mission, drawing, &bundled, page);
     let says_something = attempt.view.items.len() > 1;
     if says_something && attempt.text > best.text {
