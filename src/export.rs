@@ -38,7 +38,7 @@ use crate::base::error::{Error, Result};
 pub use encoder::Written;
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
-pub(crate) use encoder::{Encoder, Format, Frame, Needs, OneDrawing};
+pub(crate) use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Pack, Packet};
 use sequence::Sequence;
 use target::Target;
 pub(crate) use tex::needs_figure;

@@ -55,6 +55,9 @@ pub trait Watch {
     /// How far the stage is: `done` of `total`.
     fn progress(&mut self, _done: u64, _total: u64) {}
 
+    /// Where the time of the stage went: the words of its steps and their shares, the largest first.
+    fn shares(&mut self, _shares: &[(&'static str, f64)]) {}
+
     /// Whether to stop at the next good moment, leaving nothing half-written.
     fn stopped(&self) -> bool {
         false

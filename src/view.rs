@@ -116,6 +116,8 @@ pub enum ArrowKind {
     Subscribe,
     /// From a node to a node, over this topic (mode *nodes only*).
     Direct(Arc<str>),
+    /// From a box to a box, over all topics between them (mode *bundles*).
+    Bundle,
 }
 
 impl ArrowKind {
@@ -125,6 +127,7 @@ impl ArrowKind {
             Self::Publish => "publish",
             Self::Subscribe => "subscribe",
             Self::Direct(_) => "direct",
+            Self::Bundle => "bundle",
         }
     }
 }
@@ -140,6 +143,17 @@ pub struct Arrow {
     pub kind: ArrowKind,
     /// The edges it stands for, sorted.
     pub members: Vec<Element>,
+}
+
+impl Arrow {
+    /// What an arrow from node to node carries in a window: a topic, or how many; `None` for one from or to a topic.
+    pub fn carries(&self, shown: &Shown) -> Option<String> {
+        match &self.kind {
+            ArrowKind::Publish | ArrowKind::Subscribe => None,
+            ArrowKind::Direct(topic) => Some(topic.to_string()),
+            ArrowKind::Bundle => Some(words::count(shown.topics, "topic")),
+        }
+    }
 }
 
 /// What happened to an item or arrow in a window.
@@ -197,7 +211,9 @@ pub struct Shown {
     pub is_paused: bool,
     /// The headlines that `mark` tells, sorted: places in the ledger.
     pub entries: Vec<EntryId>,
-    /// What happened inside a folded namespace.
+    /// How many topics a bundle carries; 0 for all else.
+    pub topics: usize,
+    /// What happened inside a folded namespace or a bundle.
     pub inside: Option<Box<Counts>>,
     /// Messages in the window, if known.
     pub count: Option<u64>,
@@ -218,6 +234,7 @@ impl Shown {
             rates: None,
             is_paused: false,
             entries: Vec::new(),
+            topics: 0,
             inside: None,
             count: None,
             lifecycle: None,

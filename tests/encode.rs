@@ -123,7 +123,7 @@ fn run(
         strip: None,
         options,
     };
-    run::run(&sequence, outputs, progress)
+    run::run(&sequence, outputs, &run::Steps::default(), progress)
 }
 
 fn png(path: &Path) -> image::RgbImage {

@@ -245,8 +245,9 @@ pub(super) struct GraphArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "View")]
 pub(super) struct ViewArgs {
-    /// What to draw: nodes only, nodes and active topics, or all topics.
-    #[arg(long, value_name = "nodes|active|all", value_parser = ["nodes", "active", "all"])]
+    /// What to draw: nodes only, nodes with one arrow for all topics between two of them, nodes and active topics, or
+    /// all topics.
+    #[arg(long, value_name = "nodes|bundles|active|all", value_parser = ["nodes", "bundles", "active", "all"])]
     pub(super) mode: Option<String>,
     /// Names of nodes to draw, as in `rqt_graph`: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]

@@ -21,6 +21,8 @@ pub(crate) struct Terminal {
     bar: Option<ProgressBar>,
     stage: Option<(Stage, Instant)>,
     spent: BTreeMap<Stage, Duration>,
+    /// Where the time of a stage went, in words.
+    shares: BTreeMap<Stage, String>,
     begun: Instant,
     stop: Stop,
 }
@@ -35,6 +37,7 @@ impl Terminal {
             bar: None,
             stage: None,
             spent: BTreeMap::new(),
+            shares: BTreeMap::new(),
             begun: Instant::now(),
             stop: Stop::listen(last_words),
         }
@@ -127,13 +130,16 @@ impl Terminal {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// Prints how long each stage took.
+    /// Prints how long each stage took, and its largest steps.
     pub(crate) fn timings(&mut self) {
         self.end_stage();
         let lines: Vec<String> = self
             .spent
             .iter()
-            .map(|(stage, time)| format!("{:>9.3} s  {}", time.as_secs_f64(), stage.word()))
+            .map(|(stage, time)| {
+                let shares = self.shares.get(stage).map_or("", String::as_str);
+                format!("{:>9.3} s  {}{shares}", time.as_secs_f64(), stage.word())
+            })
             .collect();
         for line in &lines {
             self.say(line);
@@ -172,6 +178,20 @@ impl Watch for Terminal {
         if let Some(bar) = &self.bar {
             bar.set_length(total.max(done));
             bar.set_position(done);
+        }
+    }
+
+    fn shares(&mut self, shares: &[(&'static str, f64)]) {
+        let Some((stage, _)) = self.stage else {
+            return;
+        };
+        let shares = shares.iter().filter(|(_, share)| *share >= 0.005);
+        let words: Vec<String> = shares
+            .map(|(word, share)| format!("{word} {:.0} %", share * 100.0))
+            .collect();
+        if !words.is_empty() {
+            self.shares
+                .insert(stage, format!(" ({})", words.join(", ")));
         }
     }
 

@@ -179,7 +179,9 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
             ControlFlow::Continue(())
         }
     };
-    let written = run::run(&sequence, &job.outputs, &mut progress)?;
+    let steps = run::Steps::default();
+    let written = run::run(&sequence, &job.outputs, &steps, &mut progress)?;
+    watch.shares(&steps.shares());
     Ok(Rendered { mission, written })
 }
 

@@ -37,6 +37,9 @@ impl Keep {
             .zip(&viewed.topic)
             .map(|(id, item)| match options.mode {
                 Mode::Nodes => viewed.carriers.contains_key(&Element::Topic(id)),
+                Mode::Bundles => {
+                    item.is_some() || viewed.carriers.contains_key(&Element::Topic(id))
+                }
                 _ => item.is_some(),
             });
         let topics = numbered(topics);
