@@ -64,7 +64,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["judge"],
         &["baseline", "report"],
     ]),
-    ("pipeline", &[&["captions", "draw", "gate", "read"], &["figure"], &["export", "extract", "survey"]]),
+    ("pipeline", &[&["captions", "draw", "read"], &["figure", "gate"], &["export", "extract", "survey"]]),
     ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract", "gate"]]),
 ];
 
@@ -83,6 +83,8 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "evidence/source/qos",
             "evidence/topology",
             "export/html",
+            "gate/baseline",
+            "gate/report",
             "mission/events",
             "mission/info",
             "mission/json",

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use super::expectation::Place;
 use crate::base::digest;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::visible;
+use crate::base::yaml::Place;
 
 /// A kind of finding: its place in [`KINDS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -117,7 +117,7 @@ impl Judge<'_> {
             words::count(usize::try_from(count).unwrap_or(usize::MAX), "message"),
         );
         let mut finding = Finding::new(kind, name, at, says)
-            .saw(hz, format!("{range} Hz"))
+            .saw(hz, words::rate_range(range.from, range.to))
             .at(span)
             .detail(detail);
         let around = Span {
