@@ -2,6 +2,7 @@
 
 mod args;
 mod extract;
+mod gate;
 mod look;
 mod stop;
 pub(crate) mod terminal;
@@ -70,11 +71,17 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
     let mut terminal = Terminal::new(typed.quiet, no_colour);
+    let mut failed = FAILED;
     let outcome = match typed.command {
         Command::Render(args) => render(&args, &mut terminal),
         Command::Info(args) => info(&args, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
         Command::Events(args) => log(&args, &mut terminal),
+        Command::Baseline(args) => gate::baseline(&args, &mut terminal),
+        Command::Check(args) => {
+            failed = USAGE;
+            gate::check(&args, &mut terminal)
+        }
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
             let mut text = Vec::new();
@@ -102,7 +109,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         match (error, terminal.stopped_by()) {
             (Error::Interrupted, Some(code)) => code,
             (error, _) if error.is_usage() => USAGE,
-            _ => FAILED,
+            _ => failed,
         }
     })
 }

@@ -36,6 +36,7 @@
 //! | `layout` | the union of a view | places for everything, once, so that nothing moves |
 //! | `draw` | a view with places | scenes, and the painters that turn a scene into SVG, PDF or pixels |
 //! | `export` | scenes and missions | files |
+//! | `gate` | missions and expectations | what differs, and whether that is allowed |
 //! | `pipeline` | what was asked for | the whole program in the order it happens |
 //! | `cli` | the command line | a job for the pipeline |
 //!
@@ -72,6 +73,8 @@ mod layout;
 mod draw;
 
 mod export;
+
+mod gate;
 
 mod pipeline;
 

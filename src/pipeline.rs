@@ -5,6 +5,7 @@ mod draw;
 mod export;
 mod extract;
 mod figure;
+pub(crate) mod gate;
 mod read;
 mod survey;
 

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// The stations, lowest first: each uses only itself and those before it. These are all the doors below `src`.
 const STATIONS: &[&str] = &[
-    "base", "bag", "evidence", "graph", "mission", "view", "layout", "draw", "export", "pipeline",
-    "cli",
+    "base", "bag", "evidence", "graph", "mission", "view", "layout", "draw", "export", "gate",
+    "pipeline", "cli",
 ];
 
 /// What stands directly inside a station, floor by floor, lowest first: a file uses only files of lower floors, so
@@ -56,8 +56,16 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["animated_svg", "apng", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
         &["report", "run", "tables"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
-    ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract"]]),
+    ("gate", &[
+        &["pattern", "range"],
+        &["finding"],
+        &["expectation"],
+        &["facts"],
+        &["judge"],
+        &["baseline", "report"],
+    ]),
+    ("pipeline", &[&["captions", "draw", "read"], &["figure", "gate"], &["export", "extract", "survey"]]),
+    ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract", "gate"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
@@ -75,6 +83,8 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "evidence/source/qos",
             "evidence/topology",
             "export/html",
+            "gate/baseline",
+            "gate/report",
             "mission/events",
             "mission/info",
             "mission/json",

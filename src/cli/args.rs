@@ -1,5 +1,7 @@
 //! What can be typed: every command and flag with its help text.
 
+pub(super) mod gate;
+
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -36,6 +38,12 @@ pub(super) enum Command {
     Extract(Box<ExtractArgs>),
     /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
+    /// Write down what healthy runs have in common, as an expectation to edit and to keep.
+    #[command(after_help = gate::BASELINE_HELP)]
+    Baseline(Box<gate::BaselineArgs>),
+    /// Hold a mission against an expectation: what is missing, new, late, slow, or not as it was.
+    #[command(after_help = gate::check_help())]
+    Check(Box<gate::CheckArgs>),
     /// List the built-in styles, or print one to start your own from.
     Styles {
         /// The style to print as TOML.

@@ -119,7 +119,7 @@ fn mark(shown: &Shown) -> Option<&'static str> {
 }
 
 /// A name inside quotes: Mermaid's own entities for all that could end the text or begin markup.
-fn escaped(name: &str) -> String {
+pub(crate) fn escaped(name: &str) -> String {
     let mut out = String::new();
     for c in name.chars() {
         if c.is_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | ' ' | ':') {

@@ -1,7 +1,7 @@
 //! A report in Markdown for a pull request or a job summary: what changed, when, drawn and in tables.
 
 pub(crate) mod encoder;
-mod escape;
+pub(crate) mod escape;
 mod graph;
 mod tables;
 
