@@ -1,6 +1,5 @@
 //! Where the labels of arrows stand: on their arrow or beside it, over no box, no title, no tip and no other label.
 
-use super::place::{Placed, distance, length};
 use crate::base::geometry::{Point, Rect, Size};
 
 /// So many places along an arrow are tried on both sides of its middle, so far apart in its length.
@@ -13,123 +12,127 @@ const OFF_MIDDLE: f64 = 1.25;
 const NEAR: f64 = 0.4;
 
 /// What labels are placed among.
-struct Room<'a> {
-    labels: &'a [Vec<Size>],
-    width: f64,
-    /// Boxes, titles and tips.
-    fixed: Vec<Rect>,
-    /// The label of each arrow, where it stands.
-    set: Vec<Option<Rect>>,
+pub(crate) struct Room<'a> {
+    /// The arrows as chains of short straight pieces.
+    pub(crate) routes: &'a [Vec<Point>],
+    /// Per arrow what may be written on it, the best first.
+    pub(crate) labels: &'a [Vec<Size>],
+    /// The width of the page.
+    pub(crate) width: f64,
+    /// What no label may cover.
+    pub(crate) fixed: Vec<Rect>,
 }
 
 /// A label that has a place: its middle, and which of its alternatives it is.
-type Spot = (Point, usize);
+pub(crate) type Spot = (Point, usize);
 
-/// Places the labels of a drawing, those of short arrows first; one that finds no room may push another one aside.
-pub(crate) fn set(placed: &mut Placed, labels: &[Vec<Size>], titles: Vec<Rect>, width: f64) {
-    let mut fixed: Vec<Rect> = placed.boxes.iter().map(|b| b.grown(0.25)).collect();
-    fixed.extend(titles);
-    let tips = placed.routes.iter().filter_map(|r| r.last());
-    fixed.extend(tips.map(|p| Rect::around(*p, Size::new(1.0, 1.0))));
-    let mut room = Room {
-        labels,
-        width,
-        fixed,
-        set: vec![None; labels.len()],
-    };
-    let mut order: Vec<usize> = (0..labels.len()).filter(|at| !labels[*at].is_empty()).collect();
-    let long = |at: &usize| length(&placed.routes[*at]);
+/// The labels of a drawing in the making.
+struct Labels<'a> {
+    room: &'a Room<'a>,
+    spots: Vec<Option<Spot>>,
+}
+
+/// A place for each label that finds one, those of short arrows first; one that finds none may push another one aside.
+pub(crate) fn set(room: &Room<'_>) -> Vec<Option<Spot>> {
+    let mut order: Vec<usize> = (0..room.labels.len()).collect();
+    order.retain(|at| !room.labels[*at].is_empty());
+    let long = |at: &usize| length(&room.routes[*at]);
     order.sort_by(|a, b| long(a).total_cmp(&long(b)).then(a.cmp(b)));
-    let mut spots: Vec<Option<Spot>> = vec![None; labels.len()];
-    for at in &order {
-        spots[*at] = room.best(&placed.routes, *at);
-        room.set[*at] = spots[*at].map(|s| room.rect(*at, s));
-    }
-    for at in order.iter().filter(|at| room.set[**at].is_none()).copied().collect::<Vec<_>>() {
-        room.push_aside(&placed.routes, at, &mut spots);
-    }
-    for rect in room.set.iter().flatten() {
-        placed.size.w = placed.size.w.max(rect.right());
-        placed.size.h = placed.size.h.max(rect.bottom());
-    }
-    let unclear = |at: &&usize| {
-        let spot = spots[**at].map(|s| room.rect(**at, s));
-        let own = placed.routes.iter().enumerate().filter(|(other, _)| *other != **at);
-        spot.is_some_and(|rect| own.clone().any(|(_, r)| crosses(r, &rect.grown(NEAR))))
+    let mut labels = Labels {
+        room,
+        spots: vec![None; room.labels.len()],
     };
-    placed.unclear = order.iter().filter(unclear).count();
-    placed.left_out = order.iter().filter(|at| spots[**at].is_none()).count();
-    placed.labels = spots;
+    for at in &order {
+        labels.spots[*at] = labels.best(*at);
+    }
+    order.retain(|at| labels.spots[*at].is_none());
+    for at in order {
+        labels.push_aside(at);
+    }
+    labels.spots
 }
 
 impl Room<'_> {
-    fn rect(&self, at: usize, (middle, which): Spot) -> Rect {
+    /// Where a label stands.
+    pub(crate) fn rect(&self, at: usize, (middle, which): Spot) -> Rect {
         Rect::around(middle, self.labels[at][which])
     }
 
-    /// The best free place of a label, of its first alternative that has any.
-    fn best(&self, routes: &[Vec<Point>], at: usize) -> Option<Spot> {
-        let free = |which: usize| {
-            let spots = self.spots(routes, at, which).into_iter();
-            let free = spots.filter(|(_, s)| self.hit(at, (*s, which)).next().is_none());
-            let best = free.min_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some((best.1, which))
-        };
-        (0..self.labels[at].len()).find_map(free)
+    /// Whether a label stands on or near an arrow that is not its own.
+    pub(crate) fn is_unclear(&self, at: usize, spot: Spot) -> bool {
+        self.crossed(at, &self.rect(at, spot).grown(NEAR)) > 0
     }
 
-    /// The labels that one at this place would cover.
-    fn hit(&self, at: usize, spot: Spot) -> impl Iterator<Item = usize> + '_ {
-        let rect = self.rect(at, spot).grown(0.1);
-        let set = self.set.iter().enumerate();
-        set.filter_map(move |(other, set)| {
-            let hits = other != at && set.is_some_and(|s| s.overlaps(&rect));
-            hits.then_some(other)
-        })
+    /// How many other arrows run through a rectangle.
+    fn crossed(&self, at: usize, rect: &Rect) -> usize {
+        let others = self.routes.iter().enumerate().filter(|(o, _)| *o != at);
+        others.filter(|(_, route)| crosses(route, rect)).count()
     }
 
     /// Every place along an arrow where a label covers nothing that is fixed, with its cost.
-    fn spots(&self, routes: &[Vec<Point>], at: usize, which: usize) -> Vec<(f64, Point)> {
+    fn spots(&self, at: usize, which: usize) -> Vec<(f64, Spot)> {
         let size = self.labels[at][which];
         let mut all = Vec::new();
         for (off, part) in stations() {
-            let Some((on, normal)) = along(&routes[at], part) else {
+            let Some((on, normal)) = along(&self.routes[at], part) else {
                 continue;
             };
             let reach = f64::midpoint(normal.x.abs() * size.w, normal.y.abs() * size.h) + 0.35;
-            for (aside, penalty) in [(0.0, 0.0), (reach, ASIDE), (-reach, ASIDE)] {
+            for (aside, penalty, near) in
+                [(0.0, 0.0, 0.0), (reach, ASIDE, NEAR), (-reach, ASIDE, NEAR)]
+            {
                 let middle = Point::new(on.x + normal.x * aside, on.y + normal.y * aside);
                 let rect = Rect::around(middle, size);
                 let outside = rect.x < 0.0 || rect.y < 0.0 || rect.right() > self.width;
                 if outside || self.fixed.iter().any(|f| f.overlaps(&rect)) {
                     continue;
                 }
-                let near = rect.grown(if aside.abs() > 0.0 { NEAR } else { 0.0 });
-                let others = routes.iter().enumerate().filter(|(other, _)| *other != at);
-                let crossed = others.filter(|(_, r)| crosses(r, &near)).count();
-                all.push((crossed as f64 * ON_ARROW + penalty + off * OFF_MIDDLE, middle));
+                let crossed = self.crossed(at, &rect.grown(near)) as f64;
+                let cost = crossed * ON_ARROW + penalty + off * OFF_MIDDLE;
+                all.push((cost, (middle, which)));
             }
         }
         all
     }
+}
+
+impl Labels<'_> {
+    /// The best free place of a label, of its first alternative that has any.
+    fn best(&self, at: usize) -> Option<Spot> {
+        let free = |which: usize| {
+            let spots = self.room.spots(at, which).into_iter();
+            let free = spots.filter(|(_, spot)| self.hit(at, *spot).next().is_none());
+            free.min_by(|a, b| a.0.total_cmp(&b.0))
+                .map(|(_, spot)| spot)
+        };
+        (0..self.room.labels[at].len()).find_map(free)
+    }
+
+    /// The labels that one at this place would cover.
+    fn hit(&self, at: usize, spot: Spot) -> impl Iterator<Item = usize> + '_ {
+        let rect = self.room.rect(at, spot).grown(0.1);
+        let others = self.spots.iter().enumerate().filter(move |(o, _)| *o != at);
+        others.filter_map(move |(other, spot)| {
+            let hits = self.room.rect(other, (*spot)?).overlaps(&rect);
+            hits.then_some(other)
+        })
+    }
 
     /// Puts a label where one other stands that has room elsewhere.
-    fn push_aside(&mut self, routes: &[Vec<Point>], at: usize, spots: &mut [Option<Spot>]) {
-        for which in 0..self.labels[at].len() {
-            let mut all = self.spots(routes, at, which);
+    fn push_aside(&mut self, at: usize) {
+        for which in 0..self.room.labels[at].len() {
+            let mut all = self.room.spots(at, which);
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
-            for (_, middle) in all {
-                let hit: Vec<usize> = self.hit(at, (middle, which)).collect();
+            for (_, spot) in all {
+                let hit: Vec<usize> = self.hit(at, spot).collect();
                 let [other] = hit[..] else { continue };
-                let before = self.set[other];
-                self.set[at] = Some(self.rect(at, (middle, which)));
-                self.set[other] = None;
-                if let Some(moved) = self.best(routes, other) {
-                    self.set[other] = Some(self.rect(other, moved));
-                    (spots[at], spots[other]) = (Some((middle, which)), Some(moved));
+                let before = self.spots[other].take();
+                self.spots[at] = Some(spot);
+                self.spots[other] = self.best(other);
+                if self.spots[other].is_some() {
                     return;
                 }
-                (self.set[at], self.set[other]) = (None, before);
+                (self.spots[at], self.spots[other]) = (None, before);
             }
         }
     }
@@ -171,4 +174,12 @@ fn crosses(points: &[Point], rect: &Rect) -> bool {
         );
         touched.overlaps(rect)
     })
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    libm::hypot(a.x - b.x, a.y - b.y)
+}
+
+fn length(points: &[Point]) -> f64 {
+    points.windows(2).map(|w| distance(w[0], w[1])).sum()
 }

@@ -40,12 +40,16 @@ impl Look {
 
     /// The room it takes.
     pub(crate) fn size(&self, canvas: &Canvas<'_>) -> Size {
-        let names = self.lines.iter().map(|l| canvas.width(l, type_of(self.fate)));
+        let names = self
+            .lines
+            .iter()
+            .map(|l| canvas.width(l, type_of(self.fate)));
         let widest = names.fold(0.0, f64::max);
         let space = canvas.width(&self.space, Type::Small);
-        let (wide, rows) = match self.has_head() {
-            true => (widest.max(space), self.lines.len() + 1),
-            false => (widest + space, self.lines.len()),
+        let (wide, rows) = if self.has_head() {
+            (widest.max(space), self.lines.len() + 1)
+        } else {
+            (widest + space, self.lines.len())
         };
         Size::new(wide + 2.0, canvas.sizes.line() * rows as f64 + 0.9)
     }
@@ -140,9 +144,10 @@ fn boxed(canvas: &mut Canvas<'_>, look: &Look, rect: Rect) {
     let line = canvas.sizes.line();
     let y = |k: usize| rect.y + 0.45 + line * (k as f64 + 0.5);
     canvas.text(rect.x + 1.0, y(0), Type::Small, ink::QUIET, &look.space);
-    let (below, aside) = match look.has_head() {
-        true => (1, 0.0),
-        false => (0, canvas.width(&look.space, Type::Small)),
+    let (below, aside) = if look.has_head() {
+        (1, 0.0)
+    } else {
+        (0, canvas.width(&look.space, Type::Small))
     };
     for (k, text) in look.lines.iter().enumerate() {
         let x = rect.x + 1.0 + aside;

@@ -1,7 +1,7 @@
 //! Boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed afterwards.
 
 use super::canvas::{Canvas, Type, ink};
-use super::labels;
+use super::labels::{self, Room, Spot};
 use super::parts::{PARTED, Part, parts, shelves};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Step, Stroke};
@@ -28,7 +28,7 @@ pub(crate) struct Placed {
     pub(crate) routes: Vec<Vec<Point>>,
     curves: Vec<Route>,
     /// The middle of each label that found room, and which of its alternatives did.
-    pub(crate) labels: Vec<Option<(Point, usize)>>,
+    pub(crate) labels: Vec<Option<Spot>>,
     pub(crate) left_out: usize,
     /// How many labels stand on or near an arrow that is not theirs.
     pub(crate) unclear: usize,
@@ -283,8 +283,32 @@ impl Placed {
                 )
             })
             .collect();
-        labels::set(&mut placed, labels, titles, width);
+        placed.set_labels(labels, titles, width);
         placed
+    }
+
+    fn set_labels(&mut self, labels: &[Vec<Size>], titles: Vec<Rect>, width: f64) {
+        let mut fixed: Vec<Rect> = self.boxes.iter().map(|b| b.grown(0.25)).collect();
+        fixed.extend(titles);
+        let tips = self.routes.iter().filter_map(|r| r.last());
+        fixed.extend(tips.map(|p| Rect::around(*p, Size::new(1.0, 1.0))));
+        let room = Room {
+            routes: &self.routes,
+            labels,
+            width,
+            fixed,
+        };
+        self.labels = labels::set(&room);
+        for (at, spot) in self.labels.iter().enumerate() {
+            let Some(spot) = spot else {
+                self.left_out += usize::from(!labels[at].is_empty());
+                continue;
+            };
+            let rect = room.rect(at, *spot);
+            self.size.w = self.size.w.max(rect.right());
+            self.size.h = self.size.h.max(rect.bottom());
+            self.unclear += usize::from(room.is_unclear(at, *spot));
+        }
     }
 
     /// The drawing moved by `dx`, `dy`.
@@ -382,10 +406,6 @@ fn sampled(route: &Route) -> Vec<Point> {
     points
 }
 
-pub(crate) fn distance(a: Point, b: Point) -> f64 {
+fn distance(a: Point, b: Point) -> f64 {
     libm::hypot(a.x - b.x, a.y - b.y)
-}
-
-pub(crate) fn length(points: &[Point]) -> f64 {
-    points.windows(2).map(|w| distance(w[0], w[1])).sum()
 }
