@@ -217,6 +217,38 @@ fn a_figure_for_latex_says_what_it_shows_and_is_compiled_where_latex_is_at_hand(
     }
 }
 
+/// The page of the examples: its script makes the figures and sets it.
+#[test]
+fn the_paper_of_the_examples_is_made_by_its_script() {
+    let latex = Command::new("pdflatex").arg("--version").output();
+    if !latex.is_ok_and(|done| done.status.success()) {
+        return println!("skipped: `pdflatex` is not installed");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let paper = folder.path().join("paper");
+    std::fs::create_dir(&paper).unwrap();
+    std::fs::copy(example(), folder.path().join("warehouse.bag")).unwrap();
+    for name in ["make.sh", "paper.tex", "phases.txt"] {
+        std::fs::copy(examples.join("paper").join(name), paper.join(name)).unwrap();
+    }
+    let made = Command::new("sh")
+        .arg(paper.join("make.sh"))
+        .env("BAGREEL", env!("CARGO_BIN_EXE_bagreel"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&made.stdout);
+    assert!(made.status.success(), "{said}");
+    let log =
+        String::from_utf8_lossy(&std::fs::read(paper.join("paper.log")).unwrap()).into_owned();
+    for fault in ["Overfull \\hbox", "undefined", "too large for page"] {
+        assert!(!log.contains(fault), "{fault}: {log}");
+    }
+    for name in ["lives", "map", "steps"] {
+        assert!(log.contains(&format!("<{name}.pdf")), "{name}: {log}");
+    }
+}
+
 /// Font sizes in points.
 fn sizes_pt(svg: &str) -> Vec<f64> {
     let all = svg.split("font-size=\"").skip(1);
