@@ -94,3 +94,18 @@ fn the_evidence_of_an_edge_includes_what_was_concluded() {
     assert!(why(["/robot1/amcl", "/tf"]).contains(&"connection"));
     assert!(why(["/robot1/amcl", "/tf"]).contains(&"tf_pair"));
 }
+
+#[test]
+fn the_figure_that_fits_is_named() {
+    let words = |inputs| -> Vec<&str> { told(inputs).figures.iter().map(|f| f.figure).collect() };
+    assert_eq!(words(example("warehouse.bag")), ["lives", "map", "steps"]);
+    // One log record and one scan: nobody is known to talk to anybody.
+    let (_folder, inputs) = recorded();
+    let info = told(inputs);
+    assert_eq!(info.figures.len(), 1);
+    assert!(
+        info.figures[0].shows.contains("no publisher is known"),
+        "{:?}",
+        info.figures
+    );
+}

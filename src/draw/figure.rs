@@ -7,6 +7,7 @@ pub(crate) mod band;
 pub(crate) mod canvas;
 mod groups;
 pub(crate) mod incidents;
+mod labels;
 mod legend;
 pub(crate) mod levels;
 pub(crate) mod lives;
