@@ -210,7 +210,7 @@ fn candidates(colours: &[Rgb], cell: usize) -> Vec<u8> {
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Area {
+pub struct Area {
     /// Columns from the left.
     pub x: usize,
     /// Rows from the top.

@@ -6,7 +6,7 @@ mod tiles;
 use std::collections::HashMap;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use resvg::tiny_skia::{PixmapMut, Transform};
+use tiny_skia::{PixmapMut, Transform};
 use resvg::usvg::{self, Tree, fontdb};
 
 pub use self::canvas::Canvas;
