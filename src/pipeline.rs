@@ -12,6 +12,7 @@ pub use draw::Drawing;
 pub use export::{Render, Rendered, check, render, show};
 pub use extract::{Extract, Extracted, extract};
 pub use figure::Phases;
+pub(crate) use read::mission_file;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};
 

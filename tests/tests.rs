@@ -19,6 +19,7 @@ mod figures;
 mod hostile;
 mod info;
 mod layout;
+mod options;
 mod pages;
 mod phases;
 mod properties;
