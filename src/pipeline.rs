@@ -16,6 +16,7 @@ pub use export::{Render, Rendered};
 pub(crate) use export::{check, show};
 pub use extract::{Extract, Extracted, extract};
 pub use figure::Phases;
+pub(crate) use read::mission_file;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};
 
