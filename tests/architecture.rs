@@ -65,7 +65,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["baseline", "report"],
     ]),
     ("pipeline", &[&["captions", "draw", "read"], &["figure", "gate"], &["export", "extract", "survey"]]),
-    ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract", "gate"]]),
+    ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract", "gate"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
