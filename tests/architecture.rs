@@ -57,7 +57,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["report", "run", "tables"],
     ]),
     ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
-    ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract"]]),
+    ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
