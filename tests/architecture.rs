@@ -46,7 +46,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["caption", "hidden", "marks", "state"],
         &["filtered", "frames"],
     ]),
-    ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
+    ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
     ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],
