@@ -43,7 +43,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options"],
         &["group", "select"],
         &["items"],
-        &["caption", "hidden", "marks", "state"],
+        &["caption", "hidden", "marks", "nothing", "state"],
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
