@@ -13,6 +13,7 @@ mod items;
 mod lives;
 mod marks;
 mod names;
+mod nothing;
 mod options;
 mod roles;
 pub mod runs;
@@ -34,6 +35,7 @@ use crate::mission::ledger::{EntryId, Kind};
 pub use collapse::Candidate;
 pub use filter::NameFilter;
 pub use filtered::filtered;
+pub use nothing::nothing;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 
 /// What the picture shows of a mission, and a notice for everything that it leaves out.

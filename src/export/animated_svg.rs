@@ -200,9 +200,9 @@ impl Play<'_> {
         let whole = last.span.end.since(first.span.start) / 1_000_000_000 * 1_000_000_000;
         let _ = writeln!(
             out,
-            "</text><text class=\"u\" x=\"16\" y=\"45\">{} windows of {} · {}</text>",
-            self.windows,
-            words::period(first.span.nanos()),
+            "</text><text class=\"u\" x=\"16\" y=\"45\">{} of {} · {}</text>",
+            words::count(self.windows, "window"),
+            words::duration(first.span.nanos()),
             words::offset(whole)
         );
         let told = self
