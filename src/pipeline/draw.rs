@@ -215,7 +215,9 @@ fn bundle(
     bundled.collapse.clone_from(&drawing.view.collapse);
     let nodes = mission.elements.nodes.iter().map(|n| n.name.as_str());
     let outermost: BTreeSet<&str> = nodes.filter_map(outermost).collect();
-    bundled.collapse.extend(outermost.into_iter().map(Arc::from));
+    bundled
+        .collapse
+        .extend(outermost.into_iter().map(Arc::from));
     let boxes = outline(mission, &bundled);
     // Few boxes with many arrows among them stand best around the page.
     let drawing = if boxes.items.len() <= RING && boxes.namespaces.is_empty() {

@@ -207,7 +207,7 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     }
     let size = sequence.picture.scene(0, 1.0).size;
     let pixels = size.w * size.h * sequence.options.scale * sequence.options.scale / 1e6;
-    let cores = rayon::current_num_threads() as f64;
+    let cores = run::cores() as f64;
     let ms = frames as f64 * (FRAME_MS.0 + FRAME_MS.1 * pixels) / cores;
     #[expect(clippy::cast_possible_truncation, reason = "a rough number of seconds")]
     let about = words::duration((ms / 1000.0).ceil() as i64 * 1_000_000_000);

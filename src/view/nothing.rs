@@ -85,10 +85,7 @@ mod tests {
             hint("/robt1/.*"),
             "the nearest namespace is `/robot1`: `/robot1/.*` is all of it"
         );
-        assert_eq!(
-            hint("/robot1/aml"),
-            "the nearest name is `/robot1/amcl`"
-        );
+        assert_eq!(hint("/robot1/aml"), "the nearest name is `/robot1/amcl`");
         assert_eq!(
             hint("/somewhere/else"),
             "there are /robot1/amcl, /robot1/nav/planner"

@@ -6,8 +6,8 @@ mod tiles;
 use std::collections::HashMap;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use resvg::tiny_skia::{PixmapMut, Transform};
 use resvg::usvg::{self, Tree, fontdb};
+use tiny_skia::{PixmapMut, Transform};
 
 pub use self::canvas::Canvas;
 use self::tiles::Tiles;

@@ -98,7 +98,7 @@ fn groups_drawn_apart_equal_the_whole_document() {
     let scene = page((0..12).map(|i| element(i, i)).collect());
     let painter = painter();
     let whole = Tree::from_str(&svg::write(&scene), &painter.options).unwrap();
-    let mut map = resvg::tiny_skia::Pixmap::new(200, 120).unwrap();
+    let mut map = tiny_skia::Pixmap::new(200, 120).unwrap();
     resvg::render(&whole, Transform::identity(), &mut map.as_mut());
     assert_eq!(painter.paint(&scene, 1.0).unwrap().rgba, map.take());
 }
