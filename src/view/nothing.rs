@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(hint("/robot1/aml"), "the nearest name is `/robot1/amcl`");
         assert_eq!(
             hint("/somewhere/else"),
-            "there are /robot1/amcl, /robot1/nav/planner"
+            "there are /robot1/amcl and /robot1/nav/planner"
         );
     }
 }

@@ -75,6 +75,7 @@ impl Boxes<'_> {
         let mut title = Group {
             id: format!("{}..title", space.id),
             class: "namespace-title".to_owned(),
+            data: space.data.clone(),
             fade: space.fade,
             ..Group::default()
         };
