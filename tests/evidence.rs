@@ -11,11 +11,14 @@ use bagreel::internals::graph::{self, Built};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// A file of the shared data, or a line that says why the test is skipped.
+/// A file of the project or of the shared data, or a line that says why the test is skipped.
 fn shared(file: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(file);
+    let below = match file {
+        "warehouse/warehouse.bag" => "examples/warehouse.bag",
+        "warehouse/truth_windows.json" => "tests/data/warehouse.truth.json",
+        _ => &format!("../shared/data/{file}"),
+    };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(below);
     if path.exists() {
         return Some(path);
     }

@@ -3,6 +3,10 @@
 //! Its own way through a graph takes exponential time on some and routes edges through boxes; its placement does not.
 //! Like `layered.rs`, it is a line through its siblings. It knows no clusters: their frames stay empty.
 
+use std::cell::Cell;
+use std::panic::{self, UnwindSafe};
+use std::sync::Once;
+
 use ::layout::core::base::Orientation as Direction;
 use ::layout::core::geometry::{Point as TheirPoint, Position};
 use ::layout::core::style::StyleAttr;
@@ -41,9 +45,31 @@ impl Engine for LayoutRs {
         }
         let orientation = options.orientation.unwrap_or(Orientation::LeftRight);
         // It states what it expects with `assert!`.
-        let attempt = std::panic::catch_unwind(|| lay_out(plan, options, orientation));
+        let attempt = unheard(|| lay_out(plan, options, orientation));
         attempt.unwrap_or_else(|_| Err(Error::usage("layout-rs gave up on this graph", hint)))
     }
+}
+
+thread_local! {
+    /// Whether a panic of this thread is nobody's business but ours.
+    static IS_EXPECTED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What `work` gives, or its panic, of which nothing is printed.
+fn unheard<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
+    static QUIET: Once = Once::new();
+    QUIET.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |told| {
+            if !IS_EXPECTED.get() {
+                before(told);
+            }
+        }));
+    });
+    IS_EXPECTED.set(true);
+    let outcome = panic::catch_unwind(work);
+    IS_EXPECTED.set(false);
+    outcome
 }
 
 fn lay_out(plan: &Plan, options: &Options, orientation: Orientation) -> Result<Layout> {
@@ -188,4 +214,26 @@ fn column(row: &[usize], layers: &Layers, room: &Spacing, places: &[(f64, f64)])
         .filter(|&&item| layers.kind[item] == Kind::Vertex);
     let half = vertices.map(|&v| room.size[v].w / 2.0).fold(0.0, f64::max);
     (middle - half, middle + half)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    thread_local! {
+        static HEARD: Cell<u32> = const { Cell::new(0) };
+    }
+
+    #[test]
+    fn a_panic_inside_is_not_heard_and_any_other_is() {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |told| {
+            HEARD.set(HEARD.get() + 1);
+            before(told);
+        }));
+        assert!(unheard(|| panic!("expected")).is_err());
+        assert_eq!(HEARD.get(), 0);
+        assert!(panic::catch_unwind(|| panic!("the test's own")).is_err());
+        assert_eq!(HEARD.get(), 1);
+    }
 }
