@@ -3,9 +3,10 @@
 mod applies;
 mod args;
 mod extract;
+mod gate;
 mod look;
 mod stop;
-pub mod terminal;
+pub(crate) mod terminal;
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write as _;
@@ -72,11 +73,17 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
     let mut terminal = Terminal::new(typed.quiet, no_colour);
+    let mut failed = FAILED;
     let outcome = match typed.command {
         Command::Render(args) => render(&args, &given, &mut terminal),
         Command::Info(args) => info(&args, &given, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
         Command::Events(args) => log(&args, &given, &mut terminal),
+        Command::Baseline(args) => gate::baseline(&args, &mut terminal),
+        Command::Check(args) => {
+            failed = USAGE;
+            gate::check(&args, &mut terminal)
+        }
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
             let mut text = Vec::new();
@@ -104,7 +111,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         match (error, terminal.stopped_by()) {
             (Error::Interrupted, Some(code)) => code,
             (error, _) if error.is_usage() => USAGE,
-            _ => FAILED,
+            _ => failed,
         }
     })
 }

@@ -16,6 +16,7 @@ mod edges;
 mod encode;
 mod evidence;
 mod figures;
+mod gate;
 mod hostile;
 mod info;
 mod layout;

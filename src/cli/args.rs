@@ -1,5 +1,7 @@
 //! What can be typed: every command and flag with its help text.
 
+pub(super) mod gate;
+
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -37,6 +39,12 @@ pub(super) enum Command {
     Extract(Box<ExtractArgs>),
     /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
+    /// Write down what healthy runs have in common, as an expectation to edit and to keep.
+    #[command(after_help = gate::BASELINE_HELP)]
+    Baseline(Box<gate::BaselineArgs>),
+    /// Hold a mission against an expectation: what is missing, new, late, slow, or not as it was.
+    #[command(after_help = gate::check_help())]
+    Check(Box<gate::CheckArgs>),
     /// List the built-in styles, or print one to start your own from.
     Styles {
         /// The style to print as TOML.
@@ -272,8 +280,9 @@ pub(super) struct SizeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "View")]
 pub(super) struct ViewArgs {
-    /// What to draw: nodes only, nodes and active topics, or all topics.
-    #[arg(long, value_name = "nodes|active|all", value_parser = ["nodes", "active", "all"])]
+    /// What to draw: nodes only, nodes with one arrow for all topics between two of them, nodes and active topics, or
+    /// all topics.
+    #[arg(long, value_name = "nodes|bundles|active|all", value_parser = ["nodes", "bundles", "active", "all"])]
     pub(super) mode: Option<String>,
     /// Names of nodes to draw, as in `rqt_graph`: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]

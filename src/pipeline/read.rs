@@ -23,6 +23,7 @@ use crate::mission::{Mission, Window, read_json};
 
 /// What to read and how.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Reading {
     /// Bags of one mission, or one evolution.
     pub inputs: Vec<Input>,
@@ -54,6 +55,17 @@ impl Default for Reading {
             graph: graph::Options::default(),
             code: None,
             rate_change: RATE_CHANGE,
+        }
+    }
+}
+
+impl Reading {
+    /// Bags of one mission by their paths, or one mission's own JSON, with every option as the command line has it.
+    pub fn of<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
+        let inputs = paths.into_iter().map(|path| Input::Path(path.into()));
+        Self {
+            inputs: inputs.collect(),
+            ..Self::default()
         }
     }
 }

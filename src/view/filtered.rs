@@ -10,7 +10,7 @@ use crate::mission::{Activity, EntryId, Ledger, Mission, Window};
 
 /// The evolution without what the view leaves out. Topics in groups and what is inside collapsed namespaces are seen,
 /// so they stay, under their own names; so do changes, as they were found in the whole graph.
-pub fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
+pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let viewed = Viewed::new(&mission.elements, options);
     let mut keep = Keep::new(&mission.elements, options, &viewed);
     let ledger = keep.ledger(&mission.ledger);
@@ -42,6 +42,9 @@ impl Keep {
             .zip(&viewed.topic)
             .map(|(id, item)| match options.mode {
                 Mode::Nodes => viewed.carriers.contains_key(&Element::Topic(id)),
+                Mode::Bundles => {
+                    item.is_some() || viewed.carriers.contains_key(&Element::Topic(id))
+                }
                 _ => item.is_some(),
             });
         let topics = numbered(topics);
