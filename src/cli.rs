@@ -75,6 +75,10 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Info(args) => info(&args, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
         Command::Events(args) => log(&args, &mut terminal),
+        Command::Diff(args) => {
+            failed = USAGE;
+            gate::diff(&args, &mut terminal)
+        }
         Command::Baseline(args) => gate::baseline(&args, &mut terminal),
         Command::Check(args) => {
             failed = USAGE;

@@ -62,9 +62,9 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["expectation"],
         &["facts"],
         &["judge"],
-        &["baseline", "report"],
+        &["baseline", "difference", "report"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["figure", "gate"], &["export", "extract", "survey"]]),
+    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"], &["gate"]]),
     ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract", "gate"]]),
 ];
 
@@ -84,6 +84,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "evidence/topology",
             "export/html",
             "gate/baseline",
+            "gate/difference",
             "gate/report",
             "mission/events",
             "mission/info",

@@ -5,10 +5,37 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{GraphArgs, Inputs, length, moment};
+use super::{GraphArgs, Inputs, length, moment, size};
 use crate::base::time::Moment;
 use crate::gate;
 use crate::graph::window::Length;
+
+#[derive(Debug, Args)]
+pub(crate) struct DiffArgs {
+    /// A bag, a folder, a mission in JSON, or an expectation (`.yaml`), which the other is held against.
+    #[arg(value_name = "A")]
+    pub(crate) first: PathBuf,
+    /// The other.
+    #[arg(value_name = "B")]
+    pub(crate) second: PathBuf,
+    /// How to print what differs.
+    #[arg(long, value_name = "text|json|markdown", default_value = "text", value_parser = diff_format)]
+    pub(crate) format: &'static gate::DiffFormat,
+    /// A file to write too: `.txt`, `.json`, `.md`, or one picture of both: `.html`, `.svg`, `.gif` and all that `render`
+    /// draws. May be given many times.
+    #[arg(long = "output", short, value_name = "FILE")]
+    pub(crate) outputs: Vec<OsString>,
+    /// The style of pictures: built in, or a style file. See `bagreel styles`.
+    #[arg(long, default_value = "light", value_name = "NAME|FILE")]
+    pub(crate) style: String,
+    /// The size of pictures in pixels.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<(u32, u32)>,
+    #[command(flatten)]
+    pub(crate) time: GateTime,
+    #[command(flatten)]
+    pub(crate) graph: GraphArgs,
+}
 
 #[derive(Debug, Args)]
 pub(crate) struct BaselineArgs {
@@ -78,7 +105,7 @@ pub(crate) enum Undecidable {
 }
 
 /// Which part of a mission is judged, and in which windows.
-#[derive(Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Time")]
 pub(crate) struct GateTime {
     /// The length of the windows in which rates are judged: `60`, `30s`, `500ms`. [default: the expectation's `period`]
@@ -102,6 +129,8 @@ impl CheckArgs {
     }
 }
 
+pub(crate) const DIFF_HELP: &str = "Exit codes: 0 the same, 1 different, 2 could not tell (usage, unreadable), 3 the same but data was skipped (damaged \
+    bag).";
 pub(crate) const BASELINE_HELP: &str =
     "Exit codes: 0 written, 1 failed, 2 usage, 3 written but data was skipped (damaged bag).";
 pub(crate) const CHECK_HELP: &str = "Exit codes: 0 kept, 1 broken, 2 could not tell (usage, unreadable, or nothing could be decided), 3 kept but data was \
@@ -112,6 +141,12 @@ fn check_format(word: &str) -> Result<&'static gate::Format, String> {
         let words: Vec<&str> = gate::FORMATS.iter().map(|f| f.word).collect();
         format!("write one of {}", words.join(", "))
     })
+}
+
+fn diff_format(word: &str) -> Result<&'static gate::DiffFormat, String> {
+    let word = if word == "md" { "markdown" } else { word };
+    let format = gate::DIFF_FORMATS.iter().find(|f| f.word == word);
+    format.ok_or_else(|| "write one of text, json, markdown".to_owned())
 }
 
 fn link(text: &str) -> Result<(String, String), String> {
