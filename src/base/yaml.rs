@@ -5,6 +5,8 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_saphyr::{Location, Spanned};
 
+use super::budget::YAML;
+
 pub(crate) use serde_json::Value;
 
 /// What is wrong with a YAML document.
@@ -17,9 +19,6 @@ pub(crate) struct BadYaml {
     /// What is wrong, in the parser's words, one line.
     pub(crate) reason: String,
 }
-
-/// The longest document that is read, in bytes.
-const LONGEST: usize = 8 << 20;
 
 /// The document as JSON data: mappings as objects with keys in order, scalars typed as YAML 1.2 has it.
 ///
@@ -39,7 +38,7 @@ pub(crate) fn parse_placed(text: &str) -> Result<Placed, BadYaml> {
 }
 
 fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
-    if text.len() > LONGEST {
+    if text.len() > YAML {
         return Err(BadYaml {
             line: 0,
             column: 0,

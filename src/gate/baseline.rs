@@ -72,7 +72,7 @@ fn scalar(text: &str) -> String {
     if begins && !is_word && text.chars().all(harmless) {
         return text.to_owned();
     }
-    visible_json(&serde_json::to_string(text).unwrap_or_default())
+    visible_json(&serde_json::to_string(text).unwrap_or_default()).into_owned()
 }
 
 /// Pairs as a mapping on one line.
