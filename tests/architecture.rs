@@ -84,7 +84,6 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "evidence/topology",
             "export/html",
             "gate/baseline",
-            "gate/difference",
             "gate/report",
             "mission/events",
             "mission/info",

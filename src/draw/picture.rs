@@ -229,12 +229,11 @@ impl<'a> Picture<'a> {
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
-        scene.title = format!(
-            "{}, window {} of {}",
-            measured.options.title,
-            frame.index + 1,
-            self.len()
-        );
+        scene.title.clone_from(&measured.options.title);
+        if !measured.options.compares {
+            let (window, all) = (frame.index + 1, self.len());
+            scene.title = format!("{}, window {window} of {all}", scene.title);
+        }
         if !frame.caption.is_empty() {
             scene.title = format!("{}: {}", scene.title, frame.words(usize::MAX));
         }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::{Difference, Where};
-use crate::base::words::{self, visible, visible_json};
+use crate::base::words::{self, visible};
 use crate::export::report::escape::{code, plain};
 
 /// The two missions as the user called them.
@@ -146,7 +146,7 @@ fn json(subject: &DiffSubject, all: &[Difference]) -> String {
         second: &subject.second,
         differences: all.iter().map(row).collect(),
     };
-    visible_json(&serde_json::to_string_pretty(&report).unwrap_or_default()) + "\n"
+    crate::mission::info::json(&report)
 }
 
 fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {

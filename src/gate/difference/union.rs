@@ -298,8 +298,8 @@ impl Told<'_> {
         for (id, topic) in (0..).zip(&self.elements.topics) {
             let turned = self.turned("topic", topic.name.as_str());
             if let Some(kind) = turned.map(appeared) {
-                let of = self.elements.publishes.iter().filter(|e| e.topic == id);
-                let whole = of.filter_map(|e| wholes.get(&e.node)).next().copied();
+                let mut of = self.elements.publishes.iter().filter(|e| e.topic == id);
+                let whole = of.find_map(|e| wholes.get(&e.node)).copied();
                 self.add(kind, Element::Topic(id), Detail::None, whole);
             }
         }
