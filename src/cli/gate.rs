@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::args::gate::{BaselineArgs, CheckArgs, GateTime, Undecidable};
-use super::args::{GraphArgs, Inputs, TimeArgs};
+use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use super::terminal::Terminal;
 use super::{DONE, FAILED, SKIPPED, USAGE, code, reading, summary};
 use crate::base::error::{Error, Result};
@@ -102,7 +102,7 @@ fn judged(inputs: &Inputs, time: &GateTime, graph: &GraphArgs) -> Result<Reading
         end: time.end,
         ..TimeArgs::default()
     };
-    reading(inputs, &time, graph)
+    reading(inputs, &time, &ChangeArgs::default(), graph)
 }
 
 fn typed(bags: &[PathBuf]) -> Vec<String> {
