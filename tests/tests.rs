@@ -21,6 +21,7 @@ mod gate;
 mod hostile;
 mod info;
 mod layout;
+mod options;
 mod pages;
 mod phases;
 mod properties;

@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, GateTime, Undecidable};
-use super::args::{GraphArgs, Inputs, TimeArgs};
+use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use super::terminal::Terminal;
 use super::{DONE, FAILED, SKIPPED, USAGE, code, look, reading, summary};
 use crate::base::error::{Error, Result};
@@ -41,7 +41,7 @@ fn diff_job(args: &DiffArgs) -> Result<Diff> {
             bags: vec![path.clone()],
             verify: false,
         };
-        judged(&inputs, &args.time, &args.graph)
+        judged(&inputs, &args.time(), &args.graph)
     };
     let name = |path: &PathBuf| {
         let last = path
@@ -72,7 +72,7 @@ fn diff_job(args: &DiffArgs) -> Result<Diff> {
     drawing.page.title = format!("{} → {}", subject.first, subject.second);
     Ok(Diff {
         readings: [one(&args.first)?, one(&args.second)?],
-        rate_change: args.graph.rate_change,
+        rate_change: args.rate_change,
         subject,
         reports,
         pictures,
@@ -98,7 +98,7 @@ fn against(args: &DiffArgs, bag: &Path, expect: &Path, terminal: &mut Terminal) 
         link: Vec::new(),
         undecidable: Undecidable::Allow,
         explain: None,
-        time: args.time.clone(),
+        time: args.time(),
         graph: args.graph.clone(),
     };
     self::check(&check, terminal)
@@ -193,7 +193,7 @@ fn judged(inputs: &Inputs, time: &GateTime, graph: &GraphArgs) -> Result<Reading
         end: time.end,
         ..TimeArgs::default()
     };
-    reading(inputs, &time, graph)
+    reading(inputs, &time, &ChangeArgs::default(), graph)
 }
 
 fn typed(bags: &[PathBuf]) -> Vec<String> {

@@ -25,7 +25,7 @@ const MOST_PHRASES: usize = 12;
 const MOST_CHART: usize = 45_000;
 
 /// The report.
-pub fn report(sequence: &Sequence<'_>) -> String {
+pub(crate) fn report(sequence: &Sequence<'_>) -> String {
     let (mission, view) = (sequence.mission, sequence.view);
     let mut out = headline(sequence, view) + "\n\n";
     let links = sequence.options.links.iter();

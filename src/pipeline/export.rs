@@ -22,6 +22,7 @@ use crate::view::{View, filtered};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Render {
     /// What to read.
     pub reading: Reading,
@@ -62,6 +63,7 @@ impl Render {
 
 /// What came of it.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Rendered {
     /// The mission, with where it was drawn and everything worth saying.
     pub mission: Mission,
@@ -73,7 +75,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// Where an output cannot be written, no input can be read, or an option makes no sense.
-pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
     check(job)?;
     let mission = read(&job.reading, watch)?;
     show(job, mission, watch)
@@ -83,7 +85,7 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 ///
 /// # Errors
 /// As [`export::check`].
-pub fn check(job: &Render) -> Result<()> {
+pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
@@ -113,7 +115,7 @@ fn check_figure(job: &Render) -> Result<()> {
 ///
 /// # Errors
 /// As [`render`].
-pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
     if let Some(from) = &job.captions {
         drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
@@ -177,7 +179,9 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
             ControlFlow::Continue(())
         }
     };
-    let written = run::run(&sequence, &job.outputs, &mut progress)?;
+    let steps = run::Steps::default();
+    let written = run::run(&sequence, &job.outputs, &steps, &mut progress)?;
+    watch.shares(&steps.shares());
     Ok(Rendered { mission, written })
 }
 

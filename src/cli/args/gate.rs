@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{GraphArgs, Inputs, length, moment, size};
+use super::{GraphArgs, Inputs, length, moment, share, size};
 use crate::base::time::Moment;
 use crate::gate;
+use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
 
 #[derive(Debug, Args)]
@@ -31,10 +32,28 @@ pub(crate) struct DiffArgs {
     /// The size of pictures in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<(u32, u32)>,
-    #[command(flatten)]
-    pub(crate) time: GateTime,
+    /// A rate that differs by more than this share is told, if chance does not make such a difference.
+    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
+    pub(crate) rate_change: f64,
+    /// Begin both here: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(crate) start: Option<Moment>,
+    /// End both here, written like `--start`.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(crate) end: Option<Moment>,
     #[command(flatten)]
     pub(crate) graph: GraphArgs,
+}
+
+impl DiffArgs {
+    /// Which part of the missions is compared.
+    pub(crate) fn time(&self) -> GateTime {
+        GateTime {
+            period: None,
+            start: self.start,
+            end: self.end,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -105,7 +124,7 @@ pub(crate) enum Undecidable {
 }
 
 /// Which part of a mission is judged, and in which windows.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Time")]
 pub(crate) struct GateTime {
     /// The length of the windows in which rates are judged: `60`, `30s`, `500ms`. [default: the expectation's `period`]

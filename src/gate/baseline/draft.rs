@@ -265,11 +265,16 @@ fn band(rates: &[Rate], is_even: bool) -> Option<Range> {
 fn rounded(value: f64, round: fn(f64) -> f64) -> f64 {
     let power = 2.0 - libm::floor(libm::log10(value));
     let scale = libm::pow(10.0, libm::fabs(power));
+    // A sum of 110.00000000000001 is 110, whichever way it is rounded.
+    let whole = |digits: f64| match libm::round(digits) {
+        near if (digits - near).abs() < 1e-9 * near => near,
+        _ => round(digits),
+    };
     // Dividing by a power of ten keeps 0.3 what it is.
     if power >= 0.0 {
-        round(value * scale) / scale
+        whole(value * scale) / scale
     } else {
-        round(value / scale) * scale
+        whole(value / scale) * scale
     }
 }
 
