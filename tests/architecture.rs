@@ -43,10 +43,10 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options"],
         &["group", "select"],
         &["items"],
-        &["caption", "hidden", "marks", "state"],
+        &["caption", "hidden", "marks", "nothing", "state"],
         &["filtered", "frames"],
     ]),
-    ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
+    ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
     ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],
