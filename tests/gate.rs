@@ -609,7 +609,8 @@ fn every_result_stands_at_a_line_and_annotations_are_few() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
-    let lines: String = (0..30).map(|n| format!("  /gone_{n}: {{}}\n")).collect();
+    let lines: Vec<String> = (0..30).map(|n| format!("  /gone_{n}: {{}}\n")).collect();
+    let lines = lines.concat();
     fs::write(
         here.join("g.yaml"),
         format!("schema: bagreel.expect/1\nnodes:\n{lines}"),
