@@ -43,10 +43,10 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options"],
         &["group", "select"],
         &["items"],
-        &["caption", "hidden", "marks", "state"],
+        &["caption", "hidden", "marks", "nothing", "state"],
         &["filtered", "frames"],
     ]),
-    ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
+    ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
     ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],
@@ -62,9 +62,9 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["expectation"],
         &["facts"],
         &["judge"],
-        &["baseline", "report"],
+        &["baseline", "difference", "report"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["figure", "gate"], &["export", "extract", "survey"]]),
+    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"], &["gate"]]),
     ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract", "gate"]]),
 ];
 
