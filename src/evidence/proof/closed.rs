@@ -53,19 +53,27 @@ impl Closed {
         self.told.retain(|topic, _| !untold.contains(topic));
     }
 
+    /// Whether every message of a topic names its publisher, and none this one.
+    pub(crate) fn headers_deny(&self, what: Key) -> bool {
+        match what {
+            Key::Publish(node, topic) => lacks(&self.told, topic, node),
+            _ => false,
+        }
+    }
+
     /// Whether some complete list leaves this edge out; nothing is known against nodes and topics.
-    pub(crate) fn denies(&self, what: Key) -> bool {
-        let lacks = |lists: &BTreeMap<Name, BTreeSet<Name>>, of: Name, member: Name| {
-            lists.get(&of).is_some_and(|list| !list.contains(&member))
-        };
+    pub(crate) fn lists_deny(&self, what: Key) -> bool {
         match what {
             Key::Publish(node, topic) => {
-                lacks(&self.all, node, topic)
-                    || lacks(&self.published, node, topic)
-                    || lacks(&self.told, topic, node)
+                lacks(&self.all, node, topic) || lacks(&self.published, node, topic)
             }
             Key::Subscribe(topic, node) => lacks(&self.all, node, topic),
             Key::Node(_) | Key::Topic(_) => false,
         }
     }
+}
+
+/// Whether there is a list of this, without that member.
+fn lacks(lists: &BTreeMap<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
+    lists.get(&of).is_some_and(|list| !list.contains(&member))
 }
