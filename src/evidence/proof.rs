@@ -370,7 +370,7 @@ impl<'a> Findings<'a> {
     /// By a convention, `what` lives as long as `basis`, unless a complete list leaves it out. Headers say nothing
     /// against it: what a node publishes by convention is often silent.
     pub(crate) fn like(&mut self, source: SourceId, what: Key, basis: Key) {
-        if self.closed(|closed| closed.lists_deny(what)) {
+        if self.closed(|closed| closed.settled_lists_deny(what)) {
             return;
         }
         self.prove(Proof {

@@ -5,6 +5,8 @@ mod survey;
 mod text;
 mod why;
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 
 use advice::advice;
@@ -205,11 +207,11 @@ pub fn info(mission: &Mission) -> Info {
         )
         .collect(),
         subscribes_by_degree: listeners(mission)
-            .filter(|(_, edge)| edge.evidence != Evidence::of("source_only"))
+            .filter(|(_, edge)| !edge.evidence.is_guess())
             .map(|(id, _)| best.subscribes[id])
             .collect(),
-        topics_without_publisher: lacking(&topics, |t| t.publishers.is_empty()),
-        topics_without_subscriber: lacking(&topics, |t| t.subscribers.is_empty()),
+        topics_without_publisher: lacking(&topics, &mut elements.publishes.iter()),
+        topics_without_subscriber: lacking(&topics, &mut listeners(mission).map(|(_, edge)| edge)),
         evidence: evidence(mission),
         nodes: nodes.collect(),
         topics,
@@ -287,14 +289,13 @@ fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
-/// How well each element is known, without those that only might be meant by the code.
+/// How well each element is known, without those that stand for nodes without a name.
 fn known(
     degrees: &[Degree],
     evidence: impl Iterator<Item = Evidence>,
 ) -> impl Iterator<Item = Degree> {
-    let guessed = Evidence::of("source_only");
     let all = degrees.iter().copied().zip(evidence);
-    all.filter(move |(_, evidence)| *evidence != guessed)
+    all.filter(|(_, evidence)| !evidence.is_guess())
         .map(|(degree, _)| degree)
 }
 
@@ -309,9 +310,12 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
     edges.filter(move |(_, edge)| !is_recorder(edge))
 }
 
-/// How many topics with messages lack something.
-fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
-    topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
+/// How many topics with messages none of these edges is known to lead to.
+fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usize {
+    let known = edges.filter(|edge| !edge.evidence.is_guess());
+    let known: BTreeSet<usize> = known.map(|edge| edge.topic as usize).collect();
+    let spoken = topics.iter().enumerate().filter(|(_, t)| t.count > 0);
+    spoken.filter(|(id, _)| !known.contains(id)).count()
 }
 
 /// Messages that each node sent; `None` where no count is known.
