@@ -175,7 +175,9 @@ pub fn info(mission: &Mission) -> Info {
     let best = BestDegrees::of(mission);
     let topics = topics(mission);
     let traffic = traffic(mission, &topics);
-    let nodes = elements.nodes.iter().enumerate().map(|(id, node)| {
+    let named = elements.nodes.iter().enumerate();
+    let named = named.filter(|(_, node)| !is_unnamed(node.evidence));
+    let nodes = named.map(|(id, node)| {
         let own = &traffic[id];
         NodeInfo {
             name: node.name.to_string(),
@@ -286,6 +288,13 @@ fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
+/// The word of what stands for publishers that are counted, not named: the summary counts them with their topics.
+const UNNAMED: &str = "unknown";
+
+fn is_unnamed(evidence: Evidence) -> bool {
+    evidence == Evidence::of(UNNAMED)
+}
+
 /// How well each element is known, without those that stand for nodes without a name.
 fn known(
     degrees: &[Degree],
@@ -376,7 +385,8 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
         }
     }
     let name = |node: NodeId| elements.nodes[node as usize].name.to_string();
-    for edge in &elements.publishes {
+    let named = elements.publishes.iter();
+    for edge in named.filter(|e| !is_unnamed(e.evidence)) {
         topics[edge.topic as usize].publishers.push(name(edge.node));
     }
     for (_, edge) in listeners(mission) {
@@ -411,6 +421,6 @@ fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {
         publishes: count(&mut elements.publishes.iter().map(|e| e.evidence), source),
         subscribes: count(&mut listeners(mission).map(|(_, e)| e.evidence), source),
     });
-    rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0)
+    rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0 && row.source != UNNAMED)
         .collect()
 }
