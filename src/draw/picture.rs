@@ -282,8 +282,11 @@ impl<'a> Picture<'a> {
         let boxes = self.boxes();
         let full = self.inhabited(frame);
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
+        let mut titles = Vec::new();
         for (at, (space, place)) in spaces.enumerate() {
-            groups.push(boxes.space(space, *place, &encoded(&space.name), !full[at]));
+            let mut space = boxes.space(space, *place, &encoded(&space.name), !full[at]);
+            titles.push(boxes.title_of(&mut space));
+            groups.push(space);
         }
         let arrows = Arrows {
             style: self.measured.style,
@@ -291,22 +294,29 @@ impl<'a> Picture<'a> {
             fit: self.fit,
         };
         // What changed lies on top.
-        let mut changed = Vec::new();
+        let (mut changed, mut over, mut changed_over) = (Vec::new(), Vec::new(), Vec::new());
         for &at in &self.order {
             let Some(shown) = measured::find(&frame.arrows, at) else {
                 continue;
             };
             let arrow = &view.arrows[at];
             let ends = [arrow.from, arrow.to].map(|id| measured::find(&frame.items, id as usize));
-            let group = arrows.arrow(arrow, &self.tracks[at], shown, ends);
-            let pile = if shown.mark.is_some() {
-                &mut changed
+            let (line, label) = arrows.parts(arrow, &self.tracks[at], shown, ends);
+            let (lines, labels) = if shown.mark.is_some() {
+                (&mut changed, &mut changed_over)
             } else {
-                &mut *groups
+                (&mut *groups, &mut over)
             };
-            pile.push(group);
+            lines.push(line);
+            if !label.pieces.is_empty() {
+                labels.push(label);
+            }
         }
         groups.append(&mut changed);
+        // No line runs over words.
+        for mut words in [titles, over, changed_over] {
+            groups.append(&mut words);
+        }
         for shown in &frame.items {
             let at = shown.id as usize;
             if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
@@ -395,6 +405,7 @@ fn arrow_id(arrow: &Arrow, ends: &[String; 2]) -> String {
         ArrowKind::Publish => format!("p{from}..{to}"),
         ArrowKind::Subscribe => format!("s{from}..{to}"),
         ArrowKind::Direct(topic) => format!("d{from}..{to}..{}", encoded(topic)),
+        ArrowKind::Bundle => format!("b{from}..{to}"),
     }
 }
 

@@ -1,6 +1,6 @@
 //! From the evolution to the picture: choose what is shown, and make it readable on its page.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Stage, Watch};
@@ -10,12 +10,13 @@ use crate::base::words;
 use crate::draw::picture::{self, Measured, PageOptions};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
-use crate::layout::{Engine, Layout, extend, lay_out};
+use crate::layout::{Engine, Layout, RING, engine, extend, lay_out};
 use crate::mission::{Mission, Place, Places};
-use crate::view::{View, ViewOptions, outline, view};
+use crate::view::{Mode, View, ViewOptions, outline, view};
 
 /// What to draw and how.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Drawing {
     /// What is shown.
     pub view: ViewOptions,
@@ -69,9 +70,9 @@ pub(super) struct Composed {
     pub(super) notices: Notices,
 }
 
-/// Chooses what is shown and lays it out. With `--fit auto` the page grows, then the largest innermost namespaces are
-/// collapsed, until the smallest text is at least 9 pixels high or nothing is left to collapse; then those that turn
-/// out to fit are opened again.
+/// Chooses what is shown and lays it out. With `--fit auto` the page grows, then those namespaces are collapsed in which
+/// least changes, until the smallest text is at least 9 pixels high or nothing is left to collapse; then topics are
+/// bundled, if need be, and namespaces that turn out to fit are opened again.
 pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
     let mut page = drawing.page.clone();
@@ -84,7 +85,11 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
             best = Attempt::new(mission, drawing, &options, &page);
         }
         collapse(mission, drawing, &page, &mut options, &mut best);
-        open_again(mission, drawing, &page, (&mut options, asked), &mut best);
+        if best.is_readable() {
+            open_again(mission, drawing, &page, (&mut options, asked), &mut best);
+        } else {
+            bundle(mission, drawing, &page, &mut options, &mut best);
+        }
     }
     let Attempt {
         view,
@@ -95,6 +100,14 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     if drawing.is_fitted {
         let collapsed = &options.collapse[asked..];
         notices.extend(told(collapsed, &drawing.page, &page, text).iter());
+        if options.mode != drawing.view.mode {
+            let text = format!(
+                "one arrow for all topics between two boxes{}; `--mode {}` draws each",
+                so_that(text >= READABLE),
+                drawing.view.mode.word()
+            );
+            notices.add(Notice::new(NoticeKind::Hidden, text));
+        }
     }
     notices.extend(picture::unshown(&view, &drawing.fonts));
     let remarks = layout.remarks.iter();
@@ -184,6 +197,49 @@ fn collapse(
         options.collapse.extend(fresh.into_iter().take(many));
         *best = Attempt::new(mission, drawing, options, page);
     }
+}
+
+/// The last resort: outermost namespaces as one box each, and one arrow for all topics between two boxes; if that can
+/// be read better.
+fn bundle(
+    mission: &Mission,
+    drawing: &Drawing,
+    page: &PageOptions,
+    options: &mut ViewOptions,
+    best: &mut Attempt,
+) {
+    if options.mode.is_direct() {
+        return;
+    }
+    let mut bundled = options.clone();
+    bundled.mode = Mode::Bundles;
+    bundled.collapse.clone_from(&drawing.view.collapse);
+    let nodes = mission.elements.nodes.iter().map(|n| n.name.as_str());
+    let outermost: BTreeSet<&str> = nodes.filter_map(outermost).collect();
+    bundled
+        .collapse
+        .extend(outermost.into_iter().map(Arc::from));
+    let boxes = outline(mission, &bundled);
+    // Few boxes with many arrows among them stand best around the page.
+    let drawing = if boxes.items.len() <= RING && boxes.namespaces.is_empty() {
+        let ring = engine("ring").unwrap_or(drawing.engine);
+        &Drawing {
+            engine: ring,
+            ..drawing.clone()
+        }
+    } else {
+        drawing
+    };
+    let attempt = Attempt::new(mission, drawing, &bundled, page);
+    if boxes.items.len() > 1 && attempt.text > best.text {
+        (*options, *best) = (bundled, attempt);
+    }
+}
+
+/// The first part of a name that has more than one: `/robot1` of `/robot1/nav/planner`.
+fn outermost(name: &str) -> Option<&str> {
+    let end = name.get(1..)?.find('/')? + 1;
+    name.get(..end)
 }
 
 /// How many namespaces are tried to be opened again.

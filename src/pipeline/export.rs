@@ -9,6 +9,7 @@ use super::{Drawing, Phases, Reading, Stage, Watch, captions, read};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::words;
 use crate::draw::figure::Figure;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
@@ -17,11 +18,13 @@ use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::Sequence;
 use crate::export::{self, OneDrawing, Output, Written};
+use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{View, filtered};
+use crate::view::{View, filtered, nothing};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Render {
     /// What to read.
     pub reading: Reading,
@@ -62,6 +65,7 @@ impl Render {
 
 /// What came of it.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Rendered {
     /// The mission, with where it was drawn and everything worth saying.
     pub mission: Mission,
@@ -73,7 +77,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// Where an output cannot be written, no input can be read, or an option makes no sense.
-pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
     check(job)?;
     let mission = read(&job.reading, watch)?;
     show(job, mission, watch)
@@ -83,7 +87,7 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 ///
 /// # Errors
 /// As [`export::check`].
-pub fn check(job: &Render) -> Result<()> {
+pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
@@ -113,7 +117,7 @@ fn check_figure(job: &Render) -> Result<()> {
 ///
 /// # Errors
 /// As [`render`].
-pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
     if let Some(from) = &job.captions {
         drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
@@ -140,6 +144,10 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
     } else {
         unplaced(&mission, &drawing)
     };
+    let elements = &mission.elements;
+    if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
+        return Err(nothing(elements, &options));
+    }
     mission.notices.extend(notices.iter());
     mission.layout = is_drawn.then(|| places(&view, &layout));
     let nothing = View::default();
@@ -168,6 +176,9 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         latex: figure.as_ref().map(|(_, latex)| latex.as_str()),
         options: job.sequence.clone(),
     };
+    if let Some(warning) = long_job(job, &sequence) {
+        watch.note(&warning);
+    }
     watch.stage(Stage::Draw);
     let mut progress = |done: usize, total: usize| {
         watch.progress(done as u64, total as u64);
@@ -177,8 +188,43 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
             ControlFlow::Continue(())
         }
     };
-    let written = run::run(&sequence, &job.outputs, &mut progress)?;
+    let steps = run::Steps::default();
+    let written = run::run(&sequence, &job.outputs, &steps, &mut progress)?;
+    watch.shares(&steps.shares());
     Ok(Rendered { mission, written })
+}
+
+/// More frames than this are told before they are drawn.
+const MANY_FRAMES: usize = 2000;
+/// Milliseconds of one core for a frame, and for each of its megapixels: measured with `tests/bench/drawing.rs`, and
+/// half as much again.
+const FRAME_MS: (f64, f64) = (4.0, 13.0);
+
+/// What to know before a job of very many frames begins: how many, for how long, and what would be sensible.
+fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
+    let is_drawn = |o: &Output| o.format.is_drawn && o.format.whole != OneDrawing::Asked;
+    let frames = sequence.frame_times().len();
+    if frames <= MANY_FRAMES || !job.outputs.iter().any(is_drawn) {
+        return None;
+    }
+    let size = sequence.picture.scene(0, 1.0).size;
+    let pixels = size.w * size.h * sequence.options.scale * sequence.options.scale / 1e6;
+    let cores = run::cores() as f64;
+    let ms = frames as f64 * (FRAME_MS.0 + FRAME_MS.1 * pixels) / cores;
+    #[expect(clippy::cast_possible_truncation, reason = "a rough number of seconds")]
+    let about = words::duration((ms / 1000.0).ceil() as i64 * 1_000_000_000);
+    let windows = &sequence.mission.windows;
+    let (first, last) = (windows.first()?, windows.last()?);
+    let sensible = default_period(last.span.end.since(first.span.start));
+    let advice = if sensible > sequence.mission.period {
+        let period = words::period(sensible.nanos());
+        format!("`--period {}`", period.replace(' ', ""))
+    } else {
+        "`--start` and `--end`".to_owned()
+    };
+    Some(format!(
+        "{frames} frames will take about {about}; {advice} would show less, `--skip-unchanged` only what changes"
+    ))
 }
 
 /// The figure with its lines for LaTeX, if one was asked for.
