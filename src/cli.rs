@@ -79,6 +79,10 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Info(args) => info(&args, &given, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
         Command::Events(args) => log(&args, &given, &mut terminal),
+        Command::Diff(args) => {
+            failed = USAGE;
+            gate::diff(&args, &mut terminal)
+        }
         Command::Baseline(args) => gate::baseline(&args, &mut terminal),
         Command::Check(args) => {
             failed = USAGE;

@@ -62,9 +62,9 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["expectation"],
         &["facts"],
         &["judge"],
-        &["baseline", "report"],
+        &["baseline", "difference", "report"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["figure", "gate"], &["export", "extract", "survey"]]),
+    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"], &["gate"]]),
     ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract", "gate"]]),
 ];
 

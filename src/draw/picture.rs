@@ -41,6 +41,8 @@ pub struct PageOptions {
     pub width_mm: Option<f64>,
     /// The graph alone, without title, caption, legend and timeline.
     pub bare: bool,
+    /// Whether two missions are compared, so that no time, no window and no timeline means anything.
+    pub compares: bool,
     /// The title, such as the bag's name.
     pub title: String,
     /// Which way the edges run; `None` takes what fits better.
@@ -57,6 +59,7 @@ impl Default for PageOptions {
             size: Size::new(1280.0, 720.0),
             width_mm: None,
             bare: false,
+            compares: false,
             title: String::new(),
             orientation: None,
             phases: Vec::new(),
@@ -226,12 +229,11 @@ impl<'a> Picture<'a> {
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
-        scene.title = format!(
-            "{}, window {} of {}",
-            measured.options.title,
-            frame.index + 1,
-            self.len()
-        );
+        scene.title.clone_from(&measured.options.title);
+        if !measured.options.compares {
+            let (window, all) = (frame.index + 1, self.len());
+            scene.title = format!("{}, window {window} of {all}", scene.title);
+        }
         if !frame.caption.is_empty() {
             scene.title = format!("{}: {}", scene.title, frame.words(usize::MAX));
         }
@@ -258,7 +260,9 @@ impl<'a> Picture<'a> {
                 measured.style,
                 &measured.page,
             ));
-            groups.extend(self.timeline.ground(measured.view));
+            if !measured.options.compares {
+                groups.extend(self.timeline.ground(measured.view));
+            }
         }
         groups
     }
@@ -270,6 +274,12 @@ impl<'a> Picture<'a> {
             .phases
             .get(k)
             .map_or("", String::as_str);
+        if self.measured.options.compares {
+            groups.push(self.title.compared());
+            groups.push(self.title.chips(frame));
+            groups.push(self.title.caption(frame, phase));
+            return;
+        }
         groups.push(self.title.window(self.measured.view, frame));
         groups.push(self.title.chips(frame));
         groups.push(self.title.clock(frame));

@@ -140,6 +140,19 @@ impl<'a> Title<'a> {
         group
     }
 
+    /// What the marks mean where two missions are compared, in the place of the window's time.
+    pub(crate) fn compared(&self) -> Group {
+        let mut group = Group::named("window");
+        group.text(self.words(
+            "removed: only in the first · added: only in the second".to_owned(),
+            0.8,
+            self.style.title.quiet_size * self.page.unit,
+            Weight::Regular,
+            self.style.title.quiet,
+        ));
+        group
+    }
+
     fn left(&self) -> f64 {
         self.style.page.margin * self.page.unit
     }
