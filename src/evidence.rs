@@ -17,6 +17,7 @@ pub(crate) mod syntax;
 pub(crate) mod texts;
 pub(crate) mod times;
 pub mod topology;
+pub(crate) mod unknown;
 
 pub use claim::{Degree, EvidenceLine};
 pub use kinds::Evidence;
@@ -273,6 +274,16 @@ pub const SOURCES: &[Source] = &[
     Source {
         word: "source_only",
         about: "source code of the user's: the only place that can be meant (with `--infer source`)",
+        ..NOTHING
+    },
+    Source {
+        word: "unknown",
+        about: "publishers that a ROS 2 recording counts and nothing names",
+        ..NOTHING
+    },
+    Source {
+        word: "owned_type",
+        about: "a publisher that nothing names, of a type that one well-known program publishes",
         ..NOTHING
     },
 ];

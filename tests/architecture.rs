@@ -34,7 +34,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["claim", "topology"],
         &["kinds", "proof"],
         &["code", "publishers", "source"],
-        &["collector"],
+        &["collector", "unknown"],
     ]),
     ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),

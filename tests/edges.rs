@@ -392,6 +392,56 @@ fn publishers_that_nobody_names_are_counted() {
         .map(|t| t.unknown_publishers)
         .collect();
     assert_eq!(unknown, [None, Some(2)]);
+    assert_eq!(edges(&bag, "unknown"), ["/scan ? ×2 > /scan declared"]);
+    assert!(built.lives.nodes.len() == built.elements.nodes.len());
+}
+
+#[test]
+fn a_box_stands_for_publishers_only_while_they_are_counted() {
+    let topics = [("/scan", "sensor_msgs/msg/LaserScan")];
+    let mut bag = logging(&[("/rplidar_node", "a.cpp")], &topics);
+    assert!(edges(&bag, "unknown").is_empty());
+    let offer =
+        "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: volatile\n";
+    bag.publishers[1].qos = offer.to_owned();
+    assert!(edges(&bag, "unknown").is_empty());
+}
+
+#[test]
+fn a_peculiar_type_names_its_program() {
+    let topics = [
+        ("/turtle1/pose", "turtlesim/msg/Pose"),
+        ("/turtle1/color_sensor", "turtlesim/msg/Color"),
+    ];
+    let bag = logging(&[("/boss", "a.cpp")], &topics);
+    assert_eq!(
+        edges(&bag, "owned_type"),
+        [
+            "/turtlesim ? > /turtle1/color_sensor declared",
+            "/turtlesim ? > /turtle1/pose declared"
+        ]
+    );
+    let bag = logging(&[("/turtlesim", "a.cpp")], &topics);
+    assert!(edges(&bag, "owned_type").is_empty());
+}
+
+#[test]
+fn conventions_bow_to_complete_lists() {
+    let mut bag = Recording::default();
+    let goal = bag.publisher("/boss", "/go/goal", "test_msgs/GoActionGoal");
+    let log = bag.publisher("/boss", "/rosout", "rosgraph_msgs/Log");
+    bag.at(goal, 50, vec![0; 4]);
+    let own = &["/go/goal", "/go/cancel", "/go/result", "/rosout"];
+    bag.at(log, 40, log1("/boss", "up", "boss.py", own));
+    let of_boss = |bag: &Recording| {
+        let edges = edges(bag, "action");
+        edges.contains(&"/go/status > /boss inferred".to_owned())
+    };
+    // A list at a node's start may lack what comes later.
+    assert!(of_boss(&bag));
+    bag.at(log, 9000, log1("/boss", "still up", "boss.py", own));
+    assert!(!of_boss(&bag));
+    assert!(edges(&bag, "action").contains(&"/go/result > /boss inferred".to_owned()));
 }
 
 /// A mission of ROS 1 with a rospy node that names its topics.

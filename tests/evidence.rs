@@ -85,6 +85,77 @@ fn names(built: &Built, window: usize) -> [Names; 3] {
     ]
 }
 
+/// Right and wrong states of each degree, over all kinds and all windows of ten seconds.
+fn by_degree(bag: &str, truth: &str) -> Option<[[u32; 2]; 4]> {
+    let (bag, truth) = (shared(bag)?, shared(truth)?);
+    let truth: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(truth).unwrap()).unwrap();
+    let (built, windows) = graphs(&bag);
+    let all = &built.elements;
+    let node = |id: u32| all.nodes[id as usize].name.as_str();
+    let topic = |id: u32| all.topics[id as usize].name.as_str();
+    let mut counts = [[0; 2]; 4];
+    for real in truth["periods"]["10"].as_array().unwrap() {
+        let start = Stamp(real["start_ns"].as_i64().unwrap());
+        let near = |w: &Span| w.start.since(start).abs() <= 5 * SECOND;
+        let Some(window) = windows.iter().position(near) else {
+            continue;
+        };
+        let graph = &built.graphs[window];
+        let nodes = graph
+            .nodes
+            .iter()
+            .map(|s| (s.degree, "nodes", node(s.id), serde_json::json!(node(s.id))));
+        let publishes = graph.publishes.iter().map(|s| {
+            let edge = &all.publishes[s.id as usize];
+            let names = serde_json::json!([node(edge.node), topic(edge.topic)]);
+            (s.degree, "publishes", node(edge.node), names)
+        });
+        let subscribes = graph.subscribes.iter().map(|s| {
+            let edge = &all.subscribes[s.id as usize];
+            let names = serde_json::json!([topic(edge.topic), node(edge.node)]);
+            (s.degree, "subscribes", node(edge.node), names)
+        });
+        for (degree, kind, node, names) in nodes.chain(publishes).chain(subscribes) {
+            if !node.starts_with("/record_") {
+                let is_right = real[kind].as_array().unwrap().contains(&names);
+                counts[degree as usize][usize::from(!is_right)] += 1;
+            }
+        }
+    }
+    Some(counts)
+}
+
+#[test]
+fn every_degree_keeps_its_promise() {
+    let (warehouse, mini) = ("warehouse/truth_windows.json", "mini/truth_windows.json");
+    let recordings = [
+        ("warehouse/warehouse.bag", warehouse),
+        ("warehouse/warehouse_norosout.bag", warehouse),
+        ("warehouse/warehouse_lz4.bag", warehouse),
+        ("mini/mini_lz4.bag", mini),
+        ("mini/mini_bz2.bag", mini),
+    ];
+    let mut counts = [[0; 2]; 4];
+    for (bag, truth) in recordings {
+        let Some(more) = by_degree(bag, truth) else {
+            return;
+        };
+        for (sum, more) in counts.iter_mut().flatten().zip(more.iter().flatten()) {
+            *sum += more;
+        }
+    }
+    for (degree, least) in [(0, 0.98), (1, 0.98), (2, 0.95), (3, 0.95)] {
+        let [right, wrong] = counts[degree].map(f64::from);
+        println!("{degree}: {right} right, {wrong} wrong");
+        assert!(right >= least * (right + wrong), "{degree}: {counts:?}");
+    }
+    assert!(
+        counts[..3].iter().all(|[right, _]| *right > 100),
+        "{counts:?}"
+    );
+}
+
 /// Precision and F1 of nodes, publications and subscriptions over all windows of ten seconds.
 fn scores(bag: &str, truth: &str) -> Option<[(f64, f64); 3]> {
     let (bag, truth) = (shared(bag)?, shared(truth)?);

@@ -31,10 +31,22 @@ impl Evidence {
         Self(self.0 | other.0)
     }
 
-    /// Whether only source code speaks for it, which does not know when anything happened.
-    pub fn is_code_only(self) -> bool {
-        let code = Self::of("source").and(Self::of("source_only"));
-        !self.is_empty() && self.0 & !code.0 == 0
+    /// Whether nothing that speaks for it knows when anything happened: source code, and what stands for nodes without a
+    /// name.
+    pub fn is_timeless(self) -> bool {
+        self.is_within(&["source", "source_only", "unknown", "owned_type"])
+    }
+
+    /// Whether it stands for a node that the bag does not name.
+    pub fn is_guess(self) -> bool {
+        self.is_within(&["source_only", "unknown", "owned_type"])
+    }
+
+    /// Whether there is some, and of these kinds only.
+    fn is_within(self, words: &[&str]) -> bool {
+        let all = words.iter().map(|word| Self::of(word));
+        let all = all.fold(Self::NONE, Self::and);
+        !self.is_empty() && self.0 & !all.0 == 0
     }
 
     /// Whether nothing is in it.

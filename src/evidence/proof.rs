@@ -274,13 +274,17 @@ impl<'a> Findings<'a> {
 
     /// Whether a complete list, or every message's own header, speaks against an edge.
     pub(crate) fn denies(&mut self, what: Key) -> bool {
+        self.closed(|closed| closed.lists_deny(what) || closed.headers_deny(what))
+    }
+
+    fn closed<T>(&mut self, ask: impl Fn(&Closed) -> T) -> T {
         let closed = match self.closed.take() {
             Some(closed) => closed,
             None => Closed::new(self),
         };
-        let denies = closed.denies(what);
+        let answer = ask(&closed);
         self.closed = Some(closed);
-        denies
+        answer
     }
 
     /// Whether a bag has a connection of this topic, be it without messages.
@@ -363,8 +367,12 @@ impl<'a> Findings<'a> {
         topics.into_iter().map(|(_, topic)| topic).collect()
     }
 
-    /// By a convention, `what` lives as long as `basis`.
+    /// By a convention, `what` lives as long as `basis`, unless a complete list leaves it out. Headers say nothing
+    /// against it: what a node publishes by convention is often silent.
     pub(crate) fn like(&mut self, source: SourceId, what: Key, basis: Key) {
+        if self.closed(|closed| closed.settled_lists_deny(what)) {
+            return;
+        }
         self.prove(Proof {
             what,
             source,

@@ -6,6 +6,8 @@ mod survey;
 mod text;
 mod why;
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 
 use advice::advice;
@@ -178,7 +180,9 @@ pub fn info(mission: &Mission) -> Info {
     let best = BestDegrees::of(mission);
     let topics = topics(mission);
     let traffic = traffic(mission, &topics);
-    let nodes = elements.nodes.iter().enumerate().map(|(id, node)| {
+    let named = elements.nodes.iter().enumerate();
+    let named = named.filter(|(_, node)| !is_unnamed(node.evidence));
+    let nodes = named.map(|(id, node)| {
         let own = &traffic[id];
         NodeInfo {
             name: node.name.to_string(),
@@ -206,11 +210,11 @@ pub fn info(mission: &Mission) -> Info {
         )
         .collect(),
         subscribes_by_degree: listeners(mission)
-            .filter(|(_, edge)| edge.evidence != Evidence::of("source_only"))
+            .filter(|(_, edge)| !edge.evidence.is_guess())
             .map(|(id, _)| best.subscribes[id])
             .collect(),
-        topics_without_publisher: lacking(&topics, |t| t.publishers.is_empty()),
-        topics_without_subscriber: lacking(&topics, |t| t.subscribers.is_empty()),
+        topics_without_publisher: lacking(&topics, &mut elements.publishes.iter()),
+        topics_without_subscriber: lacking(&topics, &mut listeners(mission).map(|(_, edge)| edge)),
         evidence: evidence(mission),
         nodes: nodes.collect(),
         topics,
@@ -290,14 +294,20 @@ fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
-/// How well each element is known, without those that only might be meant by the code.
+/// The word of what stands for publishers that are counted, not named: the summary counts them with their topics.
+const UNNAMED: &str = "unknown";
+
+fn is_unnamed(evidence: Evidence) -> bool {
+    evidence == Evidence::of(UNNAMED)
+}
+
+/// How well each element is known, without those that stand for nodes without a name.
 fn known(
     degrees: &[Degree],
     evidence: impl Iterator<Item = Evidence>,
 ) -> impl Iterator<Item = Degree> {
-    let guessed = Evidence::of("source_only");
     let all = degrees.iter().copied().zip(evidence);
-    all.filter(move |(_, evidence)| *evidence != guessed)
+    all.filter(|(_, evidence)| !evidence.is_guess())
         .map(|(degree, _)| degree)
 }
 
@@ -312,9 +322,12 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
     edges.filter(move |(_, edge)| !is_recorder(edge))
 }
 
-/// How many topics with messages lack something.
-fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
-    topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
+/// How many topics with messages none of these edges is known to lead to.
+fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usize {
+    let known = edges.filter(|edge| !edge.evidence.is_guess());
+    let known: BTreeSet<usize> = known.map(|edge| edge.topic as usize).collect();
+    let spoken = topics.iter().enumerate().filter(|(_, t)| t.count > 0);
+    spoken.filter(|(id, _)| !known.contains(id)).count()
 }
 
 /// The edges of one node and its messages.
@@ -378,7 +391,8 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
         }
     }
     let name = |node: NodeId| elements.nodes[node as usize].name.to_string();
-    for edge in &elements.publishes {
+    let named = elements.publishes.iter();
+    for edge in named.filter(|e| !is_unnamed(e.evidence)) {
         topics[edge.topic as usize].publishers.push(name(edge.node));
     }
     for (_, edge) in listeners(mission) {
@@ -413,6 +427,6 @@ fn evidence(mission: &Mission) -> Vec<EvidenceInfo> {
         publishes: count(&mut elements.publishes.iter().map(|e| e.evidence), source),
         subscribes: count(&mut listeners(mission).map(|(_, e)| e.evidence), source),
     });
-    rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0)
+    rows.filter(|row| row.nodes + row.publishes + row.subscribes > 0 && row.source != UNNAMED)
         .collect()
 }

@@ -148,6 +148,7 @@ impl Viewed {
             .collect();
         if !options.exact_names {
             roles::label(&mut self.items, elements);
+            roles::label_unknown(&mut self.items, elements);
         }
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::{Item, ItemKind};
 use crate::base::time::Stamp;
+use crate::evidence::Evidence;
 use crate::graph::{Elements, Node};
 
 /// Per node of the mission, the name of its box: its role, if all nodes of that role lived one after the other.
@@ -46,6 +47,18 @@ pub(crate) fn label(items: &mut [Item], elements: &Elements) {
             1 => role,
             n => format!("{role} ~{n}").into(),
         };
+    }
+}
+
+/// Gives each box that stands for publishers without a name its question mark as a label: `?`, `? ×3`.
+pub(crate) fn label_unknown(items: &mut [Item], elements: &Elements) {
+    for item in items {
+        let node = single_node(item, elements);
+        if node.is_some_and(|n| n.evidence == Evidence::of("unknown"))
+            && let Some(mark) = item.name.rfind('?')
+        {
+            item.label = item.name[mark..].into();
+        }
     }
 }
 
@@ -99,6 +112,17 @@ mod tests {
         }
         let (view, _) = view(&mission, &ViewOptions::default());
         view.items.iter().map(|i| i.label.to_string()).collect()
+    }
+
+    #[test]
+    fn publishers_without_a_name_are_question_marks() {
+        let mut mission = mission(&["/boss /scan"]);
+        mission.elements.nodes[1].name = "/scan ? ×3".into();
+        mission.elements.nodes[1].role = "/scan ? ×3".into();
+        mission.elements.nodes[1].evidence = Evidence::of("unknown");
+        let (view, _) = view(&mission, &ViewOptions::default());
+        let labels: Vec<_> = view.items.iter().map(|i| &*i.label).collect();
+        assert_eq!(labels, ["/boss", "? ×3"]);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Findings, Key, Reliability};
+use crate::base::time::Span;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Name};
 
@@ -13,6 +14,8 @@ pub(crate) struct Closed {
     all: BTreeMap<Name, BTreeSet<Name>>,
     /// By node: all that a roscpp node publishes.
     published: BTreeMap<Name, BTreeSet<Name>>,
+    /// Nodes whose lists were heard again long after the first: a list made at a node's start may lack what comes later.
+    settled: BTreeSet<Name>,
     /// Topics whose every message names its publisher, with all of these.
     told: BTreeMap<Name, BTreeSet<Name>>,
 }
@@ -20,9 +23,20 @@ pub(crate) struct Closed {
 impl Closed {
     pub(crate) fn new(known: &Findings<'_>) -> Self {
         let mut closed = Self::default();
+        let mut heard: BTreeMap<Name, Span> = BTreeMap::new();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
             let word = SOURCES.get(fact.source).map_or("", |s| s.word);
+            if let (Claim::Lists(node, _) | Claim::Publish(node, _), Some((first, last)), true) =
+                (fact.claim, known.facts.times.bounds(fact.times), listed)
+            {
+                let span = heard.entry(node).or_insert(Span {
+                    start: first,
+                    end: last,
+                });
+                span.start = span.start.min(first);
+                span.end = span.end.max(last);
+            }
             match (fact.claim, word) {
                 (Claim::Lists(node, topic), _)
                 | (Claim::Publish(node, topic) | Claim::Subscribe(node, topic), "rosgraph") => {
@@ -34,6 +48,8 @@ impl Closed {
                 _ => {}
             }
         }
+        heard.retain(|_, span| span.nanos() >= SETTLED_NS);
+        closed.settled = heard.into_keys().collect();
         closed.tell(known);
         closed
     }
@@ -53,19 +69,39 @@ impl Closed {
         self.told.retain(|topic, _| !untold.contains(topic));
     }
 
-    /// Whether some complete list leaves this edge out; nothing is known against nodes and topics.
-    pub(crate) fn denies(&self, what: Key) -> bool {
-        let lacks = |lists: &BTreeMap<Name, BTreeSet<Name>>, of: Name, member: Name| {
-            lists.get(&of).is_some_and(|list| !list.contains(&member))
+    /// Whether every message of a topic names its publisher, and none this one.
+    pub(crate) fn headers_deny(&self, what: Key) -> bool {
+        match what {
+            Key::Publish(node, topic) => lacks(&self.told, topic, node),
+            _ => false,
+        }
+    }
+
+    /// Whether a complete list that was heard long after its node's start leaves this edge out.
+    pub(crate) fn settled_lists_deny(&self, what: Key) -> bool {
+        let node = match what {
+            Key::Publish(node, _) | Key::Subscribe(_, node) => node,
+            Key::Node(_) | Key::Topic(_) => return false,
         };
+        self.settled.contains(&node) && self.lists_deny(what)
+    }
+
+    /// Whether some complete list leaves this edge out; nothing is known against nodes and topics.
+    pub(crate) fn lists_deny(&self, what: Key) -> bool {
         match what {
             Key::Publish(node, topic) => {
-                lacks(&self.all, node, topic)
-                    || lacks(&self.published, node, topic)
-                    || lacks(&self.told, topic, node)
+                lacks(&self.all, node, topic) || lacks(&self.published, node, topic)
             }
             Key::Subscribe(topic, node) => lacks(&self.all, node, topic),
             Key::Node(_) | Key::Topic(_) => false,
         }
     }
+}
+
+/// A node has made its connections so long after its start, in nanoseconds.
+const SETTLED_NS: i64 = 5_000_000_000;
+
+/// Whether there is a list of this, without that member.
+fn lacks(lists: &BTreeMap<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
+    lists.get(&of).is_some_and(|list| !list.contains(&member))
 }

@@ -43,6 +43,8 @@ struct Contract {
     /// As a node names it: `scan` in its namespace, `~/map` below its name, `/tf` for all.
     topic: String,
     kind: String,
+    /// Whether nobody else publishes this type.
+    owns: bool,
     package: String,
 }
 
@@ -56,7 +58,7 @@ fn contracts() -> Vec<Contract> {
 }
 
 fn contract(row: &[String]) -> Option<Contract> {
-    let [node, files, ros, role, topic, kind, package, _source] = row else {
+    let [node, files, ros, role, topic, kind, owns, package, _source] = row else {
         return None;
     };
     Some(Contract {
@@ -66,6 +68,7 @@ fn contract(row: &[String]) -> Option<Contract> {
         publishes: role == "publishes",
         topic: topic.clone(),
         kind: kind.clone(),
+        owns: owns == "yes",
         package: package.clone(),
     })
 }
@@ -133,6 +136,26 @@ fn words(known: &Findings<'_>, node: Name, contract: &Contract) -> String {
     )
 }
 
+/// The types that one well-known program alone publishes.
+pub(crate) struct Owners(Vec<Contract>);
+
+impl Owners {
+    /// As the table tells.
+    pub(crate) fn new() -> Self {
+        Self(contracts().into_iter().filter(|c| c.owns).collect())
+    }
+
+    /// The node that publishes messages of this type, as it is called by default: in the namespace in which it would
+    /// publish `topic`.
+    pub(crate) fn node(&self, kind: &str, topic: &str) -> Option<String> {
+        let row = self.0.iter().find(|c| c.kind == kind)?;
+        let space = topic.strip_suffix(row.topic.as_str());
+        let space = space.filter(|_| !row.topic.starts_with('/'));
+        let space = space.map_or("", |space| space.trim_end_matches('/'));
+        Some(format!("{space}/{}", row.node))
+    }
+}
+
 /// The files that each node logs from.
 fn files(known: &Findings<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
     let mut files: BTreeMap<Name, BTreeSet<Arc<str>>> = BTreeMap::new();
@@ -175,7 +198,8 @@ mod tests {
         assert!(rows.len() > 60);
         for (line, row) in rows.iter().skip(1) {
             let contract = contract(row).unwrap_or_else(|| panic!("line {line} has other columns"));
-            assert!(row[7].starts_with("https://"), "line {line} has no source");
+            let has_source = row[8].starts_with("https://github.com/") && row[8].contains("/blob/");
+            assert!(has_source, "line {line} names no file");
             assert!(
                 ["publishes", "subscribes"].contains(&&*row[3]),
                 "line {line}"
@@ -198,6 +222,7 @@ mod tests {
             "subscribes",
             "scan",
             "a/B",
+            "",
             "amcl",
             "https://x",
         ];
@@ -211,6 +236,16 @@ mod tests {
         ));
         assert!(!is_meant(&contract, "/r1/amcl", Some(&files("node.py"))));
         assert!(!is_meant(&contract, "/r1/amcl_2", None));
+    }
+
+    #[test]
+    fn a_peculiar_type_tells_its_program() {
+        let owners = Owners::new();
+        let owner = |topic| owners.node("turtlesim/Pose", topic);
+        assert_eq!(owner("/turtle1/pose").as_deref(), Some("/turtlesim"));
+        assert_eq!(owner("/r1/turtle1/pose").as_deref(), Some("/r1/turtlesim"));
+        assert_eq!(owner("/pose").as_deref(), Some("/turtlesim"));
+        assert_eq!(owners.node("std_msgs/String", "/chatter"), None);
     }
 
     #[test]

@@ -59,8 +59,8 @@ pub(crate) fn assemble(
         sent: BTreeMap::new(),
     };
     all.count_sent();
-    for what in tracks.keys() {
-        if let Key::Publish(_, topic) = what {
+    for (what, track) in tracks {
+        if let (Key::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
             *all.publishers.entry(*topic).or_default() += 1;
         }
     }

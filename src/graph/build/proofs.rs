@@ -16,7 +16,7 @@ use crate::evidence::proof::{Findings, Key, Proof, Validity};
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::nearest::nearest;
 use crate::evidence::topology::{Element, Entry};
-use crate::evidence::{Degree, EvidenceLine, SOURCES};
+use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
 
 /// All proofs and stated values, and which of the user's names are strange. Names are numbered anew in the order of their texts.
 pub(crate) fn prove(
@@ -38,6 +38,7 @@ pub(crate) fn prove(
     }
     let code = options.code.as_ref();
     let told_by_code = code.map(|code| matching::conclude(code, &mut known));
+    unknown::conclude(&mut known);
     explain(&mut known, &collected.messages);
     if let Some(error) = known.failed {
         return Err(error);

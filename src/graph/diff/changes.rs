@@ -69,12 +69,12 @@ impl<'a> Changes<'a> {
             self.handed_over(graph, graph, &mut Vec::new());
         }
         self.before = Some((span, graph.clone()));
-        changes.retain(|change| !self.is_from_code(change));
+        changes.retain(|change| !self.is_timeless(change));
         changes
     }
 
-    /// Whether only source code speaks for what came or went, which does not know when.
-    fn is_from_code(&self, change: &Change) -> bool {
+    /// Whether nothing that speaks for what came or went knows when.
+    fn is_timeless(&self, change: &Change) -> bool {
         let all = self.elements;
         match change {
             Change::Added { what, .. } | Change::Removed { what, .. } => match *what {
@@ -83,7 +83,7 @@ impl<'a> Changes<'a> {
                 Element::Publish(id) => all.publishes[id as usize].evidence,
                 Element::Subscribe(id) => all.subscribes[id as usize].evidence,
             }
-            .is_code_only(),
+            .is_timeless(),
             _ => false,
         }
     }

@@ -71,7 +71,7 @@ fn ros2(info: &Info) -> Vec<String> {
 /// What files of the user's add to the bag as it is.
 fn from_files(info: &Info) -> Vec<String> {
     let mut advice = Vec::new();
-    let named = info.nodes.len();
+    let named = info.nodes_by_degree.total();
     if named > 0 && Evidence::all_words().any(|word| word == "source") {
         advice.push(format!(
             "`--source FOLDER` reads from their source code what the nodes known by name ({named}) publish and subscribe"

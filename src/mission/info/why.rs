@@ -1,5 +1,6 @@
 //! Explains an element: what proves it, when it lived, and each piece of evidence with its time and text.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::base::error::{Error, Result};
@@ -10,7 +11,8 @@ use crate::graph::{Edge, Element};
 use crate::mission::Mission;
 
 /// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each with its
-/// evidence and life, then the `pieces` in order of time. Plain text, a line each; names are as recorded.
+/// evidence and life, then the `pieces` in order of time. Plain text, a line each; what is said again and again stands
+/// once, with how often. Names are as recorded.
 ///
 /// # Errors
 /// [`Error::Usage`] if the mission has no such element, naming those that come close.
@@ -24,20 +26,54 @@ pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Resu
         // Writing to a string cannot fail.
         let _ = describe(&mut out, mission, element, &title);
     }
-    for piece in pieces {
-        let at = piece.time.map_or_else(
-            || "always".to_owned(),
-            |time| words::offset(mission.offset(time)),
-        );
+    let at = |time| words::offset(mission.offset(time));
+    for said in said(pieces) {
+        let piece = said.piece;
+        let first = piece.time.map_or_else(|| "always".to_owned(), at);
+        let again = match said.last {
+            Some(last) if said.count > 1 => format!(" ({}×, until {})", said.count, at(last)),
+            _ => String::new(),
+        };
         let _ = writeln!(
             out,
-            "{at:>12}  {:<18} {:<9} {}",
+            "{first:>12}  {:<18} {:<9} {}{again}",
             piece.source,
             piece.degree.word(),
             visible(&piece.text)
         );
     }
     Ok(out)
+}
+
+/// The same piece of evidence, once or more often.
+struct Said<'a> {
+    /// The first of them.
+    piece: &'a EvidenceLine,
+    count: usize,
+    /// When it was said last.
+    last: Option<Stamp>,
+}
+
+/// Pieces that differ in nothing but their time as one each, in the order of their first.
+fn said(pieces: &[EvidenceLine]) -> Vec<Said<'_>> {
+    let mut all: Vec<Said<'_>> = Vec::new();
+    let mut places = BTreeMap::new();
+    for piece in pieces {
+        let key = (piece.source, piece.degree, piece.text.as_str());
+        let place = *places.entry(key).or_insert(all.len());
+        match all.get_mut(place) {
+            Some(said) => {
+                said.count += 1;
+                said.last = said.last.max(piece.time);
+            }
+            None => all.push(Said {
+                piece,
+                count: 1,
+                last: piece.time,
+            }),
+        }
+    }
+    all
 }
 
 /// Everything that is named, with how to call it.
@@ -152,4 +188,30 @@ fn unknown(mission: &Mission, names: &[String]) -> Error {
         names => format!("nothing connects `{}`", names.join("` and `")),
     };
     Error::usage(what, hint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evidence::Degree;
+
+    #[test]
+    fn what_is_said_again_stands_once() {
+        let piece = |time, text: &str| EvidenceLine {
+            time: Some(Stamp(time)),
+            source: "rosout",
+            degree: Degree::Stated,
+            text: text.to_owned(),
+        };
+        let pieces = [piece(1, "hello"), piece(2, "more"), piece(3, "hello")];
+        let said = said(&pieces);
+        let told: Vec<_> = said
+            .iter()
+            .map(|s| (s.piece.text.as_str(), s.count, s.last))
+            .collect();
+        assert_eq!(
+            told,
+            [("hello", 2, Some(Stamp(3))), ("more", 1, Some(Stamp(2)))]
+        );
+    }
 }

@@ -32,7 +32,7 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
         tell_role(told, drafts, &mut wholes, turns);
     }
     let edges = told.elements.publishes.iter().zip(&told.lives.publishes);
-    let recorded = |what: Element| !told.is_only_code(what);
+    let recorded = |what: Element| !told.is_timeless(what);
     for (id, (edge, known)) in (0..)
         .zip(edges)
         .filter(|(id, _)| recorded(Element::Publish(*id)))
@@ -91,7 +91,7 @@ type Turns = Vec<(Stamp, Turn, NodeId, Bound)>;
 fn turns_by_role<'a>(told: &Told<'a>) -> BTreeMap<&'a str, Turns> {
     let mut all: BTreeMap<&str, Turns> = BTreeMap::new();
     let nodes = (0..).zip(told.elements.nodes.iter().zip(&told.lives.nodes));
-    for (id, (node, known)) in nodes.filter(|(id, _)| !told.is_only_code(Element::Node(*id))) {
+    for (id, (node, known)) in nodes.filter(|(id, _)| !told.is_timeless(Element::Node(*id))) {
         let of = all.entry(&*node.role).or_default();
         of.extend(turns(known).map(|(turn, at)| (at.time, turn, id, at)));
     }

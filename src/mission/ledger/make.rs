@@ -103,10 +103,9 @@ impl Told<'_> {
         }
     }
 
-    /// Whether only source code says that there is such an element: code does not know when.
-    pub(crate) fn is_only_code(&self, what: Element) -> bool {
-        let mut words = self.elements.evidence(what).words().peekable();
-        words.peek().is_some() && words.all(|word| matches!(word, "source" | "source_only"))
+    /// Whether nothing that speaks for an element knows when it was there.
+    pub(crate) fn is_timeless(&self, what: Element) -> bool {
+        self.elements.evidence(what).is_timeless()
     }
 
     /// Whether an element is housekeeping or the recorder's.

@@ -1,0 +1,71 @@
+//! Publishers that the bag counts and nothing names. ROS 2 stores with each topic how many offered it, so that a box of
+//! its own stands for those that are left, with a question mark: `/scan ?`, `/scan ? ×2`. Where one well-known program alone
+//! publishes messages of the topic's type, the box bears its name: `/turtlesim ?`.
+//!
+//! Runs when all else is known, for such a box only stands in for what nobody knows better.
+
+use crate::base::name::is_quiet;
+use crate::base::words::count;
+use crate::evidence::SOURCES;
+use crate::evidence::claim::{Degree, Name};
+use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::source::contract::Owners;
+
+/// Adds a box for every recorded topic that lacks publishers.
+pub(crate) fn conclude(known: &mut Findings<'_>) {
+    let owners = Owners::new();
+    for topic in known.topics_of(|_| true) {
+        let text = known.text(topic);
+        if is_quiet(&text) || text.split('/').any(|part| part.starts_with('_')) {
+            continue;
+        }
+        let named = known.publishers(topic).count();
+        let offered = known.offers(topic).map_or(0, |n| n as usize);
+        let owner = owners
+            .node(&known.kind(topic), &text)
+            .filter(|_| named == 0);
+        let missing = offered.saturating_sub(named);
+        if let Some(owner) = owner {
+            let kind = known.kind(topic);
+            add(known, "owned_type", &format!("{owner} ?"), topic, &|| {
+                format!(
+                    "nothing names the publisher of {text}; only {owner} is known to publish {kind}"
+                )
+            });
+        } else if missing > 0 {
+            let times = if missing > 1 {
+                format!(" ×{missing}")
+            } else {
+                String::new()
+            };
+            add(
+                known,
+                "unknown",
+                &format!("{text} ?{times}"),
+                topic,
+                &|| {
+                    let counted = count(offered, "publisher");
+                    format!(
+                        "the recording counts {counted} of {text}, of which nothing names {missing}"
+                    )
+                },
+            );
+        }
+    }
+}
+
+/// Adds a box with its edge.
+fn add(known: &mut Findings<'_>, word: &str, name: &str, topic: Name, words: &dyn Fn() -> String) {
+    let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
+    let node = known.facts.name(name);
+    let edge = (Key::Publish(node, topic), Validity::Like(Key::Node(node)));
+    for (what, when) in [(Key::Node(node), Validity::Whole), edge] {
+        let proof = Proof {
+            what,
+            source,
+            degree: Degree::Declared,
+            when,
+        };
+        known.because(proof, None, |_| words());
+    }
+}
