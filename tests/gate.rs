@@ -186,6 +186,38 @@ fn a_second_healthy_run_keeps_it_too_and_each_fault_breaks_what_it_should() {
 }
 
 #[test]
+fn other_recordings_of_one_mission_keep_its_expectation() {
+    let pairs = [
+        (
+            "data/warehouse/warehouse.bag",
+            "data/warehouse/warehouse_lz4.bag",
+        ),
+        (
+            "data/bags/mission/mission.bag",
+            "data/bags/mission/killed_bz2.bag.active",
+        ),
+        ("data/mini/mini_lz4.bag", "data/mini/mini_bz2.bag"),
+    ];
+    let dir = tempfile::tempdir().unwrap();
+    for (one, other) in pairs {
+        let (Some(one), Some(other)) = (shared(one), shared(other)) else {
+            continue;
+        };
+        let (code, said) = run(
+            dir.path(),
+            &["baseline", one.to_str().unwrap(), "-o", "g.yaml"],
+        );
+        assert_eq!(code, 0, "{said}");
+        let (code, said) = run(
+            dir.path(),
+            &["check", other.to_str().unwrap(), "--expect", "g.yaml"],
+        );
+        assert!(matches!(code, 0 | 3) && !said.contains("error["), "{said}");
+        assert!(!said.contains("warning["), "{said}");
+    }
+}
+
+#[test]
 fn what_several_runs_have_in_common_holds_in_each() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();

@@ -231,10 +231,10 @@ impl<'a> Facts<'a> {
         self.is_rewritten
     }
 
-    /// Whether the bag names nodes at all.
+    /// Whether the bag names nodes, so that one that it does not name is not there: not where a tool merged senders.
     pub(crate) fn names_nodes(&self) -> bool {
-        self.roles()
-            .any(|(_, nodes)| self.is_sure(nodes) && !self.is_tool(nodes))
+        let is_named = |nodes: &[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
+        !self.is_rewritten && self.roles().any(|(_, nodes)| is_named(nodes))
     }
 
     /// Whether the bag tells all publishers of a topic.

@@ -41,7 +41,8 @@ pub(crate) const KINDS: &[(Kind, &str, &str, &str)] = &[
         "node-missing",
         "A node that is expected is not in the bag.",
         "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
-         folded). Undecidable in a bag that names no node at all. `optional: true` asks for nothing.",
+         folded). Undecidable in a bag that names no node at all, or whose senders a tool has merged. `optional: true` asks \
+         for nothing.",
     ),
     (
         Kind::NodeForbidden,

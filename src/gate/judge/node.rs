@@ -88,15 +88,7 @@ impl Judge<'_> {
             return match (facts.optional, self.facts.names_nodes()) {
                 (true, _) => Vec::new(),
                 (false, true) => vec![self.missing(pattern, at)],
-                (false, false) => {
-                    vec![Finding::unknown(
-                    Kind::NodeMissing,
-                    name,
-                    at,
-                    format!("cannot tell whether {name} is there: this bag names no nodes"),
-                )
-                .hint("record /rosout and /parameter_events, or /rosgraph; see `bagreel info`")]
-                }
+                (false, false) => vec![self.unnamed(name, at)],
             };
         }
         if facts.may_end {
@@ -106,6 +98,23 @@ impl Judge<'_> {
             .iter()
             .filter_map(|(role, nodes)| self.gone(role, nodes, at))
             .collect()
+    }
+
+    /// That the bag does not tell whether a node is there.
+    fn unnamed(&self, name: &str, at: Place) -> Finding {
+        let (why, hint) = if self.facts.is_rewritten() {
+            (
+                "a tool merged the senders of this bag",
+                "check the bag that was recorded",
+            )
+        } else {
+            (
+                "this bag names no nodes",
+                "record /rosout and /parameter_events, or /rosgraph; see `bagreel info`",
+            )
+        };
+        let says = format!("cannot tell whether {name} is there: {why}");
+        Finding::unknown(Kind::NodeMissing, name, at, says).hint(hint)
     }
 
     fn missing(&self, pattern: &Pattern, at: Place) -> Finding {
