@@ -19,15 +19,15 @@ use crate::base::{budget, file};
 use crate::cli::terminal::Terminal;
 use crate::evidence::code::{SourceCode, Version};
 use crate::evidence::collector;
+use crate::evidence::conclude;
 use crate::evidence::topology;
 use crate::export::Output;
-use crate::graph;
 use crate::graph::window::{Division, Length};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::mission::{Mission, events};
 use crate::pipeline::{
-    Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
-    survey_file,
+    Drawing, Phases, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read,
+    survey, survey_file,
 };
 use args::{
     Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs,
@@ -138,14 +138,15 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
             },
             ..collector::Options::default()
         },
-        graph: graph::Options {
-            grace: graph.grace.unwrap_or(0) as usize,
+        grace: graph.grace.unwrap_or(0) as usize,
+        conclude: conclude::Options {
             roles: graph.roles,
             topology: topology::read_all(&graph.topology)?,
             code: None,
         },
         code: source_code(graph)?,
         rate_change: graph.rate_change,
+        phases: Phases::Found,
     })
 }
 
@@ -246,7 +247,7 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
     for remark in done.written.iter().flat_map(|w| &w.remarks) {
         terminal.note(remark);
     }
-    terminal.notices(&mission.notices);
+    terminal.notices(&done.notices);
     if timings {
         terminal.timings();
     }
@@ -268,6 +269,8 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
 /// The work that `render` was asked to do.
 fn job(args: &RenderArgs) -> Result<Render, Error> {
     let reading = reading(&args.inputs, &args.time, &args.graph)?;
+    let phases = look::phases(&args.figure.phases, args.look.captions.as_deref())?;
+    let reading = reading.with_phases(phases);
     let title = args
         .look
         .title
@@ -302,8 +305,6 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         },
         kept: kept(args),
         outputs,
-        captions: args.look.captions.clone(),
-        phases: look::phases(&args.figure.phases),
         is_filtered: args.view.filtered,
         reading,
     })

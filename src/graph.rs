@@ -15,7 +15,7 @@ use crate::base::name::{NodeName, TopicName};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 
-pub use build::{Built, Options, build};
+pub use build::{Built, History, TopicCount, Windowed, build, counts, graphs, history};
 
 /// A node's place in [`Elements::nodes`].
 pub type NodeId = u32;

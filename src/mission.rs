@@ -8,14 +8,13 @@ pub mod phases;
 
 mod json;
 pub use json::read::read_json;
-pub use json::write::write_json;
+pub use json::write::{Json, write_json};
 
 use crate::bag::Report;
 use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
-use crate::graph::lives::Lives;
 use crate::graph::{Elements, Graph, NodeId};
 
 pub use activity::Activity;
@@ -94,17 +93,6 @@ pub struct Place {
 }
 
 impl Mission {
-    /// Tells what happened by the lives of all elements, and what changed from each window to the next because of it. A
-    /// rate must change by more than the share `rate_change`.
-    pub(crate) fn tell(&mut self, lives: &Lives, rate_change: f64) {
-        self.ledger.entries = ledger::make(&ledger::Told {
-            elements: &self.elements,
-            lives,
-            rate_change,
-        });
-        self.explain();
-    }
-
     /// Finds what changed from each window to the next, by the ledger.
     pub(crate) fn explain(&mut self) {
         let windows = self.windows.iter().map(|w| (w.span, &w.graph));

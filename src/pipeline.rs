@@ -1,17 +1,19 @@
 //! The whole program in the order it happens: read, divide, build, compare, draw, write.
 
-mod captions;
+mod collect;
 mod draw;
 mod export;
 mod extract;
 mod figure;
+mod phases;
 mod read;
 mod survey;
+mod verify;
 
 pub use draw::Drawing;
 pub use export::{Render, Rendered, check, render, show};
 pub use extract::{Extract, Extracted, extract};
-pub use figure::Phases;
+pub use phases::Phases;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};
 

@@ -30,13 +30,15 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
+        &["clock", "message", "rhythm", "roles", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
-        &["kinds", "proof"],
+        &["kinds", "proof", "values"],
         &["code", "publishers", "source"],
         &["collector"],
+        &["restarts"],
+        &["conclude"],
     ]),
-    ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
+    ("graph", &[&["lives", "sending"], &["build", "diff", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "counts", "filter", "lives", "names", "roles", "runs", "settle", "union"],
@@ -56,7 +58,12 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["animated_svg", "apng", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
         &["report", "run", "tables"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
+    ("pipeline", &[
+        &["collect", "draw", "phases"],
+        &["figure", "verify"],
+        &["read"],
+        &["export", "extract", "survey"],
+    ]),
     ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract"]]),
 ];
 

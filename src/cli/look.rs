@@ -138,11 +138,16 @@ pub(super) fn figure(args: &FigureArgs, look: &LookArgs) -> Result<Option<Figure
 }
 
 /// Where phases come from.
-pub(super) fn phases(word: &str) -> Phases {
-    match word {
-        "auto" => Phases::Found,
-        "none" => Phases::None,
-        file => Phases::File(file.into()),
+pub(super) fn phases(word: &str, captions: Option<&str>) -> Result<Phases> {
+    match (word, captions) {
+        ("auto", None) => Ok(Phases::Found),
+        ("auto", Some(from)) => Ok(Phases::Captions(from.to_owned())),
+        ("none", None) => Ok(Phases::None),
+        (file, None) => Ok(Phases::File(file.into())),
+        (_, Some(_)) => Err(Error::usage(
+            "`--captions` and `--phases` both tell the phases",
+            "give one of them",
+        )),
     }
 }
 

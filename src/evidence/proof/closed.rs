@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Findings, Key, Reliability};
+use super::{Conclusions, Key, Reliability};
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Name};
 
@@ -18,7 +18,7 @@ pub(crate) struct Closed {
 }
 
 impl Closed {
-    pub(crate) fn new(known: &Findings<'_>) -> Self {
+    pub(crate) fn new(known: &Conclusions<'_>) -> Self {
         let mut closed = Self::default();
         for fact in &known.facts.list {
             let listed = fact.snapshot.is_some();
@@ -38,7 +38,7 @@ impl Closed {
         closed
     }
 
-    fn tell(&mut self, known: &Findings<'_>) {
+    fn tell(&mut self, known: &Conclusions<'_>) {
         let mut untold = BTreeSet::new();
         for stream in known.streams {
             match stream.publisher {

@@ -25,35 +25,55 @@ pub(crate) const OLD_SCHEMA: &str = "bagreel.evolution/1";
 /// # Errors
 /// Whatever `out` refuses.
 pub fn write_json(mission: &Mission, out: &mut dyn Write) -> std::io::Result<()> {
-    let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Lines::default());
-    mission.serialize(&mut serializer)?;
-    out.write_all(b"\n")
+    let places = mission.layout.as_ref();
+    Json { mission, places }.write(out)
 }
 
-impl Serialize for Mission {
+/// A mission as it is written.
+pub struct Json<'a> {
+    /// The data.
+    pub mission: &'a Mission,
+    /// Where everything was drawn, if it was.
+    pub places: Option<&'a Places>,
+}
+
+impl Json<'_> {
+    /// Writes it, as [`write_json`] does.
+    ///
+    /// # Errors
+    /// Whatever `out` refuses.
+    pub fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Lines::default());
+        self.serialize(&mut serializer)?;
+        out.write_all(b"\n")
+    }
+}
+
+impl Serialize for Json<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self { mission, places } = *self;
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("schema", SCHEMA)?;
-        map.serialize_entry("bags", &List(self.bags.iter().map(BagRow::new)))?;
-        map.serialize_entry("start_ns", &self.span.start.0)?;
-        map.serialize_entry("end_ns", &self.span.end.0)?;
-        map.serialize_entry("messages", &self.messages)?;
-        map.serialize_entry("period_ns", &self.period.nanos())?;
-        map.serialize_entry("step_ns", &self.step.nanos())?;
-        let windows = self.windows.iter().map(|window| WindowOf {
+        map.serialize_entry("bags", &List(mission.bags.iter().map(BagRow::new)))?;
+        map.serialize_entry("start_ns", &mission.span.start.0)?;
+        map.serialize_entry("end_ns", &mission.span.end.0)?;
+        map.serialize_entry("messages", &mission.messages)?;
+        map.serialize_entry("period_ns", &mission.period.nanos())?;
+        map.serialize_entry("step_ns", &mission.step.nanos())?;
+        let windows = mission.windows.iter().map(|window| WindowOf {
             window,
-            elements: &self.elements,
+            elements: &mission.elements,
         });
-        map.serialize_entry("ledger", &List(entries(&self.ledger, &self.elements)))?;
-        let phases = self.ledger.phases.iter().map(PhaseRow::from);
+        map.serialize_entry("ledger", &List(entries(&mission.ledger, &mission.elements)))?;
+        let phases = mission.ledger.phases.iter().map(PhaseRow::from);
         map.serialize_entry("phases", &List(phases))?;
         map.serialize_entry("windows", &List(windows))?;
-        if let Some(places) = &self.layout {
+        if let Some(places) = places {
             map.serialize_entry("layout", &LayoutRow::new(places))?;
         }
         map.serialize_entry(
             "notices",
-            &List(self.notices.iter().map(|n| NoticeRow {
+            &List(mission.notices.iter().map(|n| NoticeRow {
                 kind: n.kind.word(),
                 count: n.count,
                 text: n.text,
