@@ -18,9 +18,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let mission = read(&reading)?;
     let elements = &mission.elements;
-    for window in &mission.windows {
+    for (window, graph) in mission.each() {
         println!("{}", words::offset(mission.offset(window.span.start)));
-        for state in &window.graph.publishes {
+        for state in &graph.publishes {
             let edge = &elements.publishes[state.id as usize];
             if elements.topics[edge.topic as usize].name.as_str() != topic {
                 continue;

@@ -126,6 +126,7 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
             start: time.start,
             end: time.end,
             align: time.align,
+            cut: time.cut,
         },
         skip_unchanged: time.skip_unchanged,
         collect: collector::Options {
@@ -205,7 +206,7 @@ fn render(args: &RenderArgs, terminal: &mut Terminal) -> Result<u8, Error> {
         return watch(args, job, terminal);
     }
     let done = crate::pipeline::render(&job, terminal)?;
-    report(&done, args.timings, terminal);
+    report(&done, args, terminal);
     Ok(code(&done.mission))
 }
 
@@ -234,7 +235,7 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
             crate::pipeline::show(&job, mission.clone(), terminal)
         });
         match drawn {
-            Ok(done) => report(&done, args.timings, terminal),
+            Ok(done) => report(&done, args, terminal),
             Err(error) => terminal.error(&error),
         }
     }
@@ -242,7 +243,8 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
 }
 
 /// Tells what was written, how many windows and changes, in what time.
-fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
+fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
+    let (timings, is_cut) = (args.timings, args.time.cut.is_some());
     let mission = &done.mission;
     for remark in done.written.iter().flat_map(|w| &w.remarks) {
         terminal.note(remark);
@@ -259,10 +261,14 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
     let changes: usize = mission.windows.iter().map(|w| w.changes.len()).sum();
     let windows = mission.windows.len();
     let seconds = terminal.seconds();
+    let of = if is_cut {
+        String::new()
+    } else {
+        format!(" of {}", mission.period)
+    };
     terminal.say(&format!(
-        "wrote {}: {windows} windows of {}, {changes} changes, in {seconds:.1} s",
+        "wrote {}: {windows} windows{of}, {changes} changes, in {seconds:.1} s",
         names.join(", "),
-        mission.period
     ));
 }
 
@@ -356,6 +362,12 @@ fn default_output(inputs: &[Input], is_figure: bool) -> String {
 }
 
 fn log(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+    if args.time.cut.is_some() {
+        return Err(Error::usage(
+            "`--cut` divides time into windows, of which the log knows nothing",
+            "leave it out; `--phases` puts the phases into the log",
+        ));
+    }
     let mission = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
     let options = events::LogOptions {
         parts: args.parts,

@@ -5,6 +5,7 @@
 
 mod build;
 pub mod diff;
+mod graphs;
 pub mod lives;
 pub mod sending;
 pub mod window;
@@ -14,6 +15,11 @@ use std::sync::Arc;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
+
+#[cfg(test)]
+pub(crate) use graphs::tests as graphs_for_tests;
+pub(crate) use graphs::{Column, ColumnWriter, GraphsWriter, Number, Row};
+pub use graphs::{Graphs, Iter};
 
 pub use build::{Built, History, TopicCount, Windowed, build, counts, graphs, history};
 
@@ -255,6 +261,15 @@ impl Elements {
         }
         .unwrap_or_default()
     }
+}
+
+/// Windows shorter than this have no rates.
+const SHORTEST_NS: i64 = 1_000_000;
+
+/// The rate of so many messages in a window; `None` below 1 ms.
+pub(crate) fn per_second(count: u64, window: Span) -> Option<f64> {
+    let nanos = window.nanos();
+    (nanos >= SHORTEST_NS).then(|| count as f64 / (nanos as f64 / 1e9))
 }
 
 #[cfg(test)]

@@ -15,8 +15,8 @@
 //! let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 //! let reading = Reading { inputs: vec![Input::Path(bag.into())], ..Reading::default() };
 //! let mission = read(&reading)?;
-//! for window in &mission.windows {
-//!     println!("{}: {} nodes, {} changes", window.index, window.graph.nodes.len(), window.changes.len());
+//! for (window, graph) in mission.each() {
+//!     println!("{}: {} nodes, {} changes", window.index, graph.nodes.len(), window.changes.len());
 //! }
 //! # assert!(mission.windows.len() >= 5 && mission.elements.nodes.len() > 5);
 //! let job = Render::new(reading, vec![Output::parse(&page, None)?])?;

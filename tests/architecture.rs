@@ -38,7 +38,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["restarts"],
         &["conclude"],
     ]),
-    ("graph", &[&["lives", "sending"], &["build", "diff", "window"]]),
+    ("graph", &[&["graphs", "lives", "sending"], &["build", "diff", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "counts", "filter", "lives", "names", "roles", "runs", "settle", "union"],

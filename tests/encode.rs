@@ -64,6 +64,7 @@ fn mission(windows: usize) -> (Mission, View) {
         step: period,
         elements: graph::Elements::default(),
         windows: Vec::new(),
+        graphs: bagreel::graph::Graphs::default(),
         ledger: bagreel::mission::Ledger::default(),
         activity: bagreel::mission::Activity::default(),
         layout: None,

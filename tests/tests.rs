@@ -10,6 +10,7 @@
 
 mod architecture;
 mod cli;
+mod counts;
 mod damaged;
 mod docs;
 mod edges;
@@ -29,4 +30,5 @@ mod story;
 mod support;
 mod tables;
 mod telling;
+mod values;
 mod warehouse;

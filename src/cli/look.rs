@@ -99,6 +99,12 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::Options> {
         hold_changes: args.hold_changes,
         max_bytes: args.max_bytes,
         dot_profile: Profile::parse(&args.dot_profile)?,
+        json: match args.json.as_deref() {
+            Some("windows") => options::Form::Windows,
+            Some(_) => options::Form::Runs,
+            None => options::Form::Auto,
+        },
+        has_runs: args.runs,
         strip: strip.transpose()?,
         links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
         ..options::Options::default()

@@ -25,6 +25,7 @@ pub(crate) fn start<'a>(
         json: Json {
             mission: sequence.data,
             places: sequence.places,
+            form: sequence.options.json,
         },
         target: target.clone(),
     }))

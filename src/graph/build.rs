@@ -57,7 +57,7 @@ pub fn build(
     let windowed = graphs(recorded, &findings, &history, windows, grace)?;
     Ok(Built {
         elements: history.elements,
-        graphs: windowed.graphs,
+        graphs: windowed.graphs.iter().collect(),
         messages: windowed.messages,
         lives: history.lives,
         notices: findings.notices,

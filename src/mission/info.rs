@@ -264,8 +264,7 @@ impl BestDegrees {
             publishes: vec![Degree::Declared; elements.publishes.len()],
             subscribes: vec![Degree::Declared; elements.subscribes.len()],
         };
-        for window in &mission.windows {
-            let graph = &window.graph;
+        for graph in &mission.graphs {
             graph
                 .nodes
                 .iter()
@@ -317,7 +316,7 @@ fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
 /// Messages that each node sent; `None` where no count is known.
 fn sent(mission: &Mission) -> Vec<Option<u64>> {
     let mut sent: Vec<Option<u64>> = vec![None; mission.elements.nodes.len()];
-    for state in mission.windows.iter().flat_map(|w| &w.graph.publishes) {
+    for state in mission.graphs.iter().flat_map(|graph| graph.publishes) {
         let node: NodeId = mission.elements.publishes[state.id as usize].node;
         if let Some(count) = state.count {
             *sent[node as usize].get_or_insert(0) += count;
@@ -344,8 +343,8 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
             activity: vec![0; mission.windows.len()],
         })
         .collect();
-    for window in &mission.windows {
-        for state in &window.graph.topics {
+    for (window, graph) in mission.each() {
+        for state in &graph.topics {
             let topic = &mut topics[state.id as usize];
             topic.count += state.count;
             topic.bytes = state

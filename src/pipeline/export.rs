@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::draw::{Composed, compose, places, unplaced};
+use super::draw::{Composed, compose, places, unplaced, unseen};
 use super::{Drawing, Phases, Reading, Stage, Watch, read};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
@@ -16,7 +16,7 @@ use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::Sequence;
 use crate::export::{self, OneDrawing, Output, Written};
-use crate::mission::Mission;
+use crate::mission::{Form, Mission};
 use crate::view::{View, filtered};
 
 /// The whole job of `bagreel render`.
@@ -80,12 +80,31 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 /// As [`export::check`].
 pub fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
+    check_forms(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
         Input::Stdin => None,
     });
     let kept: Vec<PathBuf> = inputs.chain(&job.kept).cloned().collect();
     export::check(&job.outputs, &kept)
+}
+
+/// What is said of how data is written needs an output that it is written to.
+fn check_forms(job: &Render) -> Result<()> {
+    let none = |words: &[&str]| !job.outputs.iter().any(|o| words.contains(&o.format.word));
+    let refused = |flag: &str, output: &str| {
+        Err(Error::usage(
+            format!("`{flag}` says how data is written, and no output holds it"),
+            format!("write it with `-o {output}`"),
+        ))
+    };
+    if job.sequence.json != Form::Auto && none(&["json"]) {
+        return refused("--json", "x.json");
+    }
+    if job.sequence.has_runs && none(&["csv", "parquet"]) {
+        return refused("--runs", "x.csv");
+    }
+    Ok(())
 }
 
 /// A figure needs an output that holds it, and lines for LaTeX need a figure.
@@ -127,8 +146,10 @@ pub fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Ren
         notices,
     } = if is_drawn {
         compose(&mission, &drawing, watch)
-    } else {
+    } else if job.outputs.iter().any(|o| o.format.is_viewed) {
         unplaced(&mission, &drawing)
+    } else {
+        unseen(&drawing)
     };
     let places = is_drawn.then(|| places(&view, &layout));
     let nothing = View::default();

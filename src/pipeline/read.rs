@@ -17,7 +17,7 @@ use crate::evidence::code::{self, SourceCode};
 use crate::evidence::collector;
 use crate::evidence::conclude::{self, Findings, conclude};
 use crate::graph::diff::RATE_CHANGE;
-use crate::graph::window::{self, Division, Length, Windows};
+use crate::graph::window::{self, Cut, Division, Length, Windows};
 use crate::graph::{History, Windowed, graphs, history};
 use crate::mission::activity::{self, Activity, Cell};
 use crate::mission::ledger::{self, Ledger};
@@ -124,9 +124,11 @@ fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
 /// Refuses what only bags can be asked.
 fn refuse(reading: &Reading, path: &Path) -> Result<()> {
     let source = reading.code.is_some().then_some("`--source` adds to bags");
+    let division = &reading.division;
+    let cut = division.cut.map(|_| "`--cut` divides the time of bags");
     let topic = reading.phases.topic();
     let topic = topic.map(|_| "`--captions` takes texts of a topic from bags");
-    match source.or(topic) {
+    match source.or(cut).or(topic) {
         None => Ok(()),
         Some(what) => Err(Error::usage(
             format!("{what}, and `{}` is an evolution", path.display()),
@@ -193,26 +195,18 @@ fn mission(
     // Cells are no windows, in which grace is counted.
     let activity = activity(&history, collected.range, |spans| graphs(spans, 0))?;
     let ledger = told(&history, &activity, collected, reading)?;
-    let mut windows = window::divide(&reading.division, collected.range)?;
+    let mut windows = divided(reading, collected.range, &ledger)?;
     let period = windows.period;
-    let mut list = list(
-        &windows,
-        graphs(&windows.spans, reading.grace)?,
-        &history,
-        &ledger,
-    );
+    let mut windowed = graphs(&windows.spans, reading.grace)?;
+    let mut list = list(&windows, &windowed, &history, &ledger);
     if reading.skip_unchanged {
         windows.spans = merged(&list);
-        list = self::list(
-            &windows,
-            graphs(&windows.spans, reading.grace)?,
-            &history,
-            &ledger,
-        );
+        windowed = graphs(&windows.spans, reading.grace)?;
+        list = self::list(&windows, &windowed, &history, &ledger);
     }
     let mut notices: Notices = recorded.notices.clone();
     notices.extend(findings.notices.iter());
-    if reading.division.length == Length::Auto {
+    if reading.division.length == Length::Auto && reading.division.cut.is_none() {
         let text = format!("the period is {period}; `--period` takes another");
         notices.add(Notice::new(NoticeKind::Chosen, text));
     }
@@ -229,12 +223,32 @@ fn mission(
         step: windows.step,
         elements: history.elements,
         windows: list,
+        graphs: windowed.graphs,
         ledger,
         activity,
         undrawn: findings.undrawn.clone(),
         layout: None,
         notices,
     })
+}
+
+/// The windows: equal ones, or from turn to turn.
+fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
+    let windows = match reading.division.cut {
+        None => return window::divide(&reading.division, span),
+        Some(Cut::Phases) if ledger.phases.is_empty() => {
+            return Err(Error::usage(
+                "`--cut phases` needs phases, and `--phases none` leaves none",
+                "leave out `--phases none`",
+            ));
+        }
+        Some(Cut::Phases) => {
+            let phases = ledger.phases.iter().skip(1);
+            window::at_turns(span, phases.map(|phase| phase.span.start))
+        }
+        Some(Cut::Changes) => window::at_turns(span, ledger.turns(span).into_iter()),
+    };
+    Ok(windows)
 }
 
 /// The graphs on the grid that no `--period` moves.
@@ -245,7 +259,7 @@ fn activity(
 ) -> Result<Activity> {
     let spans = activity::grid(span);
     let graphs = graphs(&spans)?.graphs;
-    let cells = spans.into_iter().zip(graphs);
+    let cells = spans.into_iter().zip(&graphs);
     Ok(Activity {
         cells: cells.map(|(span, graph)| Cell { span, graph }).collect(),
         sending: history.sending.clone(),
@@ -278,20 +292,19 @@ fn told(
 }
 
 /// The windows with their graphs, and what changed from each to the next.
-fn list(windows: &Windows, windowed: Windowed, history: &History, ledger: &Ledger) -> Vec<Window> {
+fn list(windows: &Windows, windowed: &Windowed, history: &History, ledger: &Ledger) -> Vec<Window> {
     let graphs = windows.spans.iter().copied().zip(&windowed.graphs);
     let changes = ledger::explain(graphs, &history.elements, ledger);
-    let parts = windowed.graphs.into_iter().zip(windowed.messages);
-    let window = |(index, ((graph, messages), (changes, entries)))| Window {
+    let window = |(index, (messages, (changes, entries)))| Window {
         index,
         span: windows.spans[index],
         partial: windows.partial(index),
         messages,
-        graph,
         changes,
         entries,
     };
-    parts.zip(changes).enumerate().map(window).collect()
+    let parts = windowed.messages.iter().copied().zip(changes);
+    parts.enumerate().map(window).collect()
 }
 
 /// The windows' times with every run of them that shows no change made one.

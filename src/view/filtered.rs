@@ -13,9 +13,12 @@ pub fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let viewed = Viewed::new(&mission.elements, options);
     let keep = Keep::new(&mission.elements, options, &viewed);
     let windows = mission.windows.iter();
+    let graphs = mission.each();
+    let graphs = graphs.map(|(window, graph)| (window.span, keep.graph(&graph, options, &viewed)));
     Mission {
         elements: keep.elements(&mission.elements),
-        windows: windows.map(|w| keep.window(w, options, &viewed)).collect(),
+        windows: windows.map(|w| keep.window(w)).collect(),
+        graphs: graphs.collect(),
         // By ids of elements that are others here.
         activity: Activity::default(),
         ..mission.clone()
@@ -68,9 +71,8 @@ impl Keep {
         }
     }
 
-    fn window(&self, window: &Window, options: &ViewOptions, viewed: &Viewed) -> Window {
+    fn window(&self, window: &Window) -> Window {
         Window {
-            graph: self.graph(&window.graph, options, viewed),
             changes: window
                 .changes
                 .iter()

@@ -9,22 +9,23 @@ use super::senders::sender;
 use super::windows::Windows;
 use crate::base::error::Result;
 use crate::base::time::Span;
+use crate::evidence::Degree;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
-use crate::graph::{EdgeId, EdgeState, Graph, NodeState, State, TopicState};
+use crate::graph::{
+    Column, ColumnWriter, EdgeId, EdgeState, Graphs, GraphsWriter, NodeState, Row, State,
+    TopicState, per_second,
+};
 
 /// The graphs of the windows of one division of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Windowed {
     /// A graph per window.
-    pub graphs: Vec<Graph>,
+    pub graphs: Graphs,
     /// Messages per window.
     pub messages: Vec<u64>,
 }
-
-/// Windows shorter than this have no rates.
-const SHORTEST_NS: i64 = 1_000_000;
 
 /// The graph of each window. Windows are sorted by start, none inside another; they may overlap. Somebody who never
 /// speaks again counts as gone after `grace` windows of silence.
@@ -39,32 +40,40 @@ pub fn graphs(
     grace: usize,
 ) -> Result<Windowed> {
     let mut all = Assembly {
-        windowed: Windowed {
-            graphs: vec![Graph::default(); windows.len()],
-            messages: vec![0; windows.len()],
-        },
+        graphs: GraphsWriter::new(windows.to_vec()),
+        messages: vec![0; windows.len()],
         windows: Windows(windows),
         grace,
         findings,
         history,
+        published: BTreeMap::new(),
         sent: BTreeMap::new(),
+        topics: BTreeMap::new(),
     };
     all.topics(recorded).map_err(spool_error)?;
     all.nodes();
     all.publishes();
     all.subscribes();
-    Ok(all.windowed)
+    Ok(Windowed {
+        graphs: all.graphs.finish(),
+        messages: all.messages,
+    })
 }
 
 struct Assembly<'a> {
-    windowed: Windowed,
+    graphs: GraphsWriter,
+    messages: Vec<u64>,
     windows: Windows<'a>,
     /// Windows of silence before somebody who never speaks again counts as gone.
     grace: usize,
     findings: &'a Findings,
     history: &'a History,
-    /// Messages of each known publisher: per topic, then per window.
-    sent: BTreeMap<Name, BTreeMap<Name, BTreeMap<usize, u64>>>,
+    /// Messages of each known publisher on each topic, in windows with any.
+    published: BTreeMap<(Name, Name), Column>,
+    /// Messages of each known publisher per window.
+    sent: BTreeMap<Name, Vec<u64>>,
+    /// The states of each topic in the windows in which it is there.
+    topics: BTreeMap<u32, Column>,
 }
 
 impl Assembly<'_> {
@@ -78,15 +87,10 @@ impl Assembly<'_> {
                 self.topic(*id, Some(&sums));
             }
         }
-        let silent = history
-            .topic_ids
-            .iter()
-            .filter(|(name, _)| !history.streams.contains_key(name));
-        for (_, id) in silent {
-            self.topic(*id, None);
-        }
-        for graph in &mut self.windowed.graphs {
-            graph.topics.sort_by_key(|topic| topic.id);
+        for (name, id) in &history.topic_ids {
+            if !history.streams.contains_key(name) {
+                self.topic(*id, None);
+            }
         }
         Ok(())
     }
@@ -94,30 +98,41 @@ impl Assembly<'_> {
     /// Adds up the messages of each publisher.
     fn count(&mut self, topic: Name, streams: &[usize], sums: &[Sums]) {
         for sum in sums {
-            self.windowed.messages[sum.window] += sum.count;
+            self.messages[sum.window] += sum.count;
         }
-        for (place, stream) in streams.iter().enumerate() {
-            let Some(node) = sender(&self.findings.streams[*stream]) else {
-                continue;
-            };
-            let of_node = self.sent.entry(node).or_default();
-            let of = of_node.entry(topic).or_default();
-            for sum in sums.iter().filter(|sum| sum.streams[place] > 0) {
-                *of.entry(sum.window).or_default() += sum.streams[place];
+        let of = |stream: &usize| sender(&self.findings.streams[*stream]);
+        let mut places: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        for (place, node) in streams.iter().map(of).enumerate() {
+            if let Some(node) = node {
+                places.entry(node).or_default().push(place);
             }
+        }
+        for (node, places) in places {
+            let many = self.windows.len();
+            let sent = self.sent.entry(node).or_insert_with(|| vec![0; many]);
+            let mut column = ColumnWriter::default();
+            for sum in sums {
+                let count: u64 = places.iter().map(|place| sum.streams[*place]).sum();
+                sent[sum.window] += count;
+                if count > 0 {
+                    column.push(sum.window, counted(count));
+                }
+            }
+            self.published.insert((node, topic), column.finish());
         }
     }
 
     fn topic(&mut self, id: u32, sums: Option<&[Sums]>) {
         let course = &self.history.topics[id as usize];
         let mut list = sums.unwrap_or_default().iter().peekable();
+        let mut states = ColumnWriter::default();
         for (at, window) in self.windows.0.iter().enumerate() {
             let sum = list.next_if(|sum| sum.window == at);
             if !self.sees(course, *window) {
                 continue;
             }
             let count = sum.map_or(0, |sum| sum.count);
-            self.windowed.graphs[at].topics.push(TopicState {
+            let state = TopicState {
                 id,
                 state: course.state(*window, sum.is_some()),
                 degree: course.degree,
@@ -126,8 +141,11 @@ impl Assembly<'_> {
                 hz: per_second(count, *window),
                 median_period_s: sum.and_then(|sum| sum.median_period_s),
                 max_gap_s: sum.and_then(|sum| sum.max_gap_s),
-            });
+            };
+            states.push(at, Row::new(state.state, state.degree));
+            self.graphs.topic(at, &state);
         }
+        self.topics.insert(id, states.finish());
     }
 
     fn nodes(&mut self) {
@@ -138,14 +156,14 @@ impl Assembly<'_> {
                 if !self.sees(course, *window) {
                     continue;
                 }
-                let count = sent.map(|topics| topics.values().filter_map(|w| w.get(&at)).sum());
-                self.windowed.graphs[at].nodes.push(NodeState {
+                let state = NodeState {
                     id: *id,
                     state: course.state(*window, false),
                     degree: course.degree,
-                    hz: count.and_then(|n| per_second(n, *window)),
+                    hz: sent.and_then(|of| per_second(of[at], *window)),
                     lifecycle: self.findings.values.lifecycle(*name, *window),
-                });
+                };
+                self.graphs.node(at, &state);
             }
         }
     }
@@ -154,23 +172,23 @@ impl Assembly<'_> {
         let names = |ids: &BTreeMap<Name, u32>| -> BTreeMap<u32, Name> {
             ids.iter().map(|(name, id)| (*id, *name)).collect()
         };
-        let (nodes, topics) = (
-            names(&self.history.node_ids),
-            names(&self.history.topic_ids),
-        );
+        let nodes = names(&self.history.node_ids);
+        let topics = names(&self.history.topic_ids);
         let edges = self.history.elements.publishes.iter();
         for ((id, edge), course) in (0..).zip(edges).zip(&self.history.publishes) {
-            let sent = nodes.get(&edge.node).and_then(|node| self.sent.get(node));
-            let topic = topics.get(&edge.topic);
-            let sent = sent.and_then(|of| of.get(topic?));
+            let ends = nodes.get(&edge.node).zip(topics.get(&edge.topic));
+            let sent = ends.and_then(|(node, topic)| self.published.get(&(*node, *topic)));
+            let mut sent = sent.map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
-                if !self.sees(course, *window) {
-                    continue;
+                let count = sent.as_mut().map(|counts| {
+                    let row = counts.next();
+                    row.and_then(|row| row.count).unwrap_or(0)
+                });
+                if self.sees(course, *window) {
+                    let state = course.state(*window, count.is_some_and(|n| n > 0));
+                    let state = edge_state(id, course.degree, state, *window, count);
+                    self.graphs.publish(at, &state);
                 }
-                let count = sent.map(|windows| windows.get(&at).copied().unwrap_or(0));
-                let state = course.state(*window, count.is_some_and(|n| n > 0));
-                let state = edge_state(id, course, state, *window, count);
-                self.windowed.graphs[at].publishes.push(state);
             }
         }
     }
@@ -179,19 +197,19 @@ impl Assembly<'_> {
     fn subscribes(&mut self) {
         let edges = self.history.elements.subscribes.iter();
         for ((id, edge), course) in (0..).zip(edges).zip(&self.history.subscribes) {
+            let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
+                let topic = topic.as_mut().and_then(|states| states.next());
                 if !self.sees(course, *window) {
                     continue;
                 }
-                let graph = &mut self.windowed.graphs[at];
-                let place = graph.topics.binary_search_by_key(&edge.topic, |t| t.id);
-                let state = match place.map(|at| graph.topics[at].state) {
+                let state = match topic {
                     _ if course.is_declared() => State::Declared,
-                    Ok(state) => state,
-                    Err(_) => State::Silent,
+                    Some(row) => row.state,
+                    None => State::Silent,
                 };
-                let state = edge_state(id, course, state, *window, None);
-                graph.subscribes.push(state);
+                let state = edge_state(id, course.degree, state, *window, None);
+                self.graphs.subscribe(at, &state);
             }
         }
     }
@@ -210,9 +228,16 @@ impl Assembly<'_> {
     }
 }
 
+fn counted(count: u64) -> Row {
+    Row {
+        count: Some(count),
+        ..Row::new(State::Active, Degree::Measured)
+    }
+}
+
 fn edge_state(
     id: EdgeId,
-    course: &Course,
+    degree: Degree,
     state: State,
     window: Span,
     count: Option<u64>,
@@ -220,7 +245,7 @@ fn edge_state(
     EdgeState {
         id,
         state,
-        degree: course.degree,
+        degree,
         count,
         hz: count.and_then(|n| per_second(n, window)),
     }
@@ -231,9 +256,4 @@ fn bytes(sum: Option<&Sums>, recorded: bool) -> Option<u64> {
         Some(sum) => sum.bytes,
         None => recorded.then_some(0),
     }
-}
-
-fn per_second(count: u64, window: Span) -> Option<f64> {
-    let nanos = window.nanos();
-    (nanos >= SHORTEST_NS).then(|| count as f64 / (nanos as f64 / 1e9))
 }
