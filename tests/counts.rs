@@ -134,7 +134,7 @@ fn page(html: &str, expected: &[BTreeSet<u64>], at: &str) {
     let data: Value = serde_json::from_str(&rest[..rest.find("</script>").unwrap()]).unwrap();
     let mut told = vec![0; expected.len()];
     for row in data["told"].as_array().unwrap() {
-        told[row[0].as_u64().unwrap() as usize] = row[1].as_u64().unwrap();
+        told[place(&row[0])] = row[1].as_u64().unwrap();
     }
     let numbers: Vec<u64> = expected.iter().map(|told| told.len() as u64).collect();
     assert_eq!(told, numbers, "chips of the page of {at}");
@@ -151,12 +151,7 @@ fn page(html: &str, expected: &[BTreeSet<u64>], at: &str) {
     };
     let mut marked = vec![false; expected.len()];
     for life in data["lives"].as_array().unwrap() {
-        let runs: Vec<usize> = life[0]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|n| n.as_u64().unwrap() as usize)
-            .collect();
+        let runs: Vec<usize> = life[0].as_array().unwrap().iter().map(place).collect();
         let mut window = 0;
         for run in runs.chunks(2) {
             window += run[0];
@@ -165,6 +160,10 @@ fn page(html: &str, expected: &[BTreeSet<u64>], at: &str) {
     }
     let with_headlines: Vec<bool> = expected.iter().map(|told| !told.is_empty()).collect();
     assert_eq!(marked, with_headlines, "marks of the page of {at}");
+}
+
+fn place(number: &Value) -> usize {
+    usize::try_from(number.as_u64().unwrap()).unwrap()
 }
 
 /// The report's first line: its numbers add up to all headlines.

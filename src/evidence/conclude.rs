@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use super::collector::{Recorded, spool_error};
 use super::restarts::{Restarts, restarts};
-use super::roles::role;
 use super::values::Values;
 use crate::base::error::Result;
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claims, Name};
 use crate::evidence::code::{Code, matching};
@@ -76,7 +76,7 @@ fn findings(recorded: &Recorded, options: &Options) -> io::Result<Findings> {
     let start = recorded.span.map_or(Stamp(0), |s| s.start);
     let end = recorded.span.map_or(Stamp(0), |s| s.end.plus(-1));
     let mut known = Conclusions::new(&recorded.streams, recorded.facts.clone(), (start, end));
-    known.take_at_their_word(|source| SOURCES.get(source).is_some_and(|s| s.lasting));
+    known.take_at_their_word();
     for (row, source) in SOURCES.iter().enumerate() {
         for conclude in source.conclude {
             conclude(row, &mut known);
@@ -222,6 +222,7 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
             Validity::Always => (None, format!("{} ({})", told(proof.what), source.about)),
             Validity::Signs { .. }
             | Validity::Begins { .. }
+            | Validity::Moments(_)
             | Validity::Unending
             | Validity::Whole => continue,
         };
@@ -255,7 +256,6 @@ fn told(known: &mut Conclusions<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
                 .map(|to| last(Some(to)).max(at(from, mission.0)))
                 .into_iter()
                 .collect(),
-            held: false,
         },
     };
     let (word, degree) = if entry.declared {

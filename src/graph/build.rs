@@ -4,6 +4,7 @@
 pub(crate) mod assemble;
 pub(crate) mod history;
 pub(crate) mod liveness;
+pub(crate) mod merged;
 pub(crate) mod rates;
 pub(crate) mod senders;
 pub(crate) mod settle;

@@ -4,12 +4,10 @@
 mod column;
 mod row;
 
-pub(crate) use column::{Column, ColumnWriter};
+pub(crate) use column::{Column, ColumnWriter, Cursor};
 pub(crate) use row::{Number, Row};
 
 use std::sync::Arc;
-
-use column::Cursor;
 
 use super::{EdgeState, Element, Graph, NodeState, TopicState};
 use crate::base::time::Span;

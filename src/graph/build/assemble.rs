@@ -14,7 +14,7 @@ use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::graph::{
-    Column, ColumnWriter, EdgeId, EdgeState, Graphs, GraphsWriter, NodeState, Row, State,
+    Column, ColumnWriter, Cursor, EdgeId, EdgeState, Graphs, GraphsWriter, NodeState, Row, State,
     TopicState, per_second,
 };
 
@@ -199,7 +199,7 @@ impl Assembly<'_> {
         for ((id, edge), course) in (0..).zip(edges).zip(&self.history.subscribes) {
             let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
-                let topic = topic.as_mut().and_then(|states| states.next());
+                let topic = topic.as_mut().and_then(Cursor::next);
                 if !self.sees(course, *window) {
                     continue;
                 }

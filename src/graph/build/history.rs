@@ -6,17 +6,18 @@ use std::io;
 use std::sync::Arc;
 
 use super::liveness::{Lifetime, Liveness};
+use super::merged::fall_silent;
 use super::senders::{Traffic, traffic};
 use super::settle::settle;
 use super::tracks::{Tracks, tracks};
 use crate::base::error::Result;
+use crate::base::role::role;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::Key;
-use crate::evidence::roles::role;
 use crate::graph::lives::{
     Bound, Known, Life, Lives, Stretch, Transition, Voice, all_silent, silences,
 };
@@ -105,6 +106,7 @@ pub fn history(recorded: &Recorded, findings: &Findings) -> Result<History> {
 fn told(recorded: &Recorded, findings: &Findings) -> io::Result<History> {
     let traffic = traffic(recorded, findings)?;
     let mut tracks = tracks(recorded, findings, &traffic)?;
+    fall_silent(&mut tracks, &traffic, findings);
     let (proofs, restarts) = (&findings.proofs, &findings.restarts);
     settle(&mut tracks, proofs, restarts, findings.mission);
     Ok(assembled(&tracks, &traffic, findings))
@@ -157,7 +159,7 @@ impl Assembly<'_> {
             let Some(id) = self.history.topic_ids.get(topic) else {
                 continue;
             };
-            for sender in of.senders.iter().filter(|s| !s.stretches.is_empty()) {
+            for sender in of.list.iter().filter(|s| !s.stretches.is_empty()) {
                 let node = sender.node.and_then(|n| self.history.node_ids.get(&n));
                 self.history.lives.voices.push(Voice {
                     topic: *id,
@@ -249,7 +251,7 @@ impl Assembly<'_> {
 
     fn publish(&mut self, node: Name, topic: Name, track: &Liveness) {
         let edge = self.edge(node, topic, track);
-        let senders = self.traffic.get(&topic).map(|of| &of.senders);
+        let senders = self.traffic.get(&topic).map(|of| &of.list);
         let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
         let stretches = sender.map_or(&[][..], |s| &s.stretches);
         let all = &mut self.history;
@@ -291,13 +293,13 @@ impl Assembly<'_> {
         let Some(of) = self.traffic.get(&topic) else {
             return Vec::new();
         };
-        let of: Vec<&[Stretch]> = of.senders.iter().map(|s| &s.stretches[..]).collect();
+        let of: Vec<&[Stretch]> = of.list.iter().map(|s| &s.stretches[..]).collect();
         all_silent(&of, lives)
     }
 
     /// When all is silent that a node sends.
     fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let senders = self.traffic.values().flat_map(|of| &of.senders);
+        let senders = self.traffic.values().flat_map(|of| &of.list);
         let own = senders.filter(|s| s.node == Some(node) && !s.latched);
         let of: Vec<&[Stretch]> = own.map(|s| &s.stretches[..]).collect();
         all_silent(&of, lives)

@@ -23,7 +23,7 @@ pub(crate) struct Senders {
     /// The first and the last message of each stream; `None` if it has none.
     pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
     /// What each sender sent: those that are known, sorted, after the unknown ones together.
-    pub(crate) senders: Vec<Sender>,
+    pub(crate) list: Vec<Sender>,
     /// The place of each stream's sender among those.
     pub(crate) of: Vec<usize>,
     /// When anybody sent.
@@ -78,7 +78,7 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
     Ok(Senders {
         streams,
         traces,
-        senders: heard.into_iter().map(Heard::into_sender).collect(),
+        list: heard.into_iter().map(Heard::into_sender).collect(),
         of,
         sending: all.stretches(),
     })

@@ -32,6 +32,7 @@ pub(crate) fn tracks(
         let restarts = restarts.map_or(&[][..], Vec::as_slice);
         let deaths: Vec<Stamp> = restarts.iter().map(|r| r.death).collect();
         let track = tracks.entry(proof.what).or_default();
+        track.lasts |= lasts(&proof.when);
         track.evidence = track.evidence.and(Evidence::row(proof.source));
         track.degree = track.degree.min(proof.degree);
         match &proof.when {
@@ -61,7 +62,7 @@ pub(crate) fn tracks(
                     track.bound_all(&[first], &[]);
                 }
             }
-            Validity::Signs { signs, ends, .. } => {
+            Validity::Signs { signs, ends } => {
                 let ends = together(ends, &deaths);
                 track.sign_all(signs, &ends);
                 if SOURCES.get(proof.source).is_some_and(|s| s.own) {
@@ -73,6 +74,7 @@ pub(crate) fn tracks(
                 let ends = together(ends, &deaths);
                 track.bound_all(signs, &ends);
             }
+            Validity::Moments(signs) => track.bound_all(signs, &deaths),
             Validity::Unending => track.unending = true,
             Validity::Like(_) => {}
             Validity::Whole => track.extent = track.extent.max(Extent::Whole),
@@ -102,6 +104,11 @@ fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
     sent.collect()
 }
 
+/// Whether a reason holds on after its last sign.
+fn lasts(when: &Validity) -> bool {
+    !matches!(when, Validity::Moments(_) | Validity::Like(_))
+}
+
 /// Two lists of times as one, sorted.
 fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
     let mut all = [a, b].concat();
@@ -123,10 +130,7 @@ struct Followed<'a> {
 
 /// Puts the messages of one stream on a track: of a publication, or of a topic.
 fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed<'_>) {
-    let sender = senders
-        .of
-        .get(place)
-        .and_then(|of| senders.senders.get(*of));
+    let sender = senders.of.get(place).and_then(|of| senders.list.get(*of));
     let spoke = senders.traces.get(place).copied().flatten();
     let (Some((first, last)), Some(sender)) = (spoke, sender) else {
         track.extent = track.extent.max(Extent::Whole);

@@ -69,7 +69,7 @@ pub(crate) fn graphs(raw: &RawElements, ids: &Ids, spans: &[Span]) -> Graphs {
     for whole in &raw.subscribes {
         let id = ids.of_subscribe(&whole.element);
         whole.seen.rows(many, &mut all, |all, at, row| {
-            all.subscribe_row(id, at, row)
+            all.subscribe_row(id, at, row);
         });
     }
     all.finish()
