@@ -9,7 +9,7 @@ pub mod code;
 pub mod collector;
 pub mod conclude;
 mod kinds;
-pub mod message;
+pub(crate) mod message;
 pub(crate) mod proof;
 pub(crate) mod publishers;
 pub(crate) mod restarts;
@@ -17,13 +17,13 @@ pub(crate) mod source;
 pub(crate) mod spread;
 pub(crate) mod syntax;
 pub(crate) mod texts;
-pub mod times;
+pub(crate) mod times;
 pub mod topology;
 pub(crate) mod values;
 
 pub use claim::{Degree, EvidenceLine};
 pub use kinds::Evidence;
-pub use source::Source;
+pub(crate) use source::Source;
 
 use message::{definition, parameters};
 use source::{

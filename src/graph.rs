@@ -6,8 +6,8 @@
 mod build;
 pub mod diff;
 mod graphs;
-pub mod lives;
-pub mod sending;
+pub(crate) mod lives;
+pub(crate) mod sending;
 pub mod window;
 
 use std::sync::Arc;
@@ -19,9 +19,10 @@ use crate::evidence::{Degree, Evidence};
 #[cfg(test)]
 pub(crate) use graphs::tests as graphs_for_tests;
 pub(crate) use graphs::{Column, ColumnWriter, Cursor, GraphsWriter, Number, Row};
-pub use graphs::{Graphs, Iter};
+pub use graphs::{Graphs, Iter as GraphsIter};
 
-pub use build::{Built, History, TopicCount, Windowed, build, counts, graphs, history};
+pub use build::{Built, build};
+pub(crate) use build::{History, TopicCount, Windowed, counts, graphs, history};
 
 /// A node's place in [`Elements::nodes`].
 pub type NodeId = u32;

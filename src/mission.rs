@@ -1,6 +1,6 @@
 //! The whole sequence: every window with its graph and what changed; written as JSON and read back as an input.
 
-pub mod activity;
+pub(crate) mod activity;
 pub mod events;
 pub mod info;
 pub mod ledger;
@@ -8,7 +8,8 @@ pub mod phases;
 
 mod json;
 pub use json::read::read_json;
-pub use json::write::{Form, Json, write_json};
+pub(crate) use json::write::Json;
+pub use json::write::{Form, write_json};
 
 use crate::bag::Report;
 use crate::base::geometry::Rect;
@@ -18,10 +19,12 @@ use crate::graph::diff::{Change, Changes};
 use crate::graph::{Elements, Graph, Graphs, NodeId};
 
 pub use activity::Activity;
-pub use ledger::{EntryId, Ledger};
+pub(crate) use ledger::EntryId;
+pub use ledger::Ledger;
 
 /// One window; its graph is in [`Mission::graphs`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Window {
     /// Its place, 0...
     pub index: usize,
@@ -39,6 +42,7 @@ pub struct Window {
 
 /// A mission as a sequence of graphs.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Mission {
     /// The bags it was read from, in order.
     pub bags: Vec<Report>,

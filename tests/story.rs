@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bagreel::bag::Input;
-use bagreel::base::time::Period;
-use bagreel::graph::diff::{apply, diff};
-use bagreel::graph::window::{Division, Length};
-use bagreel::mission::events::{LogFormat, LogOptions, log};
-use bagreel::mission::ledger::Kind;
-use bagreel::mission::{Mission, read_json, write_json};
+use bagreel::internals::base::time::Period;
+use bagreel::internals::graph::diff::{apply, diff};
+use bagreel::internals::graph::window::Length;
+use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
+use bagreel::internals::mission::ledger::Kind;
+use bagreel::internals::mission::{Mission, read_json, write_json};
 use bagreel::{Reading, read};
 
 /// A mission of ours, in windows of so many seconds.
@@ -18,15 +17,9 @@ fn mission(file: &str, seconds: i64) -> Mission {
         .join("examples")
         .join(file);
     let period = Period::from_nanos(seconds * 1_000_000_000).unwrap();
-    read(&Reading {
-        inputs: vec![Input::Path(bag)],
-        division: Division {
-            length: Length::Fixed(period),
-            ..Division::default()
-        },
-        ..Reading::default()
-    })
-    .unwrap()
+    let mut reading = Reading::of([bag]);
+    reading.division.length = Length::Fixed(period);
+    read(&reading).unwrap()
 }
 
 const ALL: LogOptions = LogOptions {
@@ -39,7 +32,8 @@ const ALL: LogOptions = LogOptions {
 fn told(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
     let headlines = mission.ledger.entries.iter();
     let of_kind = headlines.filter(|e| e.kind == kind && e.is_headline());
-    let name = |e: &bagreel::mission::ledger::Entry| match mission.elements.ends(e.what) {
+    let name = |e: &bagreel::internals::mission::ledger::Entry| match mission.elements.ends(e.what)
+    {
         (Some(node), _) => mission.elements.nodes[node as usize].role.to_string(),
         (None, Some(topic)) => mission.elements.topics[topic as usize].name.to_string(),
         (None, None) => String::new(),
@@ -183,7 +177,7 @@ fn turns(mission: &Mission, kind: Kind) -> Vec<(String, f64, (f64, f64))> {
     let entries = mission.ledger.entries.iter();
     let mut all = Vec::new();
     for (id, entry) in (0..).zip(entries) {
-        let bagreel::graph::Element::Node(node) = entry.what else {
+        let bagreel::values::Element::Node(node) = entry.what else {
             continue;
         };
         let role = mission.elements.nodes[node as usize].role.to_string();
@@ -260,7 +254,7 @@ fn commanded_rates_and_take_overs_are_told_with_their_numbers() {
         _ => "",
     };
     let near = |from: f64, to: f64, at: f64| from - 5.0 <= at && at <= to + 5.0;
-    let told = |entry: &&bagreel::mission::ledger::Entry| !entry.quiet;
+    let told = |entry: &&bagreel::internals::mission::ledger::Entry| !entry.quiet;
     let mut explained = 0;
     for event in &truth {
         let topic = event["topic"].as_str().unwrap_or_default();
@@ -274,7 +268,7 @@ fn commanded_rates_and_take_overs_are_told_with_their_numbers() {
                 let at = number("time_s");
                 let close = |a: f64, b: f64| (a - b).abs() <= 0.1 * b;
                 let found = of(Kind::Rate).filter(|e| near(at, at, second(e.time))).filter(|e| {
-                    matches!(e.detail, bagreel::mission::ledger::Detail::Rates { from_hz, to_hz }
+                    matches!(e.detail, bagreel::internals::mission::ledger::Detail::Rates { from_hz, to_hz }
                         if close(from_hz, number("from_hz")) && close(to_hz, number("to_hz")))
                 });
                 let found = found.count();
@@ -294,6 +288,6 @@ fn commanded_rates_and_take_overs_are_told_with_their_numbers() {
     }
     let all = mission.ledger.entries.iter().filter(told);
     let all = all.filter(|e| matches!(e.kind, Kind::Rate | Kind::HandedOver));
-    let of_parts = |e: &&bagreel::mission::ledger::Entry| e.part_of.is_none();
+    let of_parts = |e: &&bagreel::internals::mission::ledger::Entry| e.part_of.is_none();
     assert!(all.filter(of_parts).count() <= explained, "a false line");
 }

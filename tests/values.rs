@@ -7,9 +7,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use bagreel::bag::Input;
-use bagreel::base::time::Period;
-use bagreel::graph::window::Length;
+use bagreel::values::{Length, Period};
 use bagreel::{Output, Reading, Render, render};
 
 use crate::support::{ORIGIN, Recording, rosbag1};
@@ -41,10 +39,7 @@ fn files(input: &Path, period: Option<Period>) -> BTreeMap<String, Vec<u8>> {
     let outputs = FORMATS
         .iter()
         .map(|n| Output::parse(&name(n), None).unwrap());
-    let mut reading = Reading {
-        inputs: vec![Input::Path(input.to_owned())],
-        ..Reading::default()
-    };
+    let mut reading = Reading::of([input]);
     reading.division.length = period.map_or(Length::Auto, Length::Fixed);
     render(&Render::new(reading, outputs.collect()).unwrap()).unwrap();
     let files = fs::read_dir(folder.path()).unwrap().map(|entry| {

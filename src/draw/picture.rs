@@ -396,6 +396,7 @@ fn arrow_id(arrow: &Arrow, ends: &[String; 2]) -> String {
         ArrowKind::Publish => format!("p{from}..{to}"),
         ArrowKind::Subscribe => format!("s{from}..{to}"),
         ArrowKind::Direct(topic) => format!("d{from}..{to}..{}", encoded(topic)),
+        ArrowKind::Bundle => format!("b{from}..{to}"),
     }
 }
 

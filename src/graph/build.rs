@@ -21,9 +21,9 @@ use crate::evidence::EvidenceLine;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::{self, conclude};
 
-pub use assemble::{Windowed, graphs};
-pub use history::{History, history};
-pub use rates::{TopicCount, counts};
+pub(crate) use assemble::{Windowed, graphs};
+pub(crate) use history::{History, history};
+pub(crate) use rates::{TopicCount, counts};
 
 /// Everything at once for one division of time: for those who need no more than that.
 #[derive(Clone, Debug, Default, PartialEq)]

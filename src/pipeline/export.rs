@@ -16,11 +16,12 @@ use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::Sequence;
 use crate::export::{self, OneDrawing, Output, Written};
-use crate::mission::{Form, Mission};
+use crate::mission::Mission;
 use crate::view::{View, filtered};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Render {
     /// What to read.
     pub reading: Reading,
@@ -55,6 +56,7 @@ impl Render {
 
 /// What came of it.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Rendered {
     /// The mission, as it was read.
     pub mission: Mission,
@@ -68,7 +70,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// Where an output cannot be written, no input can be read, or an option makes no sense.
-pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
     check(job)?;
     let mission = read(&job.reading, watch)?;
     show(job, mission, watch)
@@ -78,33 +80,14 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 ///
 /// # Errors
 /// As [`export::check`].
-pub fn check(job: &Render) -> Result<()> {
+pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
-    check_forms(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
         Input::Stdin => None,
     });
     let kept: Vec<PathBuf> = inputs.chain(&job.kept).cloned().collect();
     export::check(&job.outputs, &kept)
-}
-
-/// What is said of how data is written needs an output that it is written to.
-fn check_forms(job: &Render) -> Result<()> {
-    let none = |words: &[&str]| !job.outputs.iter().any(|o| words.contains(&o.format.word));
-    let refused = |flag: &str, output: &str| {
-        Err(Error::usage(
-            format!("`{flag}` says how data is written, and no output holds it"),
-            format!("write it with `-o {output}`"),
-        ))
-    };
-    if job.sequence.json != Form::Auto && none(&["json"]) {
-        return refused("--json", "x.json");
-    }
-    if job.sequence.has_runs && none(&["csv", "parquet"]) {
-        return refused("--runs", "x.csv");
-    }
-    Ok(())
 }
 
 /// A figure needs an output that holds it, and lines for LaTeX need a figure.
@@ -127,7 +110,7 @@ fn check_figure(job: &Render) -> Result<()> {
 ///
 /// # Errors
 /// As [`render`].
-pub fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
     if matches!(job.reading.phases, Phases::Captions(_)) {
         drawing.page.phases = captions(&mission);
@@ -190,7 +173,9 @@ pub fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Ren
             ControlFlow::Continue(())
         }
     };
-    let written = run::run(&sequence, &job.outputs, &mut progress)?;
+    let steps = run::Steps::default();
+    let written = run::run(&sequence, &job.outputs, &steps, &mut progress)?;
+    watch.shares(&steps.shares());
     Ok(Rendered {
         mission,
         notices: all,

@@ -1,6 +1,6 @@
 //! From bags to the mission: collect, conclude, find the phases, divide time, build the graphs; each value is made once.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::collect::{Collected, collect};
@@ -25,6 +25,7 @@ use crate::mission::{Mission, Window, read_json};
 
 /// What to read and how.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Reading {
     /// Bags of one mission, or one evolution.
     pub inputs: Vec<Input>,
@@ -67,6 +68,15 @@ impl Default for Reading {
 }
 
 impl Reading {
+    /// Bags of one mission by their paths, or one mission's own JSON, with every option as the command line has it.
+    pub fn of<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
+        let inputs = paths.into_iter().map(|path| Input::Path(path.into()));
+        Self {
+            inputs: inputs.collect(),
+            ..Self::default()
+        }
+    }
+
     /// The same with phases from elsewhere.
     #[must_use]
     pub fn with_phases(mut self, phases: Phases) -> Self {
@@ -113,7 +123,10 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
 }
 
 /// The path of the evolution that is the only input; `None` for bags.
-fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
+///
+/// # Errors
+/// Where it cannot be read.
+pub(crate) fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     let is_json = |input: &Input| -> Result<bool> { Ok(matches!(bag::sniff(input)?, Kind::Json)) };
     match inputs {
         [Input::Path(path)] if is_json(&inputs[0])? => Ok(Some(path)),
@@ -153,6 +166,12 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     }
     if !mission.knows_lives() {
         mission.find_changes(reading.rate_change, &[]);
+    } else if (reading.rate_change - RATE_CHANGE).abs() > f64::EPSILON {
+        let what = format!(
+            "`--rate-change` compares windows, and `{}` holds its changes already",
+            path.display()
+        );
+        return Err(Error::usage(what, "give the bag itself"));
     }
     let activity = Activity::of_windows(&mission);
     let basis = Basis {

@@ -20,7 +20,7 @@ use crate::graph::{
 
 /// The graphs of the windows of one division of time.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Windowed {
+pub(crate) struct Windowed {
     /// A graph per window.
     pub graphs: Graphs,
     /// Messages per window.
@@ -32,7 +32,7 @@ pub struct Windowed {
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub fn graphs(
+pub(crate) fn graphs(
     recorded: &Recorded,
     findings: &Findings,
     history: &History,

@@ -26,7 +26,7 @@ use crate::graph::{Edge, Elements, Node, NodeId, State, Topic, TopicId};
 
 /// The elements of a mission, and what holds of them whatever the windows.
 #[derive(Debug, Default)]
-pub struct History {
+pub(crate) struct History {
     /// Everything that ever is in it.
     pub elements: Elements,
     /// When everything lived, and how it sent.
@@ -99,7 +99,7 @@ impl Course {
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub fn history(recorded: &Recorded, findings: &Findings) -> Result<History> {
+pub(crate) fn history(recorded: &Recorded, findings: &Findings) -> Result<History> {
     told(recorded, findings).map_err(spool_error)
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct Sums {
 
 /// How many messages a topic has in a window.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct TopicCount {
+pub(crate) struct TopicCount {
     /// The topic's name.
     pub topic: Arc<str>,
     /// The window's place.
@@ -36,7 +36,7 @@ pub struct TopicCount {
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicCount>> {
+pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicCount>> {
     let mut streams: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (at, stream) in recorded.streams.iter().enumerate() {
         let topic = stream.connection.topic.as_str();

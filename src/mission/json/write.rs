@@ -52,7 +52,7 @@ const MOST_WINDOWS: usize = 2000;
 pub(crate) const RUNS: &str = "runs";
 
 /// A mission as it is written.
-pub struct Json<'a> {
+pub(crate) struct Json<'a> {
     /// The data.
     pub mission: &'a Mission,
     /// Where everything was drawn, if it was.
@@ -74,7 +74,7 @@ impl Json<'_> {
     ///
     /// # Errors
     /// Whatever `out` refuses.
-    pub fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
+    pub(crate) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let lines = Lines::down_to(if self.is_runs() { 3 } else { 4 });
         let mut serializer = serde_json::Serializer::with_formatter(&mut *out, lines);
         self.serialize(&mut serializer)?;
