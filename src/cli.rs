@@ -18,7 +18,7 @@ use clap::{CommandFactory as _, FromArgMatches as _};
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::words::visible;
-use crate::base::{budget, file};
+use crate::base::{budget, file, words};
 use crate::cli::terminal::Terminal;
 use crate::evidence::code::{SourceCode, Version};
 use crate::evidence::collector;
@@ -79,6 +79,10 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Info(args) => info(&args, &given, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
         Command::Events(args) => log(&args, &given, &mut terminal),
+        Command::Diff(args) => {
+            failed = USAGE;
+            gate::diff(&args, &mut terminal)
+        }
         Command::Baseline(args) => gate::baseline(&args, &mut terminal),
         Command::Check(args) => {
             failed = USAGE;
@@ -298,17 +302,23 @@ fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
         .map(|w| w.path.display().to_string())
         .collect();
     let changes: usize = mission.windows.iter().map(|w| w.changes.len()).sum();
-    let windows = mission.windows.len();
     let seconds = terminal.seconds();
-    let of = if is_cut {
-        String::new()
-    } else {
-        format!(" of {}", mission.period)
-    };
     terminal.say(&format!(
-        "wrote {}: {windows} windows{of}, {changes} changes, in {seconds:.1} s",
+        "wrote {}: {}, {}, in {seconds:.1} s",
         names.join(", "),
+        if is_cut { words::count(mission.windows.len(), "window") } else { division(mission) },
+        words::count(changes, "change")
     ));
+}
+
+/// How the mission is divided: `33 windows of 10 s`, `1 window of 5 min 26 s`.
+fn division(mission: &Mission) -> String {
+    let windows = words::count(mission.windows.len(), "window");
+    let length = match &mission.windows[..] {
+        [only] => words::duration(only.span.nanos()),
+        _ => mission.period.to_string(),
+    };
+    format!("{windows} of {length}")
 }
 
 /// The work that `render` was asked to do.

@@ -4,6 +4,7 @@
 //! of is not absent: it is undecidable, and told as such.
 
 mod baseline;
+mod difference;
 mod expectation;
 mod facts;
 mod finding;
@@ -13,6 +14,9 @@ mod range;
 mod report;
 
 pub(crate) use baseline::{Update, update, write};
+pub(crate) use difference::{
+    DIFF_FORMATS, DiffFormat, DiffSubject, Difference, Side, differences, union,
+};
 pub(crate) use expectation::{Expectation, read};
 pub(crate) use finding::{Kind, Severity};
 pub(crate) use judge::{Verdict, judge};

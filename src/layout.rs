@@ -9,6 +9,7 @@ mod layers;
 mod layout_rs;
 mod pack;
 mod pinned;
+mod ring;
 mod routes;
 mod spacing;
 
@@ -141,7 +142,11 @@ const DEEPEST: usize = 16;
 pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[
     ("layered", &layered::Layered),
     ("layout-rs", &layout_rs::LayoutRs),
+    ("ring", &ring::Ring),
 ];
+
+/// The most boxes that the engine `ring` takes.
+pub(crate) const RING: usize = ring::MOST;
 
 /// The engine of this word.
 ///

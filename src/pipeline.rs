@@ -59,6 +59,9 @@ pub trait Watch {
     /// How far the stage is: `done` of `total`.
     fn progress(&mut self, _done: u64, _total: u64) {}
 
+    /// What to know before the next stage begins, in a sentence.
+    fn note(&mut self, _text: &str) {}
+
     /// Where the time of the stage went: the words of its steps and their shares, the largest first.
     fn shares(&mut self, _shares: &[(&'static str, f64)]) {}
 

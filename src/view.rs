@@ -13,6 +13,7 @@ mod items;
 mod lives;
 mod marks;
 mod names;
+mod nothing;
 mod options;
 mod roles;
 pub(crate) mod runs;
@@ -33,6 +34,7 @@ use crate::mission::ledger::{EntryId, Kind};
 
 pub(crate) use filter::NameFilter;
 pub(crate) use filtered::filtered;
+pub(crate) use nothing::nothing;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 
 /// What the picture shows of a mission, and a notice for everything that it leaves out.

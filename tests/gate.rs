@@ -511,3 +511,206 @@ fn allowances_forgive_until_their_day_and_unused_ones_are_told() {
         "{said}"
     );
 }
+
+/// Names as nobody should give them.
+const HOSTILE: [&str; 7] = [
+    "/@team",
+    "/a\n::error file=x::forged",
+    "/##[error]forged",
+    "/</testcase><failure>",
+    "/a|b`c`<img src=x>",
+    "/-->\"];evil[\"",
+    "/\u{1b}[2J\u{202e}%0A::warning::x",
+];
+
+#[test]
+fn hostile_names_are_inert_in_every_format() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let mut robot = recording(HEALTHY, 0);
+    for name in HOSTILE {
+        let own = robot.publisher(name, &format!("{name}/topic"), "std_msgs/String");
+        robot.send(own, (1_000, 170_000), 1_000, b"\x01\0\0\0a");
+    }
+    bag(here, "run.bag", &robot);
+    let expect = "schema: bagreel.expect/1\npolicy: {unexpected_nodes: error, unexpected_topics: warn}\nnodes:\n  /lidar: {}\n";
+    fs::write(here.join("g.yaml"), expect).unwrap();
+    let print = |format: &str| {
+        said(&bagreel(
+            here,
+            &["check", "run.bag", "--expect", "g.yaml", "--format", format],
+        ))
+    };
+    let visible = |text: &str| {
+        text.chars()
+            .all(|c| c == '\n' || !(c.is_control() || c == '\u{202e}'))
+    };
+    for format in [
+        "text", "json", "markdown", "junit", "sarif", "gitlab", "github",
+    ] {
+        let text = print(format);
+        assert!(text.contains("team") && visible(&text), "{format}: {text}");
+    }
+    let github = print("github");
+    let commands: Vec<&str> = github
+        .lines()
+        .filter(|l| l.trim_start().starts_with("::"))
+        .collect();
+    assert!(
+        commands.iter().all(|l| l.contains(" file=g.yaml,line=")),
+        "{github}"
+    );
+    assert_eq!(
+        commands
+            .iter()
+            .filter(|l| l.starts_with("::error "))
+            .count(),
+        9
+    );
+    assert!(
+        !github.contains("##[") && !print("text").contains("##["),
+        "{github}"
+    );
+    let markdown = print("markdown");
+    let outside: Vec<&str> = markdown.split("```").step_by(2).collect();
+    assert!(!outside.concat().contains("@team"), "{markdown}");
+    assert!(
+        !markdown.contains("<img") && !markdown.contains("</testcase"),
+        "{markdown}"
+    );
+    assert!(!markdown.contains("evil[\""), "{markdown}");
+    let junit = print("junit");
+    let parsed = roxmltree::Document::parse(&junit).unwrap();
+    assert_eq!(
+        parsed
+            .descendants()
+            .filter(|n| n.has_tag_name("testcase"))
+            .count(),
+        3
+    );
+    assert_eq!(
+        parsed
+            .descendants()
+            .filter(|n| n.has_tag_name("failure"))
+            .count(),
+        1
+    );
+    for format in ["json", "sarif", "gitlab"] {
+        serde_json::from_str::<serde_json::Value>(&print(format)).unwrap();
+    }
+    // What is written from such names reads back, and holds.
+    assert_eq!(run(here, &["baseline", "run.bag", "-o", "own.yaml"]).0, 0);
+    let (code, said) = run(here, &["check", "run.bag", "--expect", "own.yaml"]);
+    assert_eq!((code, said.contains("no findings")), (0, true), "{said}");
+}
+
+#[test]
+fn every_result_stands_at_a_line_and_annotations_are_few() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "run.bag", &recording(HEALTHY, 0));
+    let lines: Vec<String> = (0..30).map(|n| format!("  /gone_{n}: {{}}\n")).collect();
+    let lines = lines.concat();
+    fs::write(
+        here.join("g.yaml"),
+        format!("schema: bagreel.expect/1\nnodes:\n{lines}"),
+    )
+    .unwrap();
+    let print = |format: &str| {
+        said(&bagreel(
+            here,
+            &["check", "run.bag", "--expect", "g.yaml", "--format", format],
+        ))
+    };
+    let github = print("github");
+    let errors: Vec<&str> = github
+        .lines()
+        .filter(|l| l.starts_with("::error "))
+        .collect();
+    assert_eq!(errors.len(), 10);
+    assert!(
+        errors[9].contains("and 20 more in the log"),
+        "{}",
+        errors[9]
+    );
+    assert!(github.contains("error[node-missing]: /gone_29"));
+    let sarif: serde_json::Value = serde_json::from_str(&print("sarif")).unwrap();
+    let results = sarif["runs"][0]["results"].as_array().unwrap();
+    assert_eq!(results.len(), 30);
+    let line = |r: &serde_json::Value| {
+        r["locations"][0]["physicalLocation"]["region"]["startLine"].as_u64()
+    };
+    assert!(results.iter().zip(3..).all(|(r, at)| line(r) == Some(at)));
+    let gitlab: serde_json::Value = serde_json::from_str(&print("gitlab")).unwrap();
+    let prints = gitlab
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|i| i["fingerprint"].as_str().unwrap());
+    let prints: std::collections::BTreeSet<&str> = prints.collect();
+    assert!(prints.len() == 30 && prints.iter().all(|p| p.len() == 12));
+}
+
+#[test]
+fn a_difference_is_told_of_what_both_could_have_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "a.bag", &recording(HEALTHY, 0));
+    bag(here, "same.bag", &recording(HEALTHY, 3));
+    let other = Robot {
+        scan_ms: 200,
+        controller: "/pilot",
+        has_teleop: true,
+        ..HEALTHY
+    };
+    bag(here, "b.bag", &recording(other, 3));
+    let (code, said) = run(here, &["diff", "a.bag", "same.bag"]);
+    assert_eq!((code, said.contains("no differences")), (0, true), "{said}");
+    let outputs = [
+        "-o", "d.json", "-o", "d.md", "-o", "d.svg", "-o", "d.html", "-o", "d.gif",
+    ];
+    let (code, said) = run(here, &[&["diff", "a.bag", "b.bag"][..], &outputs].concat());
+    assert_eq!(code, 1, "{said}");
+    let wanted = [
+        "- node       /controller",
+        "+ node       /pilot",
+        "+ node       /teleop",
+        "~ rate       /scan",
+        "10 Hz → 5 Hz",
+        "a.bag and b.bag: ",
+    ];
+    for line in wanted {
+        assert!(said.contains(line), "no `{line}` in {said}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_slice(&fs::read(here.join("d.json")).unwrap()).unwrap();
+    let rows = json["differences"].as_array().unwrap();
+    assert!(
+        rows.iter()
+            .any(|r| r["kind"] == "rate" && r["name"] == "/scan" && r["in"] == "both")
+    );
+    let svg = fs::read_to_string(here.join("d.svg")).unwrap();
+    for name in ["/controller", "/pilot", "/teleop", "/scan", "/odom"] {
+        assert!(svg.contains(name), "{name}");
+    }
+    assert!(!svg.contains("window 1 of"), "time means nothing here");
+    assert!(fs::read(here.join("d.gif")).unwrap().starts_with(b"GIF89a"));
+    assert!(
+        fs::read_to_string(here.join("d.md"))
+            .unwrap()
+            .starts_with("### 🔀 ")
+    );
+    fs::write(
+        here.join("g.yaml"),
+        "schema: bagreel.expect/1\nnodes:\n  /teleop: {}\n",
+    )
+    .unwrap();
+    let (code, said) = run(here, &["diff", "a.bag", "g.yaml"]);
+    assert_eq!(
+        (code, said.contains("error[node-missing]: /teleop")),
+        (1, true),
+        "{said}"
+    );
+    assert_eq!(run(here, &["diff", "gone.bag", "a.bag"]).0, 2);
+    assert_eq!(run(here, &["diff", "a.bag"]).0, 2);
+}

@@ -100,10 +100,27 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("check", "r.bag --expect all.yaml --format markdown", "--link player=https://example.org"),
     ("check", "r.bag --expect all.yaml", "--period 7s"),
     ("check", "r.bag --expect all.yaml", "--start 20"),
+    ("diff", "r.bag s.mcap", "--format json"),
+    ("diff", "r.bag s.mcap", "--output out/x.json"),
+    ("diff", "r.bag s.mcap -o out/x.svg", "--style dark"),
+    ("diff", "r.bag s.mcap -o out/x.png", "--size 300x200"),
 ];
 
 /// Options whose row is still to be written.
 const OPEN: &[(&str, &[&str])] = &[
+    (
+        "diff",
+        &[
+            "rate-change",
+            "start",
+            "end",
+            "roles",
+            "topology",
+            "source",
+            "source-at",
+            "infer",
+        ],
+    ),
     (
         "baseline",
         &["topology", "source", "source-at", "infer", "only"],
@@ -356,7 +373,7 @@ fn outcome(folder: &Path, command: &str, args: &str, with: &str) -> Option<Outco
         // 3: some topics cannot be decoded.
         Some(0 | 3) => {}
         // What is found is a result.
-        Some(1) if command == "check" => {}
+        Some(1) if command == "check" || command == "diff" => {}
         Some(1 | 2) => return None,
         code => panic!("{command} {args} {with}: {code:?} {said}"),
     }
@@ -411,6 +428,11 @@ fn every_option_of_extract_changes_something() {
 #[test]
 fn every_option_of_baseline_changes_something() {
     changes("baseline");
+}
+
+#[test]
+fn every_option_of_diff_changes_something() {
+    changes("diff");
 }
 
 #[test]

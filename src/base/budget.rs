@@ -29,9 +29,9 @@ pub(crate) const MISSION_JSON: u64 = 4 << 30;
 /// The longest file of a job's summary that a report is written behind, in bytes: GitHub takes 1 MiB.
 pub(crate) const SUMMARY: u64 = 16 << 20;
 
-/// The most names, types and states of a mission: ten times the topics of the largest robot known. With all that is kept
-/// about each, they take about 256 MB.
-pub(crate) const NAMES: usize = 1 << 17;
+/// The most names, types and states of a mission: five times the topics of the largest robot known. With all that is kept
+/// about each, in the windows of `info` too, they take about 256 MB.
+pub(crate) const NAMES: usize = 1 << 16;
 
 /// The longest of them, in bytes: ROS allows 255 for a name, and the quality of service of a hundred publishers is text
 /// too.
@@ -40,7 +40,7 @@ pub(crate) const NAME: usize = 1 << 16;
 /// Their bytes in all.
 pub(crate) const NAMES_BYTES: usize = 32 << 20;
 
-/// The most things claimed about them, each by one source: four for each name.
+/// The most things claimed about them, each by one source: eight for each name.
 pub(crate) const CLAIMS: usize = 1 << 19;
 
 /// The most lines of evidence on what somebody asks about, and the most characters of each: more than anybody reads.

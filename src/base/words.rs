@@ -179,6 +179,14 @@ pub fn clock(nanos: i64) -> String {
     )
 }
 
+/// Date and zone of a time since 1970, in nanoseconds: `2024-05-03 UTC`; just `UTC` where the year is outside 0..=9999.
+pub fn date(nanos: i64) -> String {
+    match jiff::Timestamp::from_second(nanos.div_euclid(SECOND)) {
+        Ok(time) => time.strftime("%Y-%m-%d UTC").to_string(),
+        Err(_) => "UTC".to_owned(),
+    }
+}
+
 /// Date, clock and zone of a time since 1970, in nanoseconds: `2024-05-03 14:03:22 UTC`; the bare number of seconds
 /// where the year is outside 0..=9999.
 pub fn date_and_clock(nanos: i64) -> String {

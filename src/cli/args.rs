@@ -39,6 +39,9 @@ pub(super) enum Command {
     Extract(Box<ExtractArgs>),
     /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
+    /// Tell what differs between two missions: who is there, who talks to whom, how often, what happened when.
+    #[command(after_help = gate::DIFF_HELP)]
+    Diff(Box<gate::DiffArgs>),
     /// Write down what healthy runs have in common, as an expectation to edit and to keep.
     #[command(after_help = gate::BASELINE_HELP)]
     Baseline(Box<gate::BaselineArgs>),
@@ -250,7 +253,7 @@ impl Default for ChangeArgs {
     }
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Graph")]
 pub(super) struct GraphArgs {
     /// Draw and compare roles instead of names: anonymous suffixes folded.

@@ -3,15 +3,106 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use super::args::gate::{BaselineArgs, CheckArgs, GateTime, Undecidable};
+use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, GateTime, Undecidable};
 use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use super::terminal::Terminal;
-use super::{DONE, FAILED, SKIPPED, USAGE, code, reading, summary};
+use super::{DONE, FAILED, SKIPPED, USAGE, code, look, reading, summary};
 use crate::base::error::{Error, Result};
+use crate::base::geometry::Size;
+use crate::export::Output;
 use crate::export::target::Target;
-use crate::gate::{Format, Severity, explain};
-use crate::pipeline::Reading;
-use crate::pipeline::gate::{self, Baseline, Check, Report};
+use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Severity, explain};
+use crate::pipeline::gate::{self, Baseline, Check, Diff, Report};
+use crate::pipeline::{Drawing, Reading};
+
+/// Tells what differs between two missions, or between one and an expectation.
+pub(super) fn diff(args: &DiffArgs, terminal: &mut Terminal) -> Result<u8> {
+    let paths = [&args.first, &args.second];
+    if let Some(at) = paths.iter().position(|path| is_expectation(path)) {
+        return against(args, paths[1 - at], paths[at], terminal);
+    }
+    let job = diff_job(args)?;
+    let done = gate::diff(&job, terminal)?;
+    terminal.results(&(args.format.write)(&job.subject, &done.differences))?;
+    for remark in &done.remarks {
+        terminal.note(remark);
+    }
+    for mission in &done.missions {
+        terminal.notices(&mission.notices);
+    }
+    let is_different = done.differences.iter().any(|d| d.is_known);
+    let worst = done.missions.iter().map(code).max().unwrap_or(DONE);
+    Ok(if is_different { FAILED } else { worst })
+}
+
+fn diff_job(args: &DiffArgs) -> Result<Diff> {
+    let one = |path: &PathBuf| {
+        let inputs = Inputs {
+            bags: vec![path.clone()],
+            verify: false,
+        };
+        judged(&inputs, &args.time(), &args.graph)
+    };
+    let name = |path: &PathBuf| {
+        let last = path
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
+        last.unwrap_or_else(|| path.display().to_string())
+    };
+    let (mut reports, mut pictures) = (Vec::new(), Vec::new());
+    for output in &args.outputs {
+        let ending = output.to_string_lossy().to_ascii_lowercase();
+        let is_end = |f: &&DiffFormat| f.endings.iter().any(|end| ending.ends_with(end));
+        match DIFF_FORMATS.iter().find(is_end) {
+            Some(format) => reports.push((Target::parse(output), format)),
+            None => pictures.push(Output::named(output, None)?),
+        }
+    }
+    let mut drawing = Drawing::new()?;
+    drawing.style = look::style(&args.style)?;
+    if let Some((width, height)) = args.size {
+        drawing.page.size = Size::new(f64::from(width), f64::from(height));
+        drawing.is_sized = true;
+    }
+    let subject = DiffSubject {
+        first: name(&args.first),
+        second: name(&args.second),
+    };
+    drawing.page.compares = true;
+    drawing.page.title = format!("{} → {}", subject.first, subject.second);
+    Ok(Diff {
+        readings: [one(&args.first)?, one(&args.second)?],
+        rate_change: args.rate_change,
+        subject,
+        reports,
+        pictures,
+        drawing,
+    })
+}
+
+/// Whether a path names an expectation.
+fn is_expectation(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|end| end == "yaml" || end == "yml")
+        && path.is_file()
+}
+
+/// The difference between a mission and an expectation is what a check finds.
+fn against(args: &DiffArgs, bag: &Path, expect: &Path, terminal: &mut Terminal) -> Result<u8> {
+    let format = Format::from_word(args.format.word);
+    let check = CheckArgs {
+        bags: vec![bag.to_owned()],
+        expect: Some(expect.to_owned()),
+        format: format.unwrap_or(&crate::gate::FORMATS[0]),
+        outputs: args.outputs.clone(),
+        link: Vec::new(),
+        undecidable: Undecidable::Allow,
+        explain: None,
+        time: args.time(),
+        graph: args.graph.clone(),
+    };
+    self::check(&check, terminal)
+}
 
 /// Writes down what healthy runs have in common.
 pub(super) fn baseline(args: &BaselineArgs, terminal: &mut Terminal) -> Result<u8> {

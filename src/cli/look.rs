@@ -80,6 +80,7 @@ pub(super) fn options(args: &LookArgs, title: String, rate_change: f64) -> PageO
         size,
         width_mm: args.width,
         bare: args.bare,
+        compares: false,
         title,
         orientation: match args.orientation.as_str() {
             "LR" => Some(Orientation::LeftRight),

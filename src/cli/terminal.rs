@@ -181,6 +181,11 @@ impl Watch for Terminal {
         }
     }
 
+    fn note(&mut self, text: &str) {
+        self.end_stage();
+        Self::note(self, text);
+    }
+
     fn shares(&mut self, shares: &[(&'static str, f64)]) {
         let Some((stage, _)) = self.stage else {
             return;
@@ -203,6 +208,7 @@ impl Watch for Terminal {
 fn bar(stage: Stage) -> ProgressBar {
     let template = match stage {
         Stage::Read | Stage::Verify => "{msg:>9} [{bar:40}] {bytes}/{total_bytes}",
+        Stage::Draw => "{msg:>9} [{bar:40}] frame {pos} of {len}, {eta} left",
         _ => "{msg:>9} [{bar:40}] {pos}/{len}",
     };
     let style =

@@ -42,6 +42,8 @@ pub struct PageOptions {
     pub width_mm: Option<f64>,
     /// The graph alone, without title, caption, legend and timeline.
     pub bare: bool,
+    /// Whether two missions are compared, so that no time, no window and no timeline means anything.
+    pub compares: bool,
     /// The title, such as the bag's name.
     pub title: String,
     /// Which way the edges run; `None` takes what fits better.
@@ -58,6 +60,7 @@ impl Default for PageOptions {
             size: Size::new(1280.0, 720.0),
             width_mm: None,
             bare: false,
+            compares: false,
             title: String::new(),
             orientation: None,
             phases: Vec::new(),
@@ -227,12 +230,11 @@ impl<'a> Picture<'a> {
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
-        scene.title = format!(
-            "{}, window {} of {}",
-            measured.options.title,
-            frame.index + 1,
-            self.len()
-        );
+        scene.title.clone_from(&measured.options.title);
+        if !measured.options.compares {
+            let (window, all) = (frame.index + 1, self.len());
+            scene.title = format!("{}, window {window} of {all}", scene.title);
+        }
         if !frame.caption.is_empty() {
             scene.title = format!("{}: {}", scene.title, frame.words(usize::MAX));
         }
@@ -259,7 +261,9 @@ impl<'a> Picture<'a> {
                 measured.style,
                 &measured.page,
             ));
-            groups.extend(self.timeline.ground(measured.view));
+            if !measured.options.compares {
+                groups.extend(self.timeline.ground(measured.view));
+            }
         }
         groups
     }
@@ -271,6 +275,12 @@ impl<'a> Picture<'a> {
             .phases
             .get(k)
             .map_or("", String::as_str);
+        if self.measured.options.compares {
+            groups.push(self.title.compared());
+            groups.push(self.title.chips(frame));
+            groups.push(self.title.caption(frame, phase));
+            return;
+        }
         groups.push(self.title.window(self.measured.view, frame));
         groups.push(self.title.chips(frame));
         groups.push(self.title.clock(frame));
@@ -283,8 +293,11 @@ impl<'a> Picture<'a> {
         let boxes = self.boxes();
         let full = self.inhabited(frame);
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
+        let mut titles = Vec::new();
         for (at, (space, place)) in spaces.enumerate() {
-            groups.push(boxes.space(space, *place, &encoded(&space.name), !full[at]));
+            let mut space = boxes.space(space, *place, &encoded(&space.name), !full[at]);
+            titles.push(boxes.title_of(&mut space));
+            groups.push(space);
         }
         let arrows = Arrows {
             style: self.measured.style,
@@ -292,22 +305,29 @@ impl<'a> Picture<'a> {
             fit: self.fit,
         };
         // What changed lies on top.
-        let mut changed = Vec::new();
+        let (mut changed, mut over, mut changed_over) = (Vec::new(), Vec::new(), Vec::new());
         for &at in &self.order {
             let Some(shown) = measured::find(&frame.arrows, at) else {
                 continue;
             };
             let arrow = &view.arrows[at];
             let ends = [arrow.from, arrow.to].map(|id| measured::find(&frame.items, id as usize));
-            let group = arrows.arrow(arrow, &self.tracks[at], shown, ends);
-            let pile = if shown.mark.is_some() {
-                &mut changed
+            let (line, label) = arrows.parts(arrow, &self.tracks[at], shown, ends);
+            let (lines, labels) = if shown.mark.is_some() {
+                (&mut changed, &mut changed_over)
             } else {
-                &mut *groups
+                (&mut *groups, &mut over)
             };
-            pile.push(group);
+            lines.push(line);
+            if !label.pieces.is_empty() {
+                labels.push(label);
+            }
         }
         groups.append(&mut changed);
+        // No line runs over words.
+        for mut words in [titles, over, changed_over] {
+            groups.append(&mut words);
+        }
         for shown in &frame.items {
             let at = shown.id as usize;
             if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {

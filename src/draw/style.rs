@@ -396,6 +396,50 @@ mod tests {
         assert!(refusal("[node\nfill").contains("line 1"));
     }
 
+    /// Contrast as WCAG 2 defines it, 1..=21.
+    fn contrast(a: Color, b: Color) -> f64 {
+        let light = |color: Color| {
+            let linear = color.rgb().unwrap_or([255; 3]).map(|channel| {
+                let c = f64::from(channel) / 255.0;
+                if c <= 0.039_28 {
+                    c / 12.92
+                } else {
+                    libm::pow((c + 0.055) / 1.055, 2.4)
+                }
+            });
+            0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05
+        };
+        let (a, b) = (light(a), light(b));
+        a.max(b) / a.min(b)
+    }
+
+    #[test]
+    fn every_line_is_seen_on_the_page_and_in_a_namespace() {
+        for (name, _) in BUILTIN {
+            let style = Style::builtin(name).unwrap();
+            let lines = [
+                style.edge.stroke,
+                style.silent.stroke,
+                style.declared.stroke,
+                style.added.color,
+                style.removed.color,
+                style.changed.color,
+            ];
+            let page = style.background();
+            for (ground, line) in [page, style.cluster.fill]
+                .into_iter()
+                .filter(|ground| *ground != Color::NONE)
+                .flat_map(|ground| lines.map(|line| (ground, line)))
+            {
+                let contrast = contrast(line, ground);
+                assert!(
+                    contrast >= 3.0,
+                    "{name}: {line} on {ground} is {contrast:.2}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn colours_mix() {
         let (black, white) = (

@@ -171,6 +171,11 @@ fn kind(error: &Error) -> Option<io::ErrorKind> {
     }
 }
 
+/// How many frames are drawn at a time.
+pub(crate) fn cores() -> usize {
+    rayon::current_num_threads()
+}
+
 /// A packet with the index of its window and the time of its frame.
 struct Waiting(usize, FrameTime, Packet);
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::finding::Cause;
 use super::pattern::Pattern;
 use crate::base::name::is_quiet;
+use crate::base::notice::NoticeKind;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Degree, Evidence};
@@ -26,6 +27,8 @@ pub(crate) struct Facts<'a> {
     degrees: Degrees,
     /// Messages of each topic.
     messages: Vec<u64>,
+    /// Whether a tool rewrote the bag, so that it names false publishers.
+    is_rewritten: bool,
     /// Nodes that are there, by role.
     roles: BTreeMap<&'a str, Vec<NodeId>>,
     /// The graph of each window, all at hand: rules look at them in any order.
@@ -120,6 +123,10 @@ impl<'a> Facts<'a> {
             mission,
             degrees,
             messages,
+            is_rewritten: mission
+                .notices
+                .iter()
+                .any(|n| n.kind == NoticeKind::Rewritten),
             roles,
             graphs,
         }
@@ -223,6 +230,11 @@ impl<'a> Facts<'a> {
             .collect()
     }
 
+    /// Whether a tool rewrote the bag: senders that it merged cannot be told apart.
+    pub(crate) fn is_rewritten(&self) -> bool {
+        self.is_rewritten
+    }
+
     /// Whether the bag names nodes at all.
     pub(crate) fn names_nodes(&self) -> bool {
         self.roles()
@@ -233,7 +245,9 @@ impl<'a> Facts<'a> {
     pub(crate) fn tells_publishers(&self, topic: TopicId) -> bool {
         let unknown = self.mission.elements.topics[topic as usize].unknown_publishers;
         let known = self.publishers(topic);
-        unknown.unwrap_or(0) == 0 && known.iter().any(|(.., degree)| *degree <= Degree::Stated)
+        !self.is_rewritten
+            && unknown.unwrap_or(0) == 0
+            && known.iter().any(|(.., degree)| *degree <= Degree::Stated)
     }
 
     /// Whether the bag lists subscribers, so that a node that is not listed is none: everywhere, or of these nodes.

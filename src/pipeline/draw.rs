@@ -10,7 +10,7 @@ use crate::base::words;
 use crate::draw::picture::{self, Measured, PageOptions};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
-use crate::layout::{Engine, Layout, extend, lay_out};
+use crate::layout::{Engine, Layout, RING, engine, extend, lay_out};
 use crate::mission::{Mission, Place, Places};
 use crate::view::{Mode, View, ViewOptions, outline, view};
 
@@ -85,10 +85,11 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
             best = Attempt::new(mission, drawing, &options, &page);
         }
         collapse(mission, drawing, &page, &mut options, &mut best);
-        if !best.is_readable() {
+        if best.is_readable() {
+            open_again(mission, drawing, &page, (&mut options, asked), &mut best);
+        } else {
             bundle(mission, drawing, &page, &mut options, &mut best);
         }
-        open_again(mission, drawing, &page, (&mut options, asked), &mut best);
     }
     let Attempt {
         view,
@@ -229,9 +230,19 @@ fn bundle(
     bundled
         .collapse
         .extend(outermost.into_iter().map(Arc::from));
+    let boxes = outline(mission, &bundled);
+    // Few boxes with many arrows among them stand best around the page.
+    let drawing = if boxes.items.len() <= RING && boxes.namespaces.is_empty() {
+        let ring = engine("ring").unwrap_or(drawing.engine);
+        &Drawing {
+            engine: ring,
+            ..drawing.clone()
+        }
+    } else {
+        drawing
+    };
     let attempt = Attempt::new(mission, drawing, &bundled, page);
-    let says_something = attempt.view.items.len() > 1;
-    if says_something && attempt.text > best.text {
+    if boxes.items.len() > 1 && attempt.text > best.text {
         (*options, *best) = (bundled, attempt);
     }
 }

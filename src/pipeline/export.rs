@@ -8,6 +8,7 @@ use super::{Drawing, Phases, Reading, Stage, Watch, read};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::words;
 use crate::draw::figure::Figure;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
@@ -16,8 +17,9 @@ use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::Sequence;
 use crate::export::{self, OneDrawing, Output, Written};
+use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{View, filtered};
+use crate::view::{View, filtered, nothing};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -134,6 +136,10 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     } else {
         unseen(&drawing)
     };
+    let elements = &mission.elements;
+    if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
+        return Err(nothing(elements, &options));
+    }
     let places = is_drawn.then(|| places(&view, &layout));
     let nothing = View::default();
     let drawn = if is_drawn { &view } else { &nothing };
@@ -164,6 +170,9 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
         latex: figure.as_ref().map(|(_, latex)| latex.as_str()),
         options: job.sequence.clone(),
     };
+    if let Some(warning) = long_job(job, &sequence) {
+        watch.note(&warning);
+    }
     watch.stage(Stage::Draw);
     let mut progress = |done: usize, total: usize| {
         watch.progress(done as u64, total as u64);
@@ -192,6 +201,39 @@ fn captions(mission: &Mission) -> Vec<String> {
         phase.unwrap_or_default()
     };
     mission.windows.iter().map(|w| name(w.span.end)).collect()
+}
+
+/// More frames than this are told before they are drawn.
+const MANY_FRAMES: usize = 2000;
+/// Milliseconds of one core for a frame, and for each of its megapixels: measured with `tests/bench/drawing.rs`, and
+/// half as much again.
+const FRAME_MS: (f64, f64) = (4.0, 13.0);
+
+/// What to know before a job of very many frames begins: how many, for how long, and what would be sensible.
+fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
+    let is_drawn = |o: &Output| o.format.is_drawn && o.format.whole != OneDrawing::Asked;
+    let frames = sequence.frame_times().len();
+    if frames <= MANY_FRAMES || !job.outputs.iter().any(is_drawn) {
+        return None;
+    }
+    let size = sequence.picture.scene(0, 1.0).size;
+    let pixels = size.w * size.h * sequence.options.scale * sequence.options.scale / 1e6;
+    let cores = run::cores() as f64;
+    let ms = frames as f64 * (FRAME_MS.0 + FRAME_MS.1 * pixels) / cores;
+    #[expect(clippy::cast_possible_truncation, reason = "a rough number of seconds")]
+    let about = words::duration((ms / 1000.0).ceil() as i64 * 1_000_000_000);
+    let windows = &sequence.mission.windows;
+    let (first, last) = (windows.first()?, windows.last()?);
+    let sensible = default_period(last.span.end.since(first.span.start));
+    let advice = if sensible > sequence.mission.period {
+        let period = words::period(sensible.nanos());
+        format!("`--period {}`", period.replace(' ', ""))
+    } else {
+        "`--start` and `--end`".to_owned()
+    };
+    Some(format!(
+        "{frames} frames will take about {about}; {advice} would show less, `--skip-unchanged` only what changes"
+    ))
 }
 
 /// The figure with its lines for LaTeX, if one was asked for.

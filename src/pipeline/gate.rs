@@ -3,14 +3,18 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::{Reading, Watch, read};
+use super::{Drawing, Reading, Render, Watch, read, show};
 use crate::bag::Input;
 use crate::base::error::Result;
 use crate::base::{budget, file, words};
+use crate::export::Output;
 use crate::export::check as places;
 use crate::export::sink::Sink;
 use crate::export::target::Target;
-use crate::gate::{Format, Subject, Update, Verdict, judge, update, write};
+use crate::gate::{
+    DiffFormat, DiffSubject, Difference, Format, Side, Subject, Update, Verdict, differences,
+    judge, union, update, write,
+};
 use crate::graph::window::Length;
 use crate::mission::Mission;
 
@@ -85,6 +89,71 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
     }
     Ok(Checked { mission, verdict })
 }
+
+/// The whole job of `bagreel diff`.
+pub(crate) struct Diff {
+    pub(crate) readings: [Reading; 2],
+    /// The share by which a rate must differ.
+    pub(crate) rate_change: f64,
+    pub(crate) subject: DiffSubject,
+    pub(crate) reports: Vec<(Target, &'static DiffFormat)>,
+    /// Pictures of both missions.
+    pub(crate) pictures: Vec<Output>,
+    pub(crate) drawing: Drawing,
+}
+
+/// What came of it.
+pub(crate) struct Compared {
+    pub(crate) missions: Vec<Mission>,
+    pub(crate) differences: Vec<Difference>,
+    /// What is worth knowing of the pictures.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// Compares two missions, and writes every report and picture.
+///
+/// # Errors
+/// Where a mission cannot be read or an output cannot be written.
+pub(crate) fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
+    let reports = job.reports.iter().map(|(target, _)| target.clone());
+    let pictures = job.pictures.iter().map(|output| output.target.clone());
+    let targets: Vec<Target> = reports.chain(pictures).collect();
+    places::check(&targets, &paths(&job.readings))?;
+    let [first, second] = &job.readings;
+    let first = read(first, watch)?;
+    let second = read(second, watch)?;
+    let differences = differences(&first, &second, job.rate_change);
+    for (target, format) in &job.reports {
+        put(target, &(format.write)(&job.subject, &differences))?;
+    }
+    // What moves shows the first mission and then both; what stands shows both.
+    let (moving, standing): (Vec<Output>, Vec<Output>) = job
+        .pictures
+        .iter()
+        .cloned()
+        .partition(|o| MOVING.contains(&o.format.word));
+    let mut remarks = Vec::new();
+    for (outputs, side) in [(moving, Side::Each), (standing, Side::Both)] {
+        if outputs.is_empty() {
+            continue;
+        }
+        let mission = union(&first, &second, &differences, side);
+        let mut render = Render::new(Reading::default(), outputs)?;
+        render.drawing = job.drawing.clone();
+        let done = show(&render, mission, watch)?;
+        let of_files = done.written.iter().flat_map(|w| w.remarks.clone());
+        remarks.extend(of_files);
+        remarks.extend(done.mission.notices.iter().map(|n| n.text));
+    }
+    Ok(Compared {
+        missions: vec![first, second],
+        differences,
+        remarks,
+    })
+}
+
+/// Formats in which one window follows another.
+const MOVING: [&str; 5] = ["gif", "apng", "html", "mp4", "webm"];
 
 /// The whole job of `bagreel baseline`.
 pub(crate) struct Baseline {

@@ -47,6 +47,11 @@ impl NameFilter {
         included && !self.excludes.iter().any(|t| t.matches(name))
     }
 
+    /// What is wished for, as it was written: names and patterns.
+    pub(crate) fn wanted(&self) -> Vec<&str> {
+        self.includes.iter().map(|t| t.text.as_str()).collect()
+    }
+
     /// Whether every name passes.
     pub fn passes_all(&self) -> bool {
         self.includes.is_empty() && self.excludes.is_empty()

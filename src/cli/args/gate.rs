@@ -5,10 +5,56 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{GraphArgs, Inputs, length, moment};
+use super::{GraphArgs, Inputs, length, moment, share, size};
 use crate::base::time::Moment;
 use crate::gate;
+use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::Length;
+
+#[derive(Debug, Args)]
+pub(crate) struct DiffArgs {
+    /// A bag, a folder, a mission in JSON, or an expectation (`.yaml`), which the other is held against.
+    #[arg(value_name = "A")]
+    pub(crate) first: PathBuf,
+    /// The other.
+    #[arg(value_name = "B")]
+    pub(crate) second: PathBuf,
+    /// How to print what differs.
+    #[arg(long, value_name = "text|json|markdown", default_value = "text", value_parser = diff_format)]
+    pub(crate) format: &'static gate::DiffFormat,
+    /// A file to write too: `.txt`, `.json`, `.md`, or one picture of both: `.html`, `.svg`, `.gif` and all that `render`
+    /// draws. May be given many times.
+    #[arg(long = "output", short, value_name = "FILE")]
+    pub(crate) outputs: Vec<OsString>,
+    /// The style of pictures: built in, or a style file. See `bagreel styles`.
+    #[arg(long, default_value = "light", value_name = "NAME|FILE")]
+    pub(crate) style: String,
+    /// The size of pictures in pixels.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<(u32, u32)>,
+    /// A rate that differs by more than this share is told, if chance does not make such a difference.
+    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
+    pub(crate) rate_change: f64,
+    /// Begin both here: `90`, `1:30` or `2m` after the bag's start, `-30s` before its end, or RFC 3339.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(crate) start: Option<Moment>,
+    /// End both here, written like `--start`.
+    #[arg(long, value_parser = moment, allow_hyphen_values = true)]
+    pub(crate) end: Option<Moment>,
+    #[command(flatten)]
+    pub(crate) graph: GraphArgs,
+}
+
+impl DiffArgs {
+    /// Which part of the missions is compared.
+    pub(crate) fn time(&self) -> GateTime {
+        GateTime {
+            period: None,
+            start: self.start,
+            end: self.end,
+        }
+    }
+}
 
 #[derive(Debug, Args)]
 pub(crate) struct BaselineArgs {
@@ -102,6 +148,8 @@ impl CheckArgs {
     }
 }
 
+pub(crate) const DIFF_HELP: &str = "Exit codes: 0 the same, 1 different, 2 could not tell (usage, unreadable), 3 the same but data was skipped (damaged \
+    bag).";
 pub(crate) const BASELINE_HELP: &str =
     "Exit codes: 0 written, 1 failed, 2 usage, 3 written but data was skipped (damaged bag).";
 pub(crate) const CHECK_HELP: &str = "Exit codes: 0 kept, 1 broken, 2 could not tell (usage, unreadable, or nothing could be decided), 3 kept but data was \
@@ -112,6 +160,12 @@ fn check_format(word: &str) -> Result<&'static gate::Format, String> {
         let words: Vec<&str> = gate::FORMATS.iter().map(|f| f.word).collect();
         format!("write one of {}", words.join(", "))
     })
+}
+
+fn diff_format(word: &str) -> Result<&'static gate::DiffFormat, String> {
+    let word = if word == "md" { "markdown" } else { word };
+    let format = gate::DIFF_FORMATS.iter().find(|f| f.word == word);
+    format.ok_or_else(|| "write one of text, json, markdown".to_owned())
 }
 
 fn link(text: &str) -> Result<(String, String), String> {

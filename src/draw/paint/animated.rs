@@ -170,10 +170,10 @@ impl Play<'_> {
         line(xml, "t", 26, &visible(self.title));
         if let (Some(first), Some(last)) = (self.view.frames.first(), self.view.frames.last()) {
             let whole = last.span.end.since(first.span.start) / 1_000_000_000 * 1_000_000_000;
-            let period = words::period(first.span.nanos());
+            let period = words::duration(first.span.nanos());
             let told = format!(
-                "{} windows of {period} · {}",
-                self.windows,
+                "{} of {period} · {}",
+                words::count(self.windows, "window"),
                 words::offset(whole)
             );
             line(xml, "u", 45, &told);

@@ -85,6 +85,19 @@ impl Arrows<'_> {
         shown: &Shown,
         ends: [Option<&Shown>; 2],
     ) -> Group {
+        let (mut group, over) = self.parts(arrow, track, shown, ends);
+        group.pieces.extend(over.pieces);
+        group
+    }
+
+    /// Its line, and its rate and badge, which no line may cover.
+    pub(crate) fn parts(
+        &self,
+        arrow: &Arrow,
+        track: &ArrowPath,
+        shown: &Shown,
+        ends: [Option<&Shown>; 2],
+    ) -> (Group, Group) {
         let look = options::of_arrow(self.style, &arrow.kind, shown);
         let [from, to] = &track.ends;
         let kind = arrow.kind.word();
@@ -95,17 +108,21 @@ impl Arrows<'_> {
             title: format!("{from} → {to}\n{kind}: {}", chips::facts(shown)),
             ..Group::default()
         };
+        let mut over = Group {
+            id: format!("{}..over", group.id),
+            ..group.clone()
+        };
         self.line(&mut group, track, &look);
         if let Some((text, is_pill)) = arrow_label(arrow, shown, ends[0])
             && track.label.is_some()
         {
-            self.label(&mut group, &text, is_pill, track, shown, &look);
+            self.label(&mut over, &text, is_pill, track, shown, &look);
         }
         if let Some(mark) = shown.mark.filter(|mark| is_badged(*mark, ends)) {
             let size = self.fit.pen * 0.8;
-            badge::badge(&mut group, self.style, mark, track.badge, size);
+            badge::badge(&mut over, self.style, mark, track.badge, size);
         }
-        group
+        (group, over)
     }
 
     fn line(&self, group: &mut Group, track: &ArrowPath, look: &ArrowLook) {

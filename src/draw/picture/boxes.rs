@@ -5,7 +5,7 @@ use super::options::{self, BoxLook};
 use super::page::Fit;
 use super::{badge, chips};
 use crate::base::geometry::{Point, Rect};
-use crate::draw::scene::{Anchor, Fade, Form, Group, Shape, Stroke, Text};
+use crate::draw::scene::{Anchor, Fade, Form, Group, Piece, Shape, Stroke, Text};
 use crate::draw::style::{Body, Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
@@ -68,6 +68,31 @@ impl Boxes<'_> {
             text: space.title.clone(),
         });
         group
+    }
+
+    /// Takes the title out of a namespace's box, to be painted over the lines that cross it.
+    pub(crate) fn title_of(&self, space: &mut Group) -> Group {
+        let mut title = Group {
+            id: format!("{}..title", space.id),
+            class: "namespace-title".to_owned(),
+            data: space.data.clone(),
+            fade: space.fade,
+            ..Group::default()
+        };
+        if let Some(Piece::Text(text)) = space.pieces.pop() {
+            let fill = &self.style.cluster.fill;
+            let plate = if *fill == Color::NONE {
+                self.style.page.background
+            } else {
+                *fill
+            };
+            let halo = self.style.edge.halo_width * self.fit.scale * 1.5;
+            title.text(Text {
+                halo: Some((plate, halo)),
+                ..text
+            });
+        }
+        title
     }
 
     /// One item in one window.

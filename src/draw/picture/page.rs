@@ -43,7 +43,11 @@ impl Page {
             title = style.title.height * unit;
             caption = style.caption.height * unit;
             legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
-            timeline = (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit;
+            timeline = if options.compares {
+                0.0
+            } else {
+                (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit
+            };
         }
         let margin = (style.page.margin * unit)
             .min(size.w / 20.0)

@@ -255,13 +255,26 @@ fn lane_of(kind: Kind) -> usize {
     }
 }
 
-/// ▲ for what came, ◆ for what changed, ▼ for what went.
+/// A plus for what came, a diamond for what changed, a minus for what went, as on the badges.
 pub(crate) fn mark(lane: usize, c: Point, r: f64) -> Form {
     let at = |x: f64, y: f64| Point::new(c.x + x * r, c.y + y * r);
     match lane {
-        0 => polygon(&[at(-1.0, 0.8), at(0.0, -0.9), at(1.0, 0.8)]),
+        0 => polygon(&[
+            at(-0.35, -1.0),
+            at(0.35, -1.0),
+            at(0.35, -0.35),
+            at(1.0, -0.35),
+            at(1.0, 0.35),
+            at(0.35, 0.35),
+            at(0.35, 1.0),
+            at(-0.35, 1.0),
+            at(-0.35, 0.35),
+            at(-1.0, 0.35),
+            at(-1.0, -0.35),
+            at(-0.35, -0.35),
+        ]),
         1 => polygon(&[at(0.0, -1.0), at(1.0, 0.0), at(0.0, 1.0), at(-1.0, 0.0)]),
-        _ => polygon(&[at(-1.0, -0.8), at(0.0, 0.9), at(1.0, -0.8)]),
+        _ => polygon(&[at(-1.0, -0.4), at(1.0, -0.4), at(1.0, 0.4), at(-1.0, 0.4)]),
     }
 }
 

@@ -33,6 +33,12 @@ impl<'a> Title<'a> {
     ) -> Self {
         let unit = page.unit;
         let clock = fonts.width("00:00:00", style.title.clock_size * unit, Weight::SemiBold);
+        let date = fonts.width(
+            "0000-00-00 UTC",
+            style.title.quiet_size * unit,
+            Weight::Regular,
+        );
+        let clock = clock.max(date);
         let mut right = page.size.w - (style.page.margin + 14.0) * unit - clock;
         let mut chips = [(0.0, 0.0); 3];
         for kind in [2, 1, 0] {
@@ -95,15 +101,19 @@ impl<'a> Title<'a> {
             .map_or(frame.span.start, |f| f.span.start);
         let end = view.frames.last().map_or(frame.span.end, |f| f.span.end);
         let at = |stamp: crate::base::time::Stamp| words::offset(whole(stamp.since(start)));
-        let mut parts = vec![
-            format!("window {} of {}", frame.index + 1, view.frames.len()),
-            format!(
-                "{} – {} of {}",
-                at(frame.span.start),
-                at(frame.span.end),
-                words::offset(whole(end.since(start)))
-            ),
-        ];
+        let mut parts = vec![format!(
+            "{} – {} of {}",
+            at(frame.span.start),
+            at(frame.span.end),
+            words::offset(whole(end.since(start)))
+        )];
+        if view.frames.len() > 1 {
+            let window = format!("window {} of {}", frame.index + 1, view.frames.len());
+            parts.insert(0, window);
+        }
+        if frame.messages == 0 {
+            parts.insert(0, "no message".to_owned());
+        }
         if let Some(first) = view.frames.first().filter(|_| view.frames.len() > 1) {
             parts.push(format!(
                 "{} per window",
@@ -124,6 +134,19 @@ impl<'a> Title<'a> {
             parts.join(" · "),
             0.8,
             size,
+            Weight::Regular,
+            self.style.title.quiet,
+        ));
+        group
+    }
+
+    /// What the marks mean where two missions are compared, in the place of the window's time.
+    pub(crate) fn compared(&self) -> Group {
+        let mut group = Group::named("window");
+        group.text(self.words(
+            "removed: only in the first · added: only in the second".to_owned(),
+            0.8,
+            self.style.title.quiet_size * self.page.unit,
             Weight::Regular,
             self.style.title.quiet,
         ));
@@ -152,15 +175,25 @@ impl<'a> Title<'a> {
         let mut group = Group::named("clock");
         let style = &self.style.title;
         let (bar, size) = (self.page.title, style.clock_size * self.page.unit);
+        let small = style.quiet_size * self.page.unit;
         group.title = frame.span.start.rfc3339().unwrap_or_default();
         group.text(Text {
-            at: Point::new(bar.right() - self.left(), bar.y + bar.h / 2.0 + size * 0.36),
+            at: Point::new(bar.right() - self.left(), bar.y + bar.h * 0.43),
             anchor: Anchor::End,
             size,
             weight: Weight::SemiBold,
             color: style.text,
             halo: None,
             text: words::clock(frame.span.start.0),
+        });
+        group.text(Text {
+            at: Point::new(bar.right() - self.left(), bar.y + bar.h * 0.8),
+            anchor: Anchor::End,
+            size: small,
+            weight: Weight::Regular,
+            color: style.quiet,
+            halo: None,
+            text: words::date(frame.span.start.0),
         });
         group
     }

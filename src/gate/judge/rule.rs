@@ -253,15 +253,13 @@ fn past(event: &Event) -> String {
 
 /// What should happen: `/cmd_vel handed over to /teleop`.
 fn told(event: &Event) -> String {
-    let verb = match event.kind {
-        EventKind::HandedOver => "handed over",
-        EventKind::Rate => "at another rate",
-        EventKind::Lifecycle => "in another state",
-        kind => kind.word(),
-    };
-    let to = event
-        .to
-        .as_ref()
-        .map_or_else(String::new, |to| format!(" to {to}"));
-    format!("{} {verb}{to}", event.name)
+    let name = &event.name;
+    match (event.kind, &event.to) {
+        (EventKind::HandedOver, Some(to)) => format!("{name} handed over to {to}"),
+        (EventKind::HandedOver, None) => format!("{name} handed over"),
+        (EventKind::Lifecycle, Some(to)) => format!("{name} becoming {to}"),
+        (EventKind::Lifecycle, None) => format!("{name} in another state"),
+        (EventKind::Rate, _) => format!("{name} at another rate"),
+        (kind, _) => format!("{name} {}", kind.word()),
+    }
 }

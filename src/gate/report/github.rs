@@ -35,7 +35,8 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     for line in text.lines() {
         let _ = writeln!(out, "{}", inert(line));
     }
-    out
+    // Runners take this for a command wherever it stands in a line.
+    out.replace("##[", "#\\#[")
 }
 
 fn annotation(

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::Subject;
-use crate::base::words::visible_json;
 use crate::gate::finding::{Finding, Severity};
 use crate::gate::judge::Verdict;
+use crate::mission::info::json;
 
 #[derive(Serialize)]
 struct Issue<'a> {
@@ -32,7 +32,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings().into_iter();
     let told = findings.filter(|f| f.severity != Severity::Allowed);
     let issues: Vec<Issue<'_>> = told.map(|f| issue(subject, f)).collect();
-    visible_json(&serde_json::to_string_pretty(&issues).unwrap_or_default()).into_owned() + "\n"
+    json(&issues)
 }
 
 fn issue<'a>(subject: &'a Subject<'_>, finding: &'a Finding) -> Issue<'a> {

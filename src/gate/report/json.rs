@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::Subject;
-use crate::base::words::visible_json;
 use crate::gate::finding::{Finding, Severity};
 use crate::gate::judge::{Checked, Judgement, Verdict};
+use crate::mission::info::json;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -71,7 +71,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
         kept: verdict.facts(Judgement::Kept),
         rules: verdict.checks.iter().map(rule).collect(),
     };
-    visible_json(&serde_json::to_string_pretty(&report).unwrap_or_default()).into_owned() + "\n"
+    json(&report)
 }
 
 fn rule(check: &Checked) -> Rule<'_> {

@@ -111,7 +111,9 @@ fn row(facts: &Facts<'_>, finding: &Finding) -> String {
         }
     };
     // A pull request is read in seconds: the kind's own words, not its whole sentence.
-    let what = finding.kind.word().replace('-', " ");
+    let word = finding.kind.word();
+    let short = word.strip_prefix("node-").or(word.strip_prefix("topic-"));
+    let what = short.unwrap_or(word).replace('-', " ");
     format!(
         "| {sign} | {} {what} | {when} | {} | {} |\n",
         code(&finding.name),

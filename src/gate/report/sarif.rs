@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::{Subject, kinds};
-use crate::base::words::visible_json;
 use crate::gate::finding::{Finding, KINDS, Severity};
 use crate::gate::judge::Verdict;
 
@@ -37,7 +36,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
             "results": results,
         }],
     });
-    visible_json(&serde_json::to_string_pretty(&report).unwrap_or_default()).into_owned() + "\n"
+    crate::mission::info::json(&report)
 }
 
 fn result(subject: &Subject<'_>, finding: &Finding) -> Value {

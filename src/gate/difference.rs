@@ -1,0 +1,90 @@
+//! What differs between two missions: who is there, who talks to whom, how often, and what happened in which order.
+
+mod elements;
+mod happened;
+mod report;
+mod union;
+
+use super::facts::Facts;
+use crate::mission::Mission;
+
+pub(crate) use report::{DIFF_FORMATS, DiffFormat, DiffSubject};
+pub(crate) use union::{Side, union};
+
+/// In which of two missions something is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Where {
+    /// Only in the first.
+    First,
+    /// Only in the second.
+    Second,
+    /// In both, and not the same.
+    Both,
+}
+
+/// One thing that differs.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Difference {
+    /// What kind of thing: `node`, `topic`, `publishes`, `subscribes`, `type`, `rate`, …
+    pub(crate) kind: &'static str,
+    /// Whose: the name of a node or topic, or both of an edge.
+    pub(crate) name: String,
+    pub(crate) side: Where,
+    /// What the first mission has; empty for nothing.
+    pub(crate) first: String,
+    /// What the second has.
+    pub(crate) second: String,
+    /// Whether the missions tell. What one has no evidence of is not absent from it.
+    pub(crate) is_known: bool,
+}
+
+impl Difference {
+    /// Something that only one has.
+    fn only(kind: &'static str, name: impl Into<String>, side: Where, what: &str) -> Self {
+        let (first, second) = match side {
+            Where::Second => (String::new(), what.to_owned()),
+            _ => (what.to_owned(), String::new()),
+        };
+        Self {
+            kind,
+            name: name.into(),
+            side,
+            first,
+            second,
+            is_known: true,
+        }
+    }
+
+    /// Something that both have, each in its way.
+    fn changed(
+        kind: &'static str,
+        name: impl Into<String>,
+        first: impl Into<String>,
+        second: impl Into<String>,
+    ) -> Self {
+        Self {
+            kind,
+            name: name.into(),
+            side: Where::Both,
+            first: first.into(),
+            second: second.into(),
+            is_known: true,
+        }
+    }
+}
+
+/// All that differs, elements before what happened to them, each kind by name. A rate must differ by more than the
+/// share `rate_change`, and by more than chance explains.
+pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -> Vec<Difference> {
+    let (a, b) = (Facts::new(first), Facts::new(second));
+    let mut all = elements::differences(&a, &b, rate_change);
+    all.extend(happened::differences(&a, &b));
+    if a.is_rewritten() || b.is_rewritten() {
+        // Whose messages are whose is lost there, and with it when nodes end and come back.
+        let lost = ["publishes", "end", "restarts", "event"];
+        for one in all.iter_mut().filter(|d| lost.contains(&d.kind)) {
+            one.is_known = false;
+        }
+    }
+    all
+}

@@ -1,0 +1,247 @@
+//! Which nodes, topics and edges are in one mission only, and what of those in both is not the same.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Difference, Where};
+use crate::base::words;
+use crate::evidence::Degree;
+use crate::gate::facts::{Facts, Rate, SHUTDOWN_NS};
+use crate::gate::pattern::Pattern;
+use crate::graph::{NodeId, TopicId};
+use crate::mission::ledger::Kind;
+
+/// Fewer messages tell no rate.
+const FEWEST: u64 = 5;
+/// Rates differ if chance makes such a difference less often than 3 standard deviations.
+const SIGMAS: f64 = 3.0;
+
+/// All of them.
+pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>, rate_change: f64) -> Vec<Difference> {
+    let (ours, theirs) = (nodes(a), nodes(b));
+    let mut all: Vec<Difference> = presence("node", &keys(&ours), &keys(&theirs)).collect();
+    let (sent, heard) = (topics(a), topics(b));
+    all.extend(presence("topic", &keys(&sent), &keys(&heard)));
+    for (name, first) in &ours {
+        if let Some(second) = theirs.get(name) {
+            node(name, (a, first), (b, second), &mut all);
+        }
+    }
+    for (name, first) in &sent {
+        if let Some(second) = heard.get(name) {
+            let both = |role: &str| ours.contains_key(role) && theirs.contains_key(role);
+            topic(
+                name,
+                (a, *first),
+                (b, *second),
+                rate_change,
+                &both,
+                &mut all,
+            );
+        }
+    }
+    all
+}
+
+fn keys<'a, T>(map: &BTreeMap<&'a str, T>) -> BTreeSet<&'a str> {
+    map.keys().copied().collect()
+}
+
+fn presence<'a>(
+    kind: &'static str,
+    first: &BTreeSet<&'a str>,
+    second: &BTreeSet<&'a str>,
+) -> impl Iterator<Item = Difference> + use<'a> {
+    let all: BTreeSet<&str> = first.symmetric_difference(second).copied().collect();
+    let first = first.clone();
+    all.into_iter().map(move |name| {
+        let side = if first.contains(name) {
+            Where::First
+        } else {
+            Where::Second
+        };
+        Difference::only(kind, name, side, "present")
+    })
+}
+
+/// The roles that are sure to be there, without tools.
+fn nodes<'a, 'f>(facts: &'f Facts<'a>) -> BTreeMap<&'a str, &'f [NodeId]> {
+    let sure = |nodes: &[NodeId]| facts.is_sure(nodes) && !facts.is_tool(nodes);
+    facts.roles().filter(|(_, nodes)| sure(nodes)).collect()
+}
+
+/// The topics with messages, without housekeeping.
+fn topics<'a>(facts: &Facts<'a>) -> BTreeMap<&'a str, TopicId> {
+    let all = facts.topics(&Pattern::new("**")).into_iter();
+    let told = all.filter(|id| !facts.is_housekeeping(*id) && facts.messages(*id) > 0);
+    told.map(|id| (facts.topic(id), id)).collect()
+}
+
+fn node(
+    name: &str,
+    (a, first): (&Facts<'_>, &[NodeId]),
+    (b, second): (&Facts<'_>, &[NodeId]),
+    all: &mut Vec<Difference>,
+) {
+    let restarts =
+        |facts: &Facts<'_>, nodes: &[NodeId]| facts.entries(nodes, Kind::Restarted).len();
+    let (one, other) = (restarts(a, first), restarts(b, second));
+    if one != other {
+        all.push(Difference::changed(
+            "restarts",
+            name,
+            one.to_string(),
+            other.to_string(),
+        ));
+    }
+    let (one, other) = (a.lifecycle(first), b.lifecycle(second));
+    if let (Some(one), Some(other)) = (&one, &other)
+        && one != other
+    {
+        all.push(Difference::changed("lifecycle", name, &**one, &**other));
+    }
+    let (one, other) = (end(a, first), end(b, second));
+    if one.is_some() != other.is_some() {
+        let told = |end: Option<String>| end.unwrap_or_else(|| "stays".to_owned());
+        all.push(Difference::changed("end", name, told(one), told(other)));
+    }
+}
+
+/// When nodes ended, if they did not stay.
+fn end(facts: &Facts<'_>, nodes: &[NodeId]) -> Option<String> {
+    let end = facts.lives(nodes).last()?.end;
+    let is_over = facts.mission.span.end.since(end) > SHUTDOWN_NS;
+    is_over.then(|| format!("ends at {}", facts.clock(end)))
+}
+
+fn topic(
+    name: &str,
+    (a, first): (&Facts<'_>, TopicId),
+    (b, second): (&Facts<'_>, TopicId),
+    rate_change: f64,
+    in_both: &dyn Fn(&str) -> bool,
+    all: &mut Vec<Difference>,
+) {
+    let own = |facts: &Facts<'_>, id: TopicId| {
+        let topic = &facts.mission.elements.topics[id as usize];
+        let types: Vec<&str> = topic.types.iter().map(|t| &**t).collect();
+        (types.join(", "), topic.qos.clone())
+    };
+    let ((one, qos), (other, other_qos)) = (own(a, first), own(b, second));
+    if one.replace("/msg/", "/") != other.replace("/msg/", "/") {
+        all.push(Difference::changed("type", name, one, other));
+    }
+    if let (Some(qos), Some(other)) = (qos, other_qos)
+        && qos != other
+    {
+        all.push(Difference::changed("qos", name, &*qos, &*other));
+    }
+    rates(name, (a, first), (b, second), rate_change, all);
+    let sure = |edges: Vec<(NodeId, u32, Degree)>, facts: &Facts<'_>| -> BTreeSet<String> {
+        let sure = edges
+            .into_iter()
+            .filter(|(.., degree)| *degree <= Degree::Stated);
+        let roles = sure.filter(|(node, ..)| !facts.is_tool(&[*node]));
+        roles
+            .map(|(node, ..)| facts.role(node).to_owned())
+            .collect()
+    };
+    let senders = (sure(a.publishers(first), a), sure(b.publishers(second), b));
+    let listeners = (
+        sure(a.subscribers(first), a),
+        sure(b.subscribers(second), b),
+    );
+    let tells = |side: Where, role: &str, kind: &str| {
+        // Whether the mission that lacks the edge would tell of it.
+        let (facts, id) = if side == Where::First {
+            (b, second)
+        } else {
+            (a, first)
+        };
+        let nodes = facts.nodes(&Pattern::new(role));
+        let nodes: Vec<NodeId> = nodes
+            .iter()
+            .flat_map(|(_, nodes)| *nodes)
+            .copied()
+            .collect();
+        match kind {
+            "publishes" => facts.tells_publishers(id),
+            _ => facts.tells_subscribers(&nodes),
+        }
+    };
+    for (kind, (one, other)) in [("publishes", senders), ("subscribes", listeners)] {
+        for role in one
+            .symmetric_difference(&other)
+            .filter(|role| in_both(role))
+        {
+            let side = if one.contains(role) {
+                Where::First
+            } else {
+                Where::Second
+            };
+            let edge = match kind {
+                "publishes" => format!("{role} → {name}"),
+                _ => format!("{name} → {role}"),
+            };
+            let mut difference = Difference::only(kind, edge, side, "present");
+            difference.is_known = tells(side, role, kind);
+            all.push(difference);
+        }
+    }
+}
+
+fn rates(
+    name: &str,
+    (a, first): (&Facts<'_>, TopicId),
+    (b, second): (&Facts<'_>, TopicId),
+    rate_change: f64,
+    all: &mut Vec<Difference>,
+) {
+    let mean = |facts: &Facts<'_>, id: TopicId| {
+        let rates = facts.rates(id, true, facts.mission.span);
+        let count: u64 = rates.iter().map(|r| r.count).sum();
+        let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
+        let seconds = nanos.max(1) as f64 / 1e9;
+        (count >= FEWEST).then(|| {
+            (
+                count as f64,
+                seconds,
+                facts.is_even(id, &rates),
+                spread(&rates),
+            )
+        })
+    };
+    let (Some(one), Some(other)) = (mean(a, first), mean(b, second)) else {
+        return;
+    };
+    let (from, to) = (one.0 / one.1, other.0 / other.1);
+    // What comes at even times is known to a message; chance moves a count by its square root, bursts by more.
+    let doubt = |(count, seconds, is_even, spread): (f64, f64, bool, f64)| {
+        let chance = if is_even { 1.0 } else { libm::sqrt(count) };
+        (chance / seconds).max(spread)
+    };
+    let (mine, theirs) = (doubt(one), doubt(other));
+    let noise = SIGMAS * libm::sqrt(mine * mine + theirs * theirs);
+    let apart = libm::fabs(to - from);
+    if apart > rate_change * from.min(to) && apart > noise {
+        all.push(Difference::changed(
+            "rate",
+            name,
+            words::rate(from),
+            words::rate(to),
+        ));
+    }
+}
+
+/// The standard error of the mean rate, by how windows differ; 0 with fewer than two.
+fn spread(rates: &[Rate]) -> f64 {
+    let n = rates.len() as f64;
+    if rates.len() < 2 {
+        return 0.0;
+    }
+    let mean = rates.iter().map(Rate::hz).sum::<f64>() / n;
+    let sum: f64 = rates
+        .iter()
+        .map(|r| (r.hz() - mean) * (r.hz() - mean))
+        .sum();
+    libm::sqrt(sum / (n - 1.0) / n)
+}

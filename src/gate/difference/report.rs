@@ -1,0 +1,187 @@
+//! Differences as text, JSON and Markdown.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::{Difference, Where};
+use crate::base::words::{self, visible};
+use crate::export::report::escape::{code, plain};
+
+/// The two missions as the user called them.
+#[derive(Clone, Debug)]
+pub(crate) struct DiffSubject {
+    pub(crate) first: String,
+    pub(crate) second: String,
+}
+
+/// A format that differences can be written in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DiffFormat {
+    pub(crate) word: &'static str,
+    pub(crate) endings: &'static [&'static str],
+    pub(crate) write: fn(&DiffSubject, &[Difference]) -> String,
+}
+
+/// All formats.
+pub(crate) const DIFF_FORMATS: &[DiffFormat] = &[
+    DiffFormat {
+        word: "text",
+        endings: &[".txt"],
+        write: text,
+    },
+    DiffFormat {
+        word: "json",
+        endings: &[".json"],
+        write: json,
+    },
+    DiffFormat {
+        word: "markdown",
+        endings: &[".md", ".markdown"],
+        write: markdown,
+    },
+];
+
+/// The most bytes of a table, half of what we allow for a summary.
+const MOST: usize = 128 << 10;
+
+fn sign(difference: &Difference) -> char {
+    match (difference.is_known, difference.side) {
+        (false, _) => '?',
+        (_, Where::First) => '-',
+        (_, Where::Second) => '+',
+        (_, Where::Both) => '~',
+    }
+}
+
+/// `only in a.bag`, or `15 Hz → 7.4 Hz`.
+fn how(subject: &DiffSubject, difference: &Difference) -> String {
+    let told = |text: &str| {
+        if text == "present" {
+            String::new()
+        } else {
+            format!(", {text}")
+        }
+    };
+    let (in_one, other, what) = match difference.side {
+        Where::First => (&subject.first, &subject.second, &difference.first),
+        Where::Second => (&subject.second, &subject.first, &difference.second),
+        Where::Both => return format!("{} → {}", difference.first, difference.second),
+    };
+    let doubt = if difference.is_known {
+        String::new()
+    } else {
+        format!("; {other} cannot tell")
+    };
+    format!("only in {in_one}{}{doubt}", told(what))
+}
+
+/// `a.bag and b.bag: 4 differences, 1 unknown`.
+fn summary(subject: &DiffSubject, all: &[Difference]) -> String {
+    let known = all.iter().filter(|d| d.is_known).count();
+    let unknown = match all.len() - known {
+        0 => String::new(),
+        n => format!(", {n} unknown"),
+    };
+    let many = match known {
+        0 => "no differences".to_owned(),
+        n => words::count(n, "difference"),
+    };
+    format!("{} and {}: {many}{unknown}", subject.first, subject.second)
+}
+
+fn text(subject: &DiffSubject, all: &[Difference]) -> String {
+    let long = all.iter().map(|d| visible(&d.name).chars().count()).max();
+    let width = long.unwrap_or(0).min(60);
+    let mut out = String::new();
+    for one in all {
+        let (sign, kind, name) = (sign(one), one.kind, visible(&one.name));
+        let how = how(subject, one);
+        // Writing into a string does not fail.
+        let _ = writeln!(out, "{sign} {kind:<10} {name:<width$}  {}", visible(&how));
+    }
+    let out = out + &visible(&summary(subject, all)) + "\n";
+    // GitHub's runners take this for a command wherever it stands in a line.
+    out.replace("##[", "#\\#[")
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    schema: &'static str,
+    first: &'a str,
+    second: &'a str,
+    differences: Vec<Row<'a>>,
+}
+
+#[derive(Serialize)]
+struct Row<'a> {
+    kind: &'static str,
+    name: &'a str,
+    #[serde(rename = "in")]
+    side: &'static str,
+    first: &'a str,
+    second: &'a str,
+    known: bool,
+}
+
+fn row(difference: &Difference) -> Row<'_> {
+    Row {
+        kind: difference.kind,
+        name: &difference.name,
+        side: match difference.side {
+            Where::First => "first",
+            Where::Second => "second",
+            Where::Both => "both",
+        },
+        first: &difference.first,
+        second: &difference.second,
+        known: difference.is_known,
+    }
+}
+
+fn json(subject: &DiffSubject, all: &[Difference]) -> String {
+    let report = Report {
+        schema: "bagreel.diff/1",
+        first: &subject.first,
+        second: &subject.second,
+        differences: all.iter().map(row).collect(),
+    };
+    crate::mission::info::json(&report)
+}
+
+fn markdown(subject: &DiffSubject, all: &[Difference]) -> String {
+    let known = all.iter().any(|d| d.is_known);
+    let sign_of_all = if known { "🔀" } else { "✅" };
+    let mut out = format!("### {sign_of_all} {}\n\n", plain(&summary(subject, all)));
+    if all.is_empty() {
+        return out;
+    }
+    let _ = writeln!(
+        out,
+        "| | what | name | {} | {} |\n|---|---|---|---|---|",
+        code(&subject.first),
+        code(&subject.second)
+    );
+    for (at, one) in all.iter().enumerate() {
+        let cell = |text: &str| {
+            if text.is_empty() {
+                "–".to_owned()
+            } else {
+                plain(text)
+            }
+        };
+        let (first, second) = (cell(&one.first), cell(&one.second));
+        let row = format!(
+            "| {} | {} | {} | {first} | {second} |\n",
+            sign(one),
+            one.kind,
+            code(&one.name)
+        );
+        if out.len() + row.len() > MOST {
+            let _ = writeln!(out, "\n{} more left out.", all.len() - at);
+            break;
+        }
+        out.push_str(&row);
+    }
+    out
+}

@@ -1,0 +1,431 @@
+//! Two missions as one that can be drawn: the elements of both by role, and a ledger that tells what differs.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::notice::Notices;
+use crate::base::time::{Period, Span, Stamp};
+use crate::evidence::{Degree, Evidence};
+use crate::gate::facts::Facts;
+use crate::gate::pattern::Pattern;
+use crate::graph::{
+    Edge, EdgeState, Element, Elements, Graph, Node, NodeState, State, Topic, TopicState,
+};
+use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger, sorted};
+use crate::mission::{Activity, Mission, Window};
+
+use super::{Difference, Where};
+
+/// Which of the two pictures is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// One picture with what both have.
+    Both,
+    /// First the first mission, then both.
+    Each,
+}
+
+/// The length of a window of the picture, whose time means nothing.
+const SECOND: i64 = 1_000_000_000;
+
+/// What one mission has, by role and topic.
+#[derive(Default)]
+struct Seen {
+    nodes: BTreeMap<String, (Degree, Evidence)>,
+    topics: BTreeMap<String, TopicSeen>,
+    publishes: BTreeMap<(String, String), (Degree, Evidence)>,
+    subscribes: BTreeMap<(String, String), (Degree, Evidence)>,
+}
+
+#[derive(Clone)]
+struct TopicSeen {
+    evidence: Evidence,
+    types: BTreeSet<String>,
+    count: u64,
+    hz: Option<f64>,
+}
+
+impl Seen {
+    fn of(mission: &Mission) -> Self {
+        let facts = Facts::new(mission);
+        let mut seen = Self::default();
+        let elements = &mission.elements;
+        for (role, nodes) in facts.roles().filter(|(_, nodes)| !facts.is_tool(nodes)) {
+            let evidence = nodes.iter().fold(Evidence::NONE, |all, id| {
+                all.and(elements.nodes[*id as usize].evidence)
+            });
+            let degree = if facts.is_sure(nodes) {
+                Degree::Stated
+            } else {
+                Degree::Inferred
+            };
+            seen.nodes.insert(role.to_owned(), (degree, evidence));
+        }
+        for id in facts.topics(&Pattern::new("**")) {
+            let own = &elements.topics[id as usize];
+            let rates = facts.rates(id, true, mission.span);
+            let count: u64 = rates.iter().map(|r| r.count).sum();
+            let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
+            let topic = TopicSeen {
+                evidence: own.evidence,
+                types: own.types.iter().map(|t| (**t).to_owned()).collect(),
+                count: facts.messages(id),
+                hz: (nanos > 0).then(|| count as f64 / (nanos as f64 / 1e9)),
+            };
+            let name = facts.topic(id).to_owned();
+            for (node, edge, degree) in facts.publishers(id) {
+                let evidence = elements.publishes[edge as usize].evidence;
+                let key = (facts.role(node).to_owned(), name.clone());
+                seen.publishes.insert(key, (degree, evidence));
+            }
+            for (node, edge, degree) in facts.subscribers(id) {
+                let evidence = elements.subscribes[edge as usize].evidence;
+                let key = (name.clone(), facts.role(node).to_owned());
+                seen.subscribes.insert(key, (degree, evidence));
+            }
+            seen.topics.insert(name, topic);
+        }
+        let nodes = &seen.nodes;
+        seen.publishes
+            .retain(|(node, _), _| nodes.contains_key(node));
+        seen.subscribes
+            .retain(|(_, node), _| nodes.contains_key(node));
+        seen
+    }
+}
+
+/// The mission of both. What one mission has no evidence of is drawn as the other has it.
+pub(crate) fn union(
+    first: &Mission,
+    second: &Mission,
+    differing: &[Difference],
+    side: Side,
+) -> Mission {
+    let (a, b) = (Seen::of(first), Seen::of(second));
+    let elements = elements(&a, &b);
+    let at = Stamp(SECOND);
+    let span = |from: i64| Span {
+        start: Stamp(from),
+        end: Stamp(from + SECOND),
+    };
+    let window = |index: usize, span: Span, seen: &Seen| Window {
+        index,
+        span,
+        partial: false,
+        messages: seen.topics.values().map(|t| t.count).sum(),
+        graph: graph(&elements, seen),
+        changes: Vec::new(),
+        entries: Vec::new(),
+    };
+    let windows = match side {
+        Side::Each => vec![window(0, span(0), &a), window(1, span(SECOND), &b)],
+        Side::Both => vec![window(0, span(SECOND), &b)],
+    };
+    let whole = Span {
+        start: windows.first().map_or(at, |w| w.span.start),
+        end: Stamp(2 * SECOND),
+    };
+    let entries = Told {
+        a: &a,
+        b: &b,
+        elements: &elements,
+        differing,
+        at,
+        entries: Vec::new(),
+    };
+    let period = Period::from_nanos(SECOND).unwrap_or(first.period);
+    Mission {
+        bags: first.bags.iter().chain(&second.bags).cloned().collect(),
+        span: whole,
+        messages: windows.iter().map(|w| w.messages).sum(),
+        period,
+        step: period,
+        ledger: Ledger {
+            entries: sorted(entries.all(), &elements).0,
+            phases: Vec::new(),
+        },
+        elements,
+        windows,
+        activity: Activity::default(),
+        undrawn: Vec::new(),
+        layout: None,
+        notices: Notices::new(),
+    }
+}
+
+fn elements(a: &Seen, b: &Seen) -> Elements {
+    let nodes: BTreeMap<&String, Evidence> = both(&a.nodes, &b.nodes);
+    let topics: BTreeSet<&String> = a.topics.keys().chain(b.topics.keys()).collect();
+    let place = |name: &String| u32::try_from(nodes.keys().position(|n| *n == name)?).ok();
+    let topic_place = |name: &String| u32::try_from(topics.iter().position(|t| *t == name)?).ok();
+    let edge = |node: &String, topic: &String, evidence: Evidence| {
+        Some(Edge {
+            node: place(node)?,
+            topic: topic_place(topic)?,
+            evidence,
+            first: None,
+            last: None,
+            runs: Vec::new(),
+        })
+    };
+    let publishes = both(&a.publishes, &b.publishes).into_iter();
+    let subscribes = both(&a.subscribes, &b.subscribes).into_iter();
+    Elements {
+        publishes: publishes
+            .filter_map(|((node, topic), e)| edge(node, topic, e))
+            .collect(),
+        subscribes: subscribes
+            .filter_map(|((topic, node), e)| edge(node, topic, e))
+            .collect(),
+        nodes: nodes
+            .iter()
+            .map(|(name, evidence)| Node {
+                name: name.as_str().into(),
+                role: name.as_str().into(),
+                evidence: *evidence,
+                first: None,
+                last: None,
+                runs: Vec::new(),
+            })
+            .collect(),
+        topics: topics
+            .iter()
+            .map(|name| {
+                let own = [a.topics.get(*name), b.topics.get(*name)];
+                let own = || own.into_iter().flatten();
+                let types: BTreeSet<&String> = own().flat_map(|t| &t.types).collect();
+                Topic {
+                    name: name.as_str().into(),
+                    types: types.into_iter().map(|t| t.as_str().into()).collect(),
+                    evidence: own().fold(Evidence::NONE, |all, t| all.and(t.evidence)),
+                    first: None,
+                    last: None,
+                    qos: None,
+                    runs: Vec::new(),
+                    unknown_publishers: None,
+                }
+            })
+            .collect(),
+    }
+}
+
+/// The keys of both maps with their evidence together.
+fn both<'a, K: Ord>(
+    a: &'a BTreeMap<K, (Degree, Evidence)>,
+    b: &'a BTreeMap<K, (Degree, Evidence)>,
+) -> BTreeMap<&'a K, Evidence> {
+    let mut all: BTreeMap<&K, Evidence> = BTreeMap::new();
+    for (key, (_, evidence)) in a.iter().chain(b) {
+        let slot = all.entry(key).or_insert(Evidence::NONE);
+        *slot = slot.and(*evidence);
+    }
+    all
+}
+
+fn graph(elements: &Elements, seen: &Seen) -> Graph {
+    let node = |id: u32| elements.nodes[id as usize].name.to_string();
+    let topic = |id: u32| elements.topics[id as usize].name.to_string();
+    let edge = |id: u32, known: Option<&(Degree, Evidence)>| {
+        known.map(|(degree, _)| EdgeState {
+            id,
+            state: State::Active,
+            degree: *degree,
+            count: None,
+            hz: None,
+        })
+    };
+    Graph {
+        nodes: (0..)
+            .zip(&elements.nodes)
+            .filter_map(|(id, own)| {
+                let (degree, _) = seen.nodes.get(own.name.as_str())?;
+                Some(NodeState {
+                    id,
+                    state: State::Active,
+                    degree: *degree,
+                    hz: None,
+                    lifecycle: None,
+                })
+            })
+            .collect(),
+        topics: (0..)
+            .zip(&elements.topics)
+            .filter_map(|(id, own)| {
+                let topic = seen.topics.get(own.name.as_str())?;
+                Some(TopicState {
+                    id,
+                    state: State::Active,
+                    degree: Degree::Measured,
+                    count: topic.count,
+                    bytes: None,
+                    hz: topic.hz,
+                    median_period_s: None,
+                    max_gap_s: None,
+                })
+            })
+            .collect(),
+        publishes: (0..)
+            .zip(&elements.publishes)
+            .filter_map(|(id, e)| edge(id, seen.publishes.get(&(node(e.node), topic(e.topic)))))
+            .collect(),
+        subscribes: (0..)
+            .zip(&elements.subscribes)
+            .filter_map(|(id, e)| edge(id, seen.subscribes.get(&(topic(e.topic), node(e.node)))))
+            .collect(),
+    }
+}
+
+/// The ledger under way.
+struct Told<'a> {
+    a: &'a Seen,
+    b: &'a Seen,
+    elements: &'a Elements,
+    differing: &'a [Difference],
+    at: Stamp,
+    entries: Vec<Entry>,
+}
+
+impl Told<'_> {
+    fn all(mut self) -> Vec<Entry> {
+        let mut wholes: BTreeMap<u32, EntryId> = BTreeMap::new();
+        for (id, node) in (0..).zip(&self.elements.nodes) {
+            let turned = self.turned("node", node.name.as_str());
+            if let Some(kind) = turned.map(|came| if came { Kind::Started } else { Kind::Stopped })
+            {
+                let place = self.add(kind, Element::Node(id), Detail::None, None);
+                wholes.insert(id, place);
+            }
+        }
+        for (id, topic) in (0..).zip(&self.elements.topics) {
+            let turned = self.turned("topic", topic.name.as_str());
+            if let Some(kind) = turned.map(appeared) {
+                let mut of = self.elements.publishes.iter().filter(|e| e.topic == id);
+                let whole = of.find_map(|e| wholes.get(&e.node)).copied();
+                self.add(kind, Element::Topic(id), Detail::None, whole);
+            }
+        }
+        self.edges(&wholes);
+        for difference in self.differing {
+            self.change(difference);
+        }
+        self.entries
+    }
+
+    /// Whether a difference says that something came (true) or went.
+    fn turned(&self, kind: &str, name: &str) -> Option<bool> {
+        let own = |d: &&Difference| d.is_known && d.kind == kind && d.name == name;
+        let own = self.differing.iter().find(own)?;
+        match own.side {
+            Where::First => Some(false),
+            Where::Second => Some(true),
+            Where::Both => None,
+        }
+    }
+
+    /// Edges come and go with their nodes, or by themselves.
+    fn edges(&mut self, wholes: &BTreeMap<u32, EntryId>) {
+        let elements = self.elements;
+        let name = |edge: &Edge| {
+            let node = elements.nodes[edge.node as usize].name.as_str();
+            (node, elements.topics[edge.topic as usize].name.as_str())
+        };
+        let sent = (0..).zip(&elements.publishes).map(|(id, edge)| {
+            let (node, topic) = name(edge);
+            (
+                Element::Publish(id),
+                edge.node,
+                "publishes",
+                format!("{node} → {topic}"),
+            )
+        });
+        let heard = (0..).zip(&elements.subscribes).map(|(id, edge)| {
+            let (node, topic) = name(edge);
+            (
+                Element::Subscribe(id),
+                edge.node,
+                "subscribes",
+                format!("{topic} → {node}"),
+            )
+        });
+        for (what, node, kind, label) in sent.chain(heard) {
+            if let Some(whole) = wholes.get(&node).copied() {
+                let came = self
+                    .entries
+                    .get(whole as usize)
+                    .is_some_and(|e| e.kind == Kind::Started);
+                self.add(appeared(came), what, Detail::None, Some(whole));
+            } else if let Some(came) = self.turned(kind, &label) {
+                self.add(appeared(came), what, Detail::None, None);
+            }
+        }
+    }
+
+    /// Marks what both have and is not the same.
+    fn change(&mut self, difference: &Difference) {
+        if difference.side != Where::Both {
+            return;
+        }
+        let node = self
+            .elements
+            .nodes
+            .iter()
+            .position(|n| n.name.as_str() == difference.name);
+        let topic = self
+            .elements
+            .topics
+            .iter()
+            .position(|t| t.name.as_str() == difference.name);
+        let id = |place: usize| u32::try_from(place).unwrap_or(u32::MAX);
+        let values = || Detail::Values {
+            from: difference.first.as_str().into(),
+            to: difference.second.as_str().into(),
+        };
+        match (difference.kind, node, topic) {
+            ("rate", _, Some(topic)) => {
+                let hz = |seen: &Seen| seen.topics.get(&difference.name).and_then(|t| t.hz);
+                if let (Some(from_hz), Some(to_hz)) = (hz(self.a), hz(self.b)) {
+                    let rates = Detail::Rates { from_hz, to_hz };
+                    self.add(Kind::Rate, Element::Topic(id(topic)), rates, None);
+                }
+            }
+            ("type", _, Some(topic)) => {
+                self.add(Kind::Type, Element::Topic(id(topic)), values(), None);
+            }
+            ("qos", _, Some(topic)) => {
+                self.add(Kind::Qos, Element::Topic(id(topic)), values(), None);
+            }
+            ("lifecycle" | "end" | "restarts", Some(node), _) => {
+                self.add(Kind::Lifecycle, Element::Node(id(node)), values(), None);
+            }
+            _ => {}
+        }
+    }
+
+    fn add(
+        &mut self,
+        kind: Kind,
+        what: Element,
+        detail: Detail,
+        part_of: Option<EntryId>,
+    ) -> EntryId {
+        self.entries.push(Entry {
+            kind,
+            what,
+            time: self.at,
+            earliest: self.at,
+            latest: self.at,
+            until: None,
+            detail,
+            degree: Degree::Measured,
+            evidence: self.elements.evidence(what),
+            part_of,
+            quiet: false,
+            weight: 1,
+        });
+        EntryId::try_from(self.entries.len() - 1).unwrap_or(EntryId::MAX)
+    }
+}
+
+/// What is told of something that came, or went.
+fn appeared(came: bool) -> Kind {
+    if came { Kind::Appeared } else { Kind::Vanished }
+}

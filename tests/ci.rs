@@ -1,0 +1,137 @@
+//! The jobs of `examples/ci/`: the commands that stand in them run, and write what lies beside them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/ci")
+}
+
+/// A place as a job finds it: the recording, the expectations, and an empty summary.
+fn place() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir(dir.path().join("out")).unwrap();
+    let bag = folder().join("../courier.mcap");
+    fs::copy(bag, dir.path().join("out/nav_test.mcap")).unwrap();
+    for name in ["minimal.yaml", "graph.yaml", "rules.yaml"] {
+        fs::copy(folder().join(name), dir.path().join(name)).unwrap();
+    }
+    dir
+}
+
+/// Every command of ours in a job, in order.
+fn commands(job: &str) -> Vec<String> {
+    let text = fs::read_to_string(folder().join(job)).unwrap();
+    let lines = text
+        .lines()
+        .map(|line| line.trim().trim_start_matches("- "));
+    lines
+        .filter(|line| line.starts_with("bagreel "))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Runs a command as a job does; its exit code and what it printed.
+#[cfg(unix)]
+fn run(dir: &Path, command: &str) -> (Option<i32>, String) {
+    let url = "https://github.com/acme/robot/actions/runs/1/artifacts/2";
+    let command = command.replace("${{ steps.player.outputs.artifact-url }}", url);
+    assert!(!command.contains("${{"), "{command}");
+    let ours = Path::new(env!("CARGO_BIN_EXE_bagreel")).parent().unwrap();
+    let path = format!("{}:{}", ours.display(), std::env::var("PATH").unwrap());
+    let output = Command::new("sh")
+        .args(["-c", &command])
+        .current_dir(dir)
+        .env("PATH", path)
+        .env("GITHUB_STEP_SUMMARY", dir.join("summary.md"))
+        .output()
+        .unwrap();
+    (
+        output.status.code(),
+        String::from_utf8(output.stdout).unwrap(),
+    )
+}
+
+/// Compares with what lies in `examples/ci/out`; with `ACCEPT=1` puts it there.
+fn same(name: &str, text: &str) {
+    let path = folder().join("out").join(name);
+    if std::env::var_os("ACCEPT").is_some() {
+        fs::create_dir_all(folder().join("out")).unwrap();
+        fs::write(&path, text).unwrap();
+    }
+    let kept = fs::read_to_string(&path).unwrap_or_default();
+    assert_eq!(
+        kept, text,
+        "{name}: `ACCEPT=1 cargo test --test tests ci::` takes the new one"
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn the_commands_of_the_jobs_run_and_write_what_lies_beside_them() {
+    let dir = place();
+    let here = dir.path();
+    let read = |name: &str| fs::read_to_string(here.join(name)).unwrap();
+    let github = commands("github.yml");
+    assert_eq!(github.len(), 2);
+    assert_eq!(run(here, &github[0]).0, Some(0));
+    fs::write(here.join("summary.md"), "Built.\n").unwrap();
+    let (code, said) = run(here, &github[1]);
+    assert_eq!(code, Some(1));
+    same("github.txt", &said);
+    same("check.xml", &read("check.xml"));
+    let summary = read("summary.md");
+    assert!(
+        summary.starts_with("Built.\n\n### ❌ Graph check"),
+        "{summary}"
+    );
+    same("summary.md", summary.strip_prefix("Built.\n\n").unwrap());
+    assert!(here.join("player.html").is_file() && here.join("strip.png").is_file());
+    let gitlab = commands("gitlab.yml");
+    assert_eq!(gitlab.len(), 2);
+    assert_eq!(run(here, &gitlab[0]).0, Some(0));
+    assert_eq!(run(here, &gitlab[1]).0, Some(1));
+    same("codequality.json", &read("codequality.json"));
+}
+
+#[test]
+#[cfg(unix)]
+fn the_three_expectations_find_what_lies_beside_them() {
+    let dir = place();
+    for (name, code) in [("minimal", 0), ("graph", 1), ("rules", 1)] {
+        let command = format!(
+            "bagreel check out/nav_test.mcap --expect {name}.yaml -o {name}.json -o {name}.sarif"
+        );
+        let (got, said) = run(dir.path(), &command);
+        assert_eq!(got, Some(code), "{name}: {said}");
+        same(&format!("{name}.txt"), &said);
+        let sarif = fs::read_to_string(dir.path().join(format!("{name}.sarif"))).unwrap();
+        if name == "graph" {
+            same("graph.sarif", &sarif);
+            let json = fs::read_to_string(dir.path().join("graph.json")).unwrap();
+            same("graph.json", &json);
+        }
+    }
+}
+
+#[test]
+fn what_others_made_is_pinned() {
+    for job in ["github.yml", "setup-bagreel/action.yml"] {
+        let text = fs::read_to_string(folder().join(job)).unwrap();
+        for line in text
+            .lines()
+            .filter_map(|l| l.trim().trim_start_matches("- ").strip_prefix("uses: "))
+        {
+            let pin = line
+                .split('@')
+                .nth(1)
+                .map_or("", |rest| rest.split(' ').next().unwrap());
+            let is_pinned = pin.len() == 40 && pin.bytes().all(|b| b.is_ascii_hexdigit());
+            assert!(is_pinned || line.starts_with("./"), "{job}: {line}");
+        }
+    }
+    let action = fs::read_to_string(folder().join("setup-bagreel/action.yml")).unwrap();
+    let check = action.find("sha256sum --check").unwrap();
+    assert!(check < action.find("tar --extract").unwrap());
+}
