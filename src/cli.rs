@@ -306,7 +306,11 @@ fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
     terminal.say(&format!(
         "wrote {}: {}, {}, in {seconds:.1} s",
         names.join(", "),
-        if is_cut { words::count(mission.windows.len(), "window") } else { division(mission) },
+        if is_cut {
+            words::count(mission.windows.len(), "window")
+        } else {
+            division(mission)
+        },
         words::count(changes, "change")
     ));
 }
