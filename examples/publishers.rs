@@ -13,9 +13,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let reading = Reading::of([bag]);
     let mission = read(&reading)?;
     let elements = &mission.elements;
-    for window in &mission.windows {
+    for (window, graph) in mission.each() {
         println!("{:.0} s", mission.offset(window.span.start) as f64 / 1e9);
-        for state in &window.graph.publishes {
+        for state in &graph.publishes {
             let edge = &elements.publishes[state.id as usize];
             if elements.topics[edge.topic as usize].name.as_str() != topic {
                 continue;

@@ -14,8 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "{} messages, windows of {}",
         mission.messages, mission.period
     );
-    for window in &mission.windows {
-        let graph = &window.graph;
+    for (window, graph) in mission.each() {
         println!(
             "{:>4}  {:>3} nodes  {:>3} topics  {:>3} edges  {:>3} changes",
             window.index,

@@ -22,15 +22,15 @@ use crate::base::{budget, file, words};
 use crate::cli::terminal::Terminal;
 use crate::evidence::code::{SourceCode, Version};
 use crate::evidence::collector;
+use crate::evidence::conclude;
 use crate::evidence::topology;
 use crate::export::Output;
-use crate::graph;
 use crate::graph::window::{Division, Length};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::mission::{Mission, events};
 use crate::pipeline::{
-    Drawing, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read, survey,
-    survey_file,
+    Drawing, Phases, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read,
+    survey, survey_file,
 };
 use applies::Given;
 use args::{
@@ -159,6 +159,7 @@ fn reading(
             start: time.start,
             end: time.end,
             align: time.align,
+            cut: time.cut,
         },
         skip_unchanged: time.skip_unchanged,
         collect: collector::Options {
@@ -170,14 +171,15 @@ fn reading(
             },
             ..collector::Options::default()
         },
-        graph: graph::Options {
-            grace: change.grace as usize,
+        grace: change.grace as usize,
+        conclude: conclude::Options {
             roles: graph.roles,
             topology: topology::read_all(&graph.topology)?,
             code: None,
         },
         code: source_code(graph)?,
         rate_change: change.rate_change,
+        phases: Phases::Found,
     })
 }
 
@@ -248,7 +250,7 @@ fn render(args: &RenderArgs, given: &Given, terminal: &mut Terminal) -> Result<u
         return watch(args, job, terminal);
     }
     let done = crate::pipeline::render(&job, terminal)?;
-    report(&done, args.timings, terminal);
+    report(&done, args, terminal);
     Ok(code(&done.mission))
 }
 
@@ -276,7 +278,7 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
             crate::pipeline::show(&job, mission.clone(), terminal)
         });
         match drawn {
-            Ok(done) => report(&done, args.timings, terminal),
+            Ok(done) => report(&done, args, terminal),
             Err(error) => terminal.error(&error),
         }
     }
@@ -284,12 +286,13 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
 }
 
 /// Tells what was written, how many windows and changes, in what time.
-fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
+fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
+    let (timings, is_cut) = (args.timings, args.time.cut.is_some());
     let mission = &done.mission;
     for remark in done.written.iter().flat_map(|w| &w.remarks) {
         terminal.note(remark);
     }
-    terminal.notices(&mission.notices);
+    terminal.notices(&done.notices);
     if timings {
         terminal.timings();
     }
@@ -303,7 +306,11 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
     terminal.say(&format!(
         "wrote {}: {}, {}, in {seconds:.1} s",
         names.join(", "),
-        division(mission),
+        if is_cut {
+            words::count(mission.windows.len(), "window")
+        } else {
+            division(mission)
+        },
         words::count(changes, "change")
     ));
 }
@@ -321,6 +328,8 @@ fn division(mission: &Mission) -> String {
 /// The work that `render` was asked to do.
 fn job(args: &RenderArgs) -> Result<Render, Error> {
     let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
+    let phases = look::phases(&args.figure.phases, args.look.captions.as_deref())?;
+    let reading = reading.with_phases(phases);
     let title = args
         .look
         .title
@@ -355,8 +364,6 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         },
         kept: kept(args),
         outputs,
-        captions: args.look.captions.clone(),
-        phases: look::phases(&args.figure.phases),
         is_filtered: args.view.filtered,
         reading,
     })

@@ -80,12 +80,14 @@ pub const FORMATS: &[Format] = &[
         word: "dot",
         what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
         start: dot::start,
+        is_viewed: true,
         ..DATA
     },
     Format {
         word: "mmd",
         what: "a Mermaid flow chart, per window with `{n}`, else the union",
         start: mermaid::encoder::start,
+        is_viewed: true,
         ..DATA
     },
     #[cfg(feature = "pdf")]

@@ -5,6 +5,7 @@
 
 mod build;
 pub mod diff;
+mod graphs;
 pub(crate) mod lives;
 pub(crate) mod sending;
 pub mod window;
@@ -15,7 +16,13 @@ use crate::base::name::{NodeName, TopicName};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 
-pub use build::{Built, Options, build};
+#[cfg(test)]
+pub(crate) use graphs::tests as graphs_for_tests;
+pub(crate) use graphs::{Column, ColumnWriter, Cursor, GraphsWriter, Number, Row};
+pub use graphs::{Graphs, Iter as GraphsIter};
+
+pub use build::{Built, build};
+pub(crate) use build::{History, TopicCount, Windowed, counts, graphs, history};
 
 /// A node's place in [`Elements::nodes`].
 pub type NodeId = u32;
@@ -255,6 +262,15 @@ impl Elements {
         }
         .unwrap_or_default()
     }
+}
+
+/// Windows shorter than this have no rates.
+const SHORTEST_NS: i64 = 1_000_000;
+
+/// The rate of so many messages in a window; `None` below 1 ms.
+pub(crate) fn per_second(count: u64, window: Span) -> Option<f64> {
+    let nanos = window.nanos();
+    (nanos >= SHORTEST_NS).then(|| count as f64 / (nanos as f64 / 1e9))
 }
 
 #[cfg(test)]

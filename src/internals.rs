@@ -8,14 +8,14 @@ pub mod base {
 /// See `src/evidence.rs`.
 pub mod evidence {
     pub use crate::evidence::{Degree, Evidence, EvidenceLine, SOURCES};
-    pub use crate::evidence::{code, collector, topology};
+    pub use crate::evidence::{code, collector, conclude, topology};
 }
 
 /// See `src/graph.rs`.
 pub mod graph {
     pub use crate::graph::{
-        Built, EdgeState, Element, Elements, Graph, NodeState, Options, State, TopicState, build,
-        diff, window,
+        Built, EdgeState, Element, Elements, Graph, NodeState, State, TopicState, build, diff,
+        window,
     };
 }
 

@@ -14,8 +14,8 @@
 //! let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 //! let reading = Reading::of([bag]);
 //! let mission = read(&reading)?;
-//! for window in &mission.windows {
-//!     println!("{}: {} nodes, {} changes", window.index, window.graph.nodes.len(), window.changes.len());
+//! for (window, graph) in mission.each() {
+//!     println!("{}: {} nodes, {} changes", window.index, graph.nodes.len(), window.changes.len());
 //! }
 //! # assert!(mission.windows.len() >= 5 && mission.elements.nodes.len() > 5);
 //! let job = Render::new(reading, vec![Output::parse(&page, None)?])?;
@@ -96,11 +96,12 @@ pub mod values {
     pub use crate::base::name::{NodeName, TopicName};
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
     pub use crate::base::time::{Period, Span, Stamp};
+    pub use crate::evidence::conclude;
     pub use crate::evidence::{Degree, Evidence};
-    pub use crate::graph::window::{Division, Length};
+    pub use crate::graph::window::{Cut, Division, Length};
     pub use crate::graph::{
-        Edge, EdgeId, EdgeState, Element, Elements, Node, NodeId, NodeState, State, Topic, TopicId,
-        TopicState,
+        Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Node, NodeId, NodeState,
+        State, Topic, TopicId, TopicState,
     };
     pub use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Phase};
     pub use crate::pipeline::{Drawing, Phases, Stage, Unwatched, Watch};

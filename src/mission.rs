@@ -8,21 +8,21 @@ pub mod phases;
 
 mod json;
 pub use json::read::read_json;
-pub use json::write::write_json;
+pub(crate) use json::write::Json;
+pub use json::write::{Form, write_json};
 
 use crate::bag::Report;
 use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
-use crate::graph::lives::Lives;
-use crate::graph::{Elements, Graph, NodeId};
+use crate::graph::{Elements, Graph, Graphs, NodeId};
 
 pub use activity::Activity;
 pub(crate) use ledger::EntryId;
 pub use ledger::Ledger;
 
-/// One window with its graph.
+/// One window; its graph is in [`Mission::graphs`].
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Window {
@@ -34,8 +34,6 @@ pub struct Window {
     pub partial: bool,
     /// Messages in it.
     pub messages: u64,
-    /// The graph.
-    pub graph: Graph,
     /// What changed against the window before; empty in the first.
     pub changes: Vec<Change>,
     /// The place in the ledger of the entry that each of the changes belongs to.
@@ -60,6 +58,8 @@ pub struct Mission {
     pub elements: Elements,
     /// The windows in order; those without a message are there too.
     pub windows: Vec<Window>,
+    /// The graph of each window.
+    pub graphs: Graphs,
     /// What happened, in continuous time.
     pub ledger: Ledger,
     /// What was alive and how busy on a grid of its own; made when the mission is read, not part of its file.
@@ -97,20 +97,15 @@ pub struct Place {
 }
 
 impl Mission {
-    /// Tells what happened by the lives of all elements, and what changed from each window to the next because of it. A
-    /// rate must change by more than the share `rate_change`.
-    pub(crate) fn tell(&mut self, lives: &Lives, rate_change: f64) {
-        self.ledger.entries = ledger::make(&ledger::Told {
-            elements: &self.elements,
-            lives,
-            rate_change,
-        });
-        self.explain();
+    /// The windows in order, each with its graph, which is made as it is asked for.
+    pub fn each(&self) -> impl Iterator<Item = (&Window, Graph)> {
+        self.windows.iter().zip(&self.graphs)
     }
 
     /// Finds what changed from each window to the next, by the ledger.
     pub(crate) fn explain(&mut self) {
-        let windows = self.windows.iter().map(|w| (w.span, &w.graph));
+        let spans = self.windows.iter().map(|w| w.span);
+        let windows = spans.zip(&self.graphs);
         let told = ledger::explain(windows, &self.elements, &self.ledger);
         for (window, (changes, entries)) in self.windows.iter_mut().zip(told) {
             (window.changes, window.entries) = (changes, entries);
@@ -122,13 +117,13 @@ impl Mission {
     /// under the same name, and when, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
         let mut changes = Changes::new(&self.elements, threshold);
-        for window in &mut self.windows {
+        for (window, graph) in self.windows.iter_mut().zip(&self.graphs) {
             let inside: Vec<_> = restarts
                 .iter()
                 .copied()
                 .filter(|(_, at)| window.span.contains(*at))
                 .collect();
-            window.changes = changes.next(window.span, &window.graph, &inside);
+            window.changes = changes.next(window.span, &graph, &inside);
         }
         self.ledger = Ledger::from_changes(&self.elements, &self.windows);
         let places = ledger::places(&self.ledger, &self.windows);

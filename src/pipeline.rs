@@ -1,13 +1,15 @@
 //! The whole program in the order it happens: read, divide, build, compare, draw, write.
 
-mod captions;
+mod collect;
 mod draw;
 mod export;
 mod extract;
 mod figure;
 pub(crate) mod gate;
+mod phases;
 mod read;
 mod survey;
+mod verify;
 
 pub use draw::Drawing;
 pub(crate) use export::render;
@@ -15,7 +17,7 @@ pub use export::{Render, Rendered};
 #[cfg(feature = "cli")]
 pub(crate) use export::{check, show};
 pub use extract::{Extract, Extracted, extract};
-pub use figure::Phases;
+pub use phases::Phases;
 pub(crate) use read::mission_file;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};

@@ -2,7 +2,7 @@
 const $ = new Proxy({}, { get: (_, id) => document.getElementById(id) }), say = (id, text) => $[id].textContent = text;
 let raw = $.data.textContent;
 if ($.data.type == 'deflated') raw = await new Response(new Blob([Uint8Array.from(atob(raw), c => c.charCodeAt())]).stream().pipeThrough(new DecompressionStream('deflate-raw'))).text();
-const { names, arrows, facts, words, classes, labels, lives, starts, end, epoch, boxes } = JSON.parse(raw);
+const { names, arrows, facts, words, classes, labels, lives, starts, end, epoch, boxes, told } = JSON.parse(raw);
 say('data', raw = '');
 const N = names.length, W = starts.length, last = W - 1, svg = $.graph, stage = $.stage, els = [...$.items.children, ...$.arrows.children];
 const name = names.concat(arrows.map(ends => ends.map(i => names[i]).join(' → '))), about = facts.map(list => list.map(f => words[f]).join('\n'));
@@ -15,8 +15,8 @@ const at = (list, w, lo = 0, hi = list.length) => {
 	return lo && list[lo - 1];
 };
 const KINDS = ['added', 'removed', 'changed'], mark = classes.map(c => KINDS.findIndex(k => c.includes(k))), turns = classes.map(c => /ster|wer/.test(c));
-const counts = KINDS.map(() => starts.map(() => 0)), each = f => KINDS.map((k, m) => f(k, counts[m], m)).join('');
-for (const [list] of lives) list.forEach((k, i) => i % 2 && mark[k] >= 0 && counts[mark[k]][list[i - 1]]++);
+// Headlines by window: how many, and the words of three chips.
+const chips = new Map(told.map(([w, n, ...texts]) => [w, { n, texts }]));
 const iso = (s, from, to) => new Date(s * 1e3).toISOString().slice(from, to), clock = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
 const list = (id, all) => $[id].replaceChildren(...all.slice(0, 50).map(i => Object.assign(document.createElement('button'), { textContent: name[i], className: classes[cur[i]], onclick: () => pick(i, 1) })));
 
@@ -39,7 +39,9 @@ function seek(w, quiet) {
 	now = w;
 	say('where', `${place} · ${time} – ${clock(starts[w + 1] ?? end)} of ${clock(end)}`);
 	say('clock', iso(epoch / 1e3 + starts[w], 11, 19));
-	$.chips.innerHTML = each((k, n, m) => n[w] ? `<span class=${k}>${'+−◆'[m]}${n[w]} ${k}</span> ` : '');
+	const { n = 0, texts = [] } = chips.get(w) ?? {};
+	$.chips.dataset.entries = n;
+	$.chips.innerHTML = texts.map((t, m) => t && `<span class=${KINDS[m]}>${t}</span> `).join('');
 	$.seek.value = w;
 	$.seek.ariaValueText = [time, place, $.chips.textContent].join(', ');
 	list('news', news);
@@ -56,7 +58,7 @@ function play(on) {
 	save();
 }
 const go = w => { play(0); seek(w); };
-const jump = by => { let w = now; do w += by; while (counts[0][w] + counts[1][w] + counts[2][w] === 0); go(w); };
+const jump = by => { let w = now; do w += by; while (w >= 0 && w < W && !chips.has(w)); go(w); };
 
 // The selection.
 function pick(i, look) {

@@ -32,11 +32,13 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("evidence", &[
         &["clock", "message", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
-        &["kinds", "proof"],
+        &["kinds", "proof", "values"],
         &["code", "publishers", "source"],
         &["collector", "unknown"],
+        &["restarts"],
+        &["conclude"],
     ]),
-    ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
+    ("graph", &[&["graphs", "lives", "sending"], &["build", "diff", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "counts", "filter", "lives", "names", "roles", "runs", "settle", "union"],
@@ -64,7 +66,13 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["judge"],
         &["baseline", "difference", "report"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"], &["gate"]]),
+    ("pipeline", &[
+        &["collect", "draw", "phases"],
+        &["figure", "verify"],
+        &["read"],
+        &["export", "extract", "survey"],
+        &["gate"],
+    ]),
     ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract", "gate"]]),
 ];
 

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use bagreel::bag::{Connection, ConnectionId, Encoding, Message, Sink as _};
 use bagreel::internals::base::time::{Span, Stamp};
-use bagreel::internals::evidence::collector::{Collected, Collector, Options};
+use bagreel::internals::evidence::collector::{Collector, Options, Recorded};
+use bagreel::internals::evidence::conclude;
 use bagreel::internals::evidence::topology::{Element, Entry, Topology};
 use bagreel::internals::evidence::{Degree, EvidenceLine};
 use bagreel::internals::graph::{self, Built};
@@ -14,8 +15,8 @@ use crate::support::{ORIGIN, Recording};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// Everything that is collected from a recording.
-fn collected(bag: &Recording, options: Options) -> Collected {
+/// Everything that is recorded in a recording.
+fn recorded(bag: &Recording, options: Options) -> Recorded {
     let mut collector = Collector::new(options);
     let mut progress = |_, _| ();
     let mut sink = collector.bag(&mut progress);
@@ -53,10 +54,11 @@ fn collected(bag: &Recording, options: Options) -> Collected {
 
 /// What is concluded from a recording, with the pieces of evidence on `why`.
 fn concluded(bag: &Recording, options: Options) -> (Built, Vec<EvidenceLine>) {
-    let mut collected = collected(bag, options);
-    let span = collected.span.unwrap();
-    let built = graph::build(&mut collected, &[span], &graph::Options::default()).unwrap();
-    (built, collected.why())
+    let recorded = recorded(bag, options);
+    let span = recorded.span.unwrap();
+    let built = graph::build(&recorded, &[span], &conclude::Options::default(), 0).unwrap();
+    let lines = built.lines.clone();
+    (built, lines)
 }
 
 /// Every edge that a kind of evidence proves: `/node > /topic degree` or `/topic > /node degree`.
@@ -601,8 +603,8 @@ fn told(entries: Vec<Entry>, windows: &[(i64, i64)]) -> Built {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
     bag.send(scan, (0, 10_001), 100, &[1; 8]);
-    let mut collected = collected(&bag, Options::default());
-    let second = |s: i64| collected.span.unwrap().start.plus(s * SECOND);
+    let recorded = recorded(&bag, Options::default());
+    let second = |s: i64| recorded.span.unwrap().start.plus(s * SECOND);
     let windows: Vec<Span> = windows
         .iter()
         .map(|(from, to)| Span {
@@ -614,11 +616,11 @@ fn told(entries: Vec<Entry>, windows: &[(i64, i64)]) -> Built {
         entries,
         notices: Vec::new(),
     };
-    let options = graph::Options {
+    let options = conclude::Options {
         topology,
-        ..graph::Options::default()
+        ..conclude::Options::default()
     };
-    graph::build(&mut collected, &windows, &options).unwrap()
+    graph::build(&recorded, &windows, &options, 0).unwrap()
 }
 
 fn entry(element: Element, to_s: Option<i64>) -> Entry {
@@ -677,8 +679,8 @@ fn what_the_user_states_and_headers_say_is_among_the_evidence() {
         why: vec!["/scan".to_owned()],
         ..Options::default()
     };
-    let mut collected = collected(&bag, options);
-    let whole = collected.span.unwrap();
+    let recorded = recorded(&bag, options);
+    let whole = recorded.span.unwrap();
     let topology = Topology {
         entries: vec![entry(
             Element::Subscribe("/slam".to_owned(), "/scan".to_owned()),
@@ -686,15 +688,11 @@ fn what_the_user_states_and_headers_say_is_among_the_evidence() {
         )],
         notices: Vec::new(),
     };
-    let options = graph::Options {
+    let options = conclude::Options {
         topology,
-        ..graph::Options::default()
+        ..conclude::Options::default()
     };
-    graph::build(&mut collected, &[whole], &options).unwrap();
-    let sources: BTreeSet<_> = collected
-        .why()
-        .into_iter()
-        .map(|piece| piece.source)
-        .collect();
+    let built = graph::build(&recorded, &[whole], &options, 0).unwrap();
+    let sources: BTreeSet<_> = built.lines.into_iter().map(|piece| piece.source).collect();
     assert_eq!(sources, ["connection", "topology"].into());
 }

@@ -115,6 +115,8 @@ fn run(
     let sequence = Sequence {
         mission: &mission,
         data: &mission,
+        places: None,
+        notices: &mission.notices,
         view: &view,
         picture: &Discs,
         painter: &Painter::new(&fonts),

@@ -7,6 +7,7 @@ use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, 
 use bagreel::internals::base::notice::Notice;
 use bagreel::internals::base::time::{Span, Stamp};
 use bagreel::internals::evidence::collector::{Collector, Options};
+use bagreel::internals::evidence::conclude;
 use bagreel::internals::graph::{self, Built};
 
 const SECOND: i64 = 1_000_000_000;
@@ -49,11 +50,11 @@ fn graphs(path: &Path) -> (Built, Vec<Span>) {
 }
 
 fn built(collector: Collector) -> (Built, Vec<Span>) {
-    let mut collected = collector.finish().unwrap();
-    let windows = windows(collected.span.unwrap(), 10 * SECOND);
-    let options = graph::Options::default();
+    let recorded = collector.finish().unwrap();
+    let windows = windows(recorded.span.unwrap(), 10 * SECOND);
+    let options = conclude::Options::default();
     (
-        graph::build(&mut collected, &windows, &options).unwrap(),
+        graph::build(&recorded, &windows, &options, 0).unwrap(),
         windows,
     )
 }

@@ -120,10 +120,11 @@ fn a_mission_read_back_tells_the_same() {
 fn every_difference_of_two_windows_points_at_its_entry() {
     for seconds in [1, 10, 60] {
         let mission = mission("warehouse.bag", seconds);
-        for pair in mission.windows.windows(2) {
-            let [before, after] = pair else { continue };
-            let difference = diff(&before.graph, &after.graph);
-            assert_eq!(apply(&before.graph, &difference), after.graph);
+        let later = mission.graphs.iter().skip(1);
+        let pairs = mission.graphs.iter().zip(later);
+        for ((old, new), after) in pairs.zip(&mission.windows[1..]) {
+            let difference = diff(&old, &new);
+            assert_eq!(apply(&old, &difference), new);
             let moved = difference.nodes.added.len()
                 + difference.topics.added.len()
                 + difference.publishes.added.len()
@@ -160,4 +161,133 @@ fn the_log_never_runs_backwards_and_parts_have_no_parts() {
             assert_eq!(entries[whole as usize].part_of, None);
         }
     }
+}
+
+/// What really happened, from the scripts that ran the mission and the nodes' own counters; made by the same rules for
+/// every mission.
+fn truth() -> Vec<serde_json::Value> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/warehouse.story.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Starts or stops of nodes by role, with seconds and the interval in which the truth should lie; those of a restart
+/// too.
+fn turns(mission: &Mission, kind: Kind) -> Vec<(String, f64, (f64, f64))> {
+    let second = |at| mission.offset(at) as f64 / 1e9;
+    let entries = mission.ledger.entries.iter();
+    let mut all = Vec::new();
+    for (id, entry) in (0..).zip(entries) {
+        let bagreel::values::Element::Node(node) = entry.what else {
+            continue;
+        };
+        let role = mission.elements.nodes[node as usize].role.to_string();
+        let has_part = mission.ledger.parts(id).any(|part| part.kind == kind);
+        let interval = (second(entry.earliest), second(entry.latest));
+        match entry.kind {
+            found if found == kind => all.push((role, second(entry.time), interval)),
+            Kind::Restarted if !has_part && kind == Kind::Stopped => {
+                all.push((role, second(entry.time), interval));
+            }
+            Kind::Restarted if !has_part => {
+                let until = second(entry.until.unwrap_or(entry.time));
+                all.push((role, until, (f64::MIN, f64::MAX)));
+            }
+            _ => {}
+        }
+    }
+    all
+}
+
+#[test]
+fn starts_and_stops_are_told_in_time_whatever_the_period() {
+    let truth = truth();
+    for seconds in [1, 10, 30, 60] {
+        let mission = mission("warehouse.bag", seconds);
+        let (mut errors, mut inside, mut missed) = (Vec::new(), 0, Vec::new());
+        for (word, kind) in [("started", Kind::Started), ("stopped", Kind::Stopped)] {
+            let mut told = turns(&mission, kind);
+            for event in truth.iter().filter(|e| e["kind"] == word) {
+                let (node, at) = (
+                    event["node"].as_str().unwrap(),
+                    event["time_s"].as_f64().unwrap(),
+                );
+                let near = told
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, (name, ..))| name == node);
+                let nearest = near.min_by(|a, b| (a.1.1 - at).abs().total_cmp(&(b.1.1 - at).abs()));
+                let Some((place, (_, time, (earliest, latest)))) = nearest else {
+                    missed.push(format!("{word} {node} {at}"));
+                    continue;
+                };
+                let [from, to] = ["earliest_s", "latest_s"].map(|key| event[key].as_f64().unwrap());
+                errors.push((from - time).max(time - to).max(0.0));
+                inside += usize::from(*earliest <= to && from <= *latest);
+                told.remove(place);
+            }
+            // What is told beside the truth is within two seconds of the bag's ends, or of who records.
+            let end = mission.offset(mission.span.end) as f64 / 1e9;
+            told.retain(|(name, at, (earliest, latest))| {
+                let is_edge = *at < 5.0 && *earliest < 2.0 || *latest > end - 2.0;
+                !is_edge && !name.contains("record")
+            });
+            assert!(told.is_empty(), "{word} by {seconds} s: {told:?}");
+        }
+        assert!(missed.is_empty(), "{missed:?}");
+        errors.sort_by(f64::total_cmp);
+        let (median, worst) = (errors[errors.len() / 2], errors[errors.len() * 95 / 100]);
+        assert!(median <= 0.5 && worst <= 2.0, "{errors:?}");
+        assert!(
+            inside * 100 >= errors.len() * 95,
+            "{inside} of {}",
+            errors.len()
+        );
+    }
+}
+
+#[test]
+fn commanded_rates_and_take_overs_are_told_with_their_numbers() {
+    let (mission, truth) = (mission("warehouse.bag", 60), truth());
+    let second = |at| mission.offset(at) as f64 / 1e9;
+    let name = |what| match mission.elements.ends(what) {
+        (_, Some(topic)) => mission.elements.topics[topic as usize].name.as_str(),
+        _ => "",
+    };
+    let near = |from: f64, to: f64, at: f64| from - 5.0 <= at && at <= to + 5.0;
+    let told = |entry: &&bagreel::internals::mission::ledger::Entry| !entry.quiet;
+    let mut explained = 0;
+    for event in &truth {
+        let topic = event["topic"].as_str().unwrap_or_default();
+        let number = |key: &str| event[key].as_f64().unwrap();
+        let of = |kind: Kind| {
+            let entries = mission.ledger.entries.iter().filter(told);
+            entries.filter(move |e| e.kind == kind && name(e.what) == topic)
+        };
+        match event["kind"].as_str().unwrap() {
+            "rate" => {
+                let at = number("time_s");
+                let close = |a: f64, b: f64| (a - b).abs() <= 0.1 * b;
+                let found = of(Kind::Rate).filter(|e| near(at, at, second(e.time))).filter(|e| {
+                    matches!(e.detail, bagreel::internals::mission::ledger::Detail::Rates { from_hz, to_hz }
+                        if close(from_hz, number("from_hz")) && close(to_hz, number("to_hz")))
+                });
+                let found = found.count();
+                assert!(found == 1 || event["doubtful"] == true, "{event}: {found}");
+                explained += found;
+            }
+            "handed_over" => {
+                let (from, to) = (number("earliest_s"), number("latest_s"));
+                let found = of(Kind::HandedOver)
+                    .filter(|e| near(from, to, second(e.time)))
+                    .count();
+                assert!(found == 1 || event["doubtful"] == true, "{event}: {found}");
+                explained += found;
+            }
+            _ => {}
+        }
+    }
+    let all = mission.ledger.entries.iter().filter(told);
+    let all = all.filter(|e| matches!(e.kind, Kind::Rate | Kind::HandedOver));
+    let of_parts = |e: &&bagreel::internals::mission::ledger::Entry| e.part_of.is_none();
+    assert!(all.filter(of_parts).count() <= explained, "a false line");
 }

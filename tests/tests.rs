@@ -11,6 +11,7 @@
 mod architecture;
 mod ci;
 mod cli;
+mod counts;
 mod damaged;
 mod docs;
 mod edges;
@@ -32,4 +33,5 @@ mod story;
 mod support;
 mod tables;
 mod telling;
+mod values;
 mod warehouse;

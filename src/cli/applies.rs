@@ -111,8 +111,11 @@ const RULES: &[Rule] = &[
     },
     Rule {
         options: &["captions"],
-        takes: |asked, output| asked.is_window(output) && !is_figure(asked.args, output),
-        what: "animations, pages and single windows take them: `x.gif`, `x.pdf`, `x{n}.svg`",
+        takes: |asked, output| {
+            let is_told = ["json", "csv", "parquet"].contains(&output.format.word);
+            asked.is_window(output) || is_told || is_figure(asked.args, output)
+        },
+        what: "animations, pages, single windows, figures and data take them: `x.gif`, `x{n}.svg`, `x.json`",
     },
     Rule {
         options: &[
@@ -179,6 +182,16 @@ const RULES: &[Rule] = &[
         },
         what: "figures and data take them: `--figure lives -o x.pdf`, `x.json`, `x.csv`",
     },
+    Rule {
+        options: &["json"],
+        takes: |_, output| output.format.word == "json",
+        what: "`x.json` takes it",
+    },
+    Rule {
+        options: &["runs"],
+        takes: |_, output| ["csv", "parquet"].contains(&output.format.word),
+        what: "tables take it: `x.csv`",
+    },
 ];
 
 /// Refuses options that say nothing to any of the outputs.
@@ -209,6 +222,7 @@ const OF_BAGS: &[&str] = &[
     "end",
     "align",
     "skip-unchanged",
+    "cut",
     "grace",
     "roles",
     "topology",
@@ -235,7 +249,7 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
 }
 
 /// Options that say how time is cut into windows.
-const OF_WINDOWS: &[&str] = &["period", "step", "align", "skip-unchanged", "grace"];
+const OF_WINDOWS: &[&str] = &["period", "step", "align", "skip-unchanged", "cut", "grace"];
 
 /// What is to be said where somebody cuts windows for what is told in continuous time. That is no mistake: scripts ask
 /// for the log and for pictures with the same options.

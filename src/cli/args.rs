@@ -11,7 +11,7 @@ use crate::base::time::{Moment, Period, parse_nanos};
 use crate::export::FORMATS;
 use crate::export::tables::TableFormat;
 use crate::graph::diff::RATE_CHANGE;
-use crate::graph::window::{Align, Length};
+use crate::graph::window::{Align, Cut, Length};
 
 /// See how a robot's software reconfigures during a mission, straight from its bag files.
 #[derive(Debug, Parser)]
@@ -228,6 +228,9 @@ pub(super) struct TimeArgs {
     /// Merge runs of windows with equal graphs.
     #[arg(long)]
     pub(super) skip_unchanged: bool,
+    /// A window per phase, or per reconfiguration, instead of per period.
+    #[arg(long, value_parser = cut, value_name = "phases|changes", conflicts_with_all = ["period", "step", "align", "skip_unchanged"])]
+    pub(super) cut: Option<Cut>,
 }
 
 #[derive(Debug, Args)]
@@ -400,6 +403,13 @@ pub(super) struct SequenceArgs {
     /// Also write the first frame of animations as a PNG here.
     #[arg(long, value_name = "FILE")]
     pub(super) poster: Option<PathBuf>,
+    /// How JSON holds the windows: each with all that is in it, or each element once with what it says when. [default:
+    /// windows up to 2000 of them, else runs]
+    #[arg(long, value_name = "windows|runs", value_parser = ["windows", "runs"])]
+    pub(super) json: Option<String>,
+    /// A row per run of equal windows in tables of nodes, topics and edges, not per window.
+    #[arg(long)]
+    pub(super) runs: bool,
     /// How DOT is written: laid out for `rqt_graph`, or plain for Graphviz.
     #[arg(long, value_name = "rqt|plain", default_value = "rqt", value_parser = ["rqt", "plain"])]
     pub(super) dot_profile: String,
@@ -428,6 +438,14 @@ fn align(text: &str) -> Result<Align, String> {
         "bag" => Ok(Align::Bag),
         "clock" => Ok(Align::Clock),
         _ => Err("write `bag` or `clock`".to_owned()),
+    }
+}
+
+fn cut(text: &str) -> Result<Cut, String> {
+    match text {
+        "phases" => Ok(Cut::Phases),
+        "changes" => Ok(Cut::Changes),
+        _ => Err("write `phases` or `changes`".to_owned()),
     }
 }
 

@@ -100,6 +100,12 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::Options> {
         hold_changes: args.hold_changes,
         max_bytes: args.max_bytes,
         dot_profile: Profile::parse(&args.dot_profile)?,
+        json: match args.json.as_deref() {
+            Some("windows") => options::Form::Windows,
+            Some(_) => options::Form::Runs,
+            None => options::Form::Auto,
+        },
+        has_runs: args.runs,
         strip: strip.transpose()?,
         links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
         ..options::Options::default()
@@ -139,11 +145,16 @@ pub(super) fn figure(args: &FigureArgs, look: &LookArgs) -> Result<Option<Figure
 }
 
 /// Where phases come from.
-pub(super) fn phases(word: &str) -> Phases {
-    match word {
-        "auto" => Phases::Found,
-        "none" => Phases::None,
-        file => Phases::File(file.into()),
+pub(super) fn phases(word: &str, captions: Option<&str>) -> Result<Phases> {
+    match (word, captions) {
+        ("auto", None) => Ok(Phases::Found),
+        ("auto", Some(from)) => Ok(Phases::Captions(from.to_owned())),
+        ("none", None) => Ok(Phases::None),
+        (file, None) => Ok(Phases::File(file.into())),
+        (_, Some(_)) => Err(Error::usage(
+            "`--captions` and `--phases` both tell the phases",
+            "give one of them",
+        )),
     }
 }
 

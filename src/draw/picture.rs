@@ -4,6 +4,7 @@ mod arrows;
 mod badge;
 mod boxes;
 mod chips;
+pub(crate) use chips::chips;
 mod legend;
 mod measured;
 mod options;

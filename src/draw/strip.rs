@@ -393,6 +393,7 @@ mod tests {
             step: period,
             elements: Elements::default(),
             windows: Vec::new(),
+            graphs: crate::graph::Graphs::default(),
             ledger: crate::mission::Ledger::default(),
             activity: crate::mission::Activity::default(),
             undrawn: Vec::new(),

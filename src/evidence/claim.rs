@@ -180,7 +180,7 @@ pub struct EvidenceLine {
 }
 
 /// All claims of a mission.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Claims {
     /// The names somebody asks about ([`EvidenceLine`]); none: no pieces are kept.
     pub(crate) watched: Vec<String>,
@@ -201,7 +201,8 @@ pub(crate) struct Claims {
     bytes: usize,
     places: HashMap<(Claim, SourceId, Option<Name>), usize>,
     pub(crate) list: Vec<ClaimRecord>,
-    pub(crate) times: Stamps,
+    /// Taken in until they are shared.
+    pub(crate) times: Arc<Stamps>,
     /// What stands for the texts that found no room.
     overflow: Option<Name>,
     /// Claims that found no room.
@@ -280,26 +281,25 @@ impl Claims {
 
     /// Takes in a sequence number of the stream at `place`.
     pub(crate) fn sequence(&mut self, place: usize, time: Stamp, number: u32) {
-        let times = &mut self.times;
-        let id = *self
-            .sequences
-            .entry(place)
-            .or_insert_with(|| times.series());
-        self.times.add(id, &[time], Some(&[number]));
+        note(&mut self.times, &mut self.sequences, place, (time, number));
     }
 
     /// Takes in a header stamp of the stream at `place`.
     pub(crate) fn header(&mut self, place: usize, stamp: Stamp, log_time: u32) {
-        let times = &mut self.times;
-        let id = *self.headers.entry(place).or_insert_with(|| times.series());
-        self.times.add(id, &[stamp], Some(&[log_time]));
+        note(&mut self.times, &mut self.headers, place, (stamp, log_time));
     }
 
     /// Takes in the hash of a payload of the stream at `place`.
     pub(crate) fn payload(&mut self, place: usize, time: Stamp, hash: u32) {
-        let times = &mut self.times;
-        let id = *self.payloads.entry(place).or_insert_with(|| times.series());
-        self.times.add(id, &[time], Some(&[hash]));
+        note(&mut self.times, &mut self.payloads, place, (time, hash));
+    }
+
+    /// Ends the taking in of times.
+    ///
+    /// # Errors
+    /// As [`Stamps::finish`].
+    pub(crate) fn finish(&mut self) -> io::Result<()> {
+        Arc::get_mut(&mut self.times).map_or(Ok(()), Stamps::finish)
     }
 
     /// Takes in that `source` claims something, at `time` if it is a matter of time.
@@ -316,7 +316,9 @@ impl Claims {
                 return;
             }
             None => {
-                let times = self.times.series();
+                let Some(times) = Arc::get_mut(&mut self.times).map(Stamps::series) else {
+                    return;
+                };
                 self.list.push(ClaimRecord {
                     claim: said.claim,
                     source,
@@ -330,7 +332,9 @@ impl Claims {
         };
         let fact = &mut self.list[place];
         fact.degree = fact.degree.min(said.degree);
-        self.times.add(fact.times, time.as_slice(), None);
+        if let Some(times) = Arc::get_mut(&mut self.times) {
+            times.add(fact.times, time.as_slice(), None);
+        }
     }
 
     /// Numbers all names in the order of their texts; tells the new number of each old one.
@@ -358,9 +362,27 @@ impl Claims {
         new
     }
 
+    /// The texts of all names, by their numbers.
+    pub(crate) fn into_texts(self) -> Vec<Arc<str>> {
+        self.texts
+    }
+
     /// When a fact was claimed, sorted.
-    pub(crate) fn times(&mut self, fact: &ClaimRecord) -> io::Result<Vec<Stamp>> {
+    pub(crate) fn times(&self, fact: &ClaimRecord) -> io::Result<Vec<Stamp>> {
         self.times.times(fact.times)
+    }
+}
+
+/// Adds a time with its number to the series of a place.
+fn note(
+    times: &mut Arc<Stamps>,
+    series: &mut BTreeMap<usize, SeriesId>,
+    place: usize,
+    (time, number): (Stamp, u32),
+) {
+    if let Some(times) = Arc::get_mut(times) {
+        let id = *series.entry(place).or_insert_with(|| times.series());
+        times.add(id, &[time], Some(&[number]));
     }
 }
 

@@ -11,6 +11,7 @@ use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
+use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claims, SourceId};
 use crate::evidence::message::cursor::Cursor;
 use crate::evidence::message::dynamic::Schema;
@@ -18,7 +19,6 @@ use crate::evidence::proof::{Reliability, Stream};
 use crate::evidence::publishers;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
-use crate::evidence::{EvidenceLine, SOURCES};
 
 /// What to look at while reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,6 +32,8 @@ pub struct Options {
     /// The beginnings of payloads are compared with each other and with log texts, up to this many bytes of them; 0: none,
     /// and none is read for it.
     pub payload_bytes: u64,
+    /// The topic of strings whose texts are kept ([`Recorded::texts`]).
+    pub texts_of: Option<String>,
 }
 
 impl Default for Options {
@@ -41,6 +43,7 @@ impl Default for Options {
             why: Vec::new(),
             infer_stamps: false,
             payload_bytes: PAYLOAD_BYTES,
+            texts_of: None,
         }
     }
 }
@@ -48,6 +51,10 @@ impl Default for Options {
 /// Bytes of payload that are compared unless asked otherwise: a tenth of a second of work, and enough for an hour of a
 /// small robot without cameras.
 pub const PAYLOAD_BYTES: u64 = 64 << 20;
+/// The most texts that are kept of a topic.
+const MOST_TEXTS: usize = 10_000;
+/// How many characters of each.
+const LONGEST_TEXT: usize = 200;
 /// What a payload costs besides its bytes: its hash is kept.
 const PAYLOAD_ENTRY: u64 = 64;
 
@@ -64,6 +71,9 @@ pub struct Collector {
     schemas: Vec<Option<Schema>>,
     /// Bytes of payload compared so far.
     compared: u64,
+    /// Whether the messages of each stream are texts that are kept.
+    told: Vec<bool>,
+    texts: Vec<(Stamp, String)>,
     messages: Stamps,
     facts: Claims,
     notices: Notices,
@@ -122,6 +132,7 @@ impl Collector {
             equal_stamps::hear(&mut heard, message.data);
         }
         self.compare(place, message);
+        self.keep_text(place, message);
         let stream = &self.streams[place];
         for (source, read) in &self.readers[place] {
             let mut heard = SourceContext {
@@ -137,6 +148,19 @@ impl Collector {
                 self.notices
                     .add(undecodable(stream, "some messages do not have its layout"));
             }
+        }
+    }
+
+    /// Keeps the text of a message, if somebody asked for those of its topic.
+    fn keep_text(&mut self, place: usize, message: &Message<'_>) {
+        if !self.told[place] || self.texts.len() >= MOST_TEXTS {
+            return;
+        }
+        let encoding = &self.streams[place].connection.encoding;
+        let mut cursor = Cursor::new(encoding, message.data);
+        if let Ok(Ok(text)) = cursor.as_mut().map(Cursor::string) {
+            let text = text.chars().take(LONGEST_TEXT).collect();
+            self.texts.push((message.time, text));
         }
     }
 
@@ -168,9 +192,9 @@ impl Collector {
     ///
     /// # Errors
     /// If times had to be put into a temporary file and that failed.
-    pub fn finish(mut self) -> Result<Collected> {
+    pub fn finish(mut self) -> Result<Recorded> {
         self.messages.finish().map_err(spool_error)?;
-        self.facts.times.finish().map_err(spool_error)?;
+        self.facts.finish().map_err(spool_error)?;
         let Belief { span, jump } = believed(self.messages.days());
         self.notices
             .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));
@@ -185,7 +209,9 @@ impl Collector {
                         .to_owned(),
             });
         }
-        let mut all = Collected {
+        self.texts.sort();
+        let mut all = Recorded {
+            texts: self.texts,
             streams: self.streams,
             messages: self.messages,
             facts: self.facts,
@@ -261,7 +287,12 @@ impl Sink for BagSink<'_> {
         }
         let stamped = all.options.infer_stamps && equal_stamps::is_stamped(connection);
         let compared = all.options.payload_bytes > 0;
-        let want = match (readers.is_empty(), stamped, all.options.sizes) {
+        let is_text = matches!(
+            &*connection.type_name,
+            "std_msgs/String" | "std_msgs/msg/String"
+        );
+        let told = is_text && all.options.texts_of.as_deref() == Some(connection.topic.as_str());
+        let want = match (readers.is_empty() && !told, stamped, all.options.sizes) {
             (false, ..) => Want::Payload,
             _ if compared => Want::Head(payload::HEAD),
             (true, true, _) => Want::Head(equal_stamps::HEAD),
@@ -272,6 +303,7 @@ impl Sink for BagSink<'_> {
         all.streams.push(stream);
         all.readers.push(readers);
         all.stamped.push(stamped);
+        all.told.push(told);
         let definition = connection.definition.as_deref();
         let schema = echo::schema(&connection.type_name, definition);
         all.schemas.push(schema.filter(|_| compared));
@@ -303,10 +335,12 @@ impl Sink for BagSink<'_> {
 
 /// Everything that the bags of a mission hold about its graph.
 #[derive(Debug)]
-pub struct Collected {
+pub struct Recorded {
     pub(crate) streams: Vec<Stream>,
     pub(crate) messages: Stamps,
     pub(crate) facts: Claims,
+    /// The texts of the topic that was asked for, sorted by time.
+    pub texts: Vec<(Stamp, String)>,
     /// What went wrong without stopping us.
     pub notices: Notices,
     /// The times that are no accident; `None` if all of them may be believed.
@@ -316,15 +350,7 @@ pub struct Collected {
     pub span: Option<Span>,
 }
 
-impl Collected {
-    /// Every piece of evidence on what [`Options::why`] asks for, in order of time, source and text.
-    pub fn why(&self) -> Vec<EvidenceLine> {
-        let mut pieces = self.facts.pieces.clone();
-        pieces.sort_unstable();
-        pieces.dedup();
-        pieces
-    }
-
+impl Recorded {
     /// Whether a time may be believed.
     pub(crate) fn believes(&self, time: Stamp) -> bool {
         self.believed.is_none_or(|span| span.contains(time))

@@ -129,9 +129,9 @@ impl Proof {
 
 /// Everything known about a mission once all bags are read, and what follows from it so far.
 #[derive(Debug)]
-pub(crate) struct Findings<'a> {
+pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
-    pub(crate) facts: &'a mut Claims,
+    pub(crate) facts: Claims,
     pub(crate) proofs: Vec<Proof>,
     /// Reasons that were put into words by who gave them, while somebody asks why.
     pub(crate) worded: BTreeSet<(Key, SourceId)>,
@@ -151,12 +151,8 @@ pub(crate) struct Findings<'a> {
     closed: Option<Closed>,
 }
 
-impl<'a> Findings<'a> {
-    pub(crate) fn new(
-        streams: &'a [Stream],
-        facts: &'a mut Claims,
-        mission: (Stamp, Stamp),
-    ) -> Self {
+impl<'a> Conclusions<'a> {
+    pub(crate) fn new(streams: &'a [Stream], facts: Claims, mission: (Stamp, Stamp)) -> Self {
         let mut recorded: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
         for (at, stream) in streams.iter().enumerate() {
             recorded.entry(stream.topic).or_default().push(at);

@@ -37,7 +37,7 @@ use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Claims, Degree, Name, SourceId, Statement};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::definition::{Fit, Shape};
-use crate::evidence::proof::{Findings, Stream};
+use crate::evidence::proof::{Conclusions, Stream};
 
 /// A kind of evidence.
 pub struct Source {
@@ -56,7 +56,7 @@ pub struct Source {
 }
 
 /// Draws a conclusion.
-pub(crate) type Conclude = fn(SourceId, &mut Findings<'_>);
+pub(crate) type Conclude = fn(SourceId, &mut Conclusions<'_>);
 
 /// A source that does nothing yet, for rows to fill in.
 pub(crate) const NOTHING: Source = Source {

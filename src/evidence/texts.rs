@@ -25,7 +25,7 @@ pub(crate) struct Shown {
 }
 
 /// Texts of both sides.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Texts {
     said: Vec<Said>,
     shown: Vec<Shown>,

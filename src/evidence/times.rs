@@ -7,6 +7,7 @@ mod merge;
 
 use std::collections::BTreeMap;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::SpooledTempFile;
 
@@ -50,7 +51,8 @@ struct Series {
 #[derive(Debug)]
 pub(crate) struct Stamps {
     series: Vec<Series>,
-    spool: SpooledTempFile,
+    /// Locked because reading moves its position.
+    spool: Mutex<SpooledTempFile>,
     written: u64,
     open: usize,
     /// Messages per day since 1970.
@@ -62,7 +64,7 @@ impl Default for Stamps {
     fn default() -> Self {
         Self {
             series: Vec::new(),
-            spool: SpooledTempFile::new(IN_MEMORY),
+            spool: Mutex::new(SpooledTempFile::new(IN_MEMORY)),
             written: 0,
             open: 0,
             days: BTreeMap::new(),
@@ -90,7 +92,9 @@ impl Stamps {
             series.open.push((*stamp, size));
             if series.open.len() == BLOCK {
                 self.open = self.open.saturating_sub(BLOCK - 1);
-                close(series, &mut self.spool, &mut self.written, &mut self.days)
+                let spool = self.spool.get_mut();
+                let spool = spool.unwrap_or_else(PoisonError::into_inner);
+                close(series, spool, &mut self.written, &mut self.days)
                     .unwrap_or_else(|e| self.failed = Some(e));
             } else {
                 self.open += 1;
@@ -104,8 +108,10 @@ impl Stamps {
 
     /// Puts all that came so far into blocks.
     fn close_all(&mut self) {
+        let spool = self.spool.get_mut();
+        let spool = spool.unwrap_or_else(PoisonError::into_inner);
         for series in &mut self.series {
-            close(series, &mut self.spool, &mut self.written, &mut self.days)
+            close(series, spool, &mut self.written, &mut self.days)
                 .unwrap_or_else(|e| self.failed = Some(e));
         }
         self.open = 0;
@@ -147,7 +153,7 @@ impl Stamps {
     ///
     /// # Errors
     /// If the unnamed file cannot be read.
-    pub(crate) fn times(&mut self, id: SeriesId) -> io::Result<Vec<Stamp>> {
+    pub(crate) fn times(&self, id: SeriesId) -> io::Result<Vec<Stamp>> {
         let mut times = Vec::new();
         self.merge(&[id], |timed| times.push(timed.time))?;
         Ok(times)
@@ -157,10 +163,16 @@ impl Stamps {
         self.series.get(id.0 as usize)
     }
 
-    fn load(&mut self, block: &Block) -> io::Result<Vec<(Stamp, u32)>> {
+    fn spool(&self) -> MutexGuard<'_, SpooledTempFile> {
+        self.spool.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn load(&self, block: &Block) -> io::Result<Vec<(Stamp, u32)>> {
         let mut bytes = vec![0; block.bytes as usize];
-        self.spool.seek(SeekFrom::Start(block.at))?;
-        self.spool.read_exact(&mut bytes)?;
+        let mut spool = self.spool();
+        spool.seek(SeekFrom::Start(block.at))?;
+        spool.read_exact(&mut bytes)?;
+        drop(spool);
         Ok(block::decode(&bytes, block.count as usize))
     }
 }
@@ -246,7 +258,7 @@ mod tests {
             all.add(*id, &[Stamp(n << 42)], None);
         }
         all.finish().unwrap();
-        assert!(all.spool.is_rolled() || all.written <= IN_MEMORY as u64);
+        assert!(all.spool().is_rolled() || all.written <= IN_MEMORY as u64);
         let mut next = 0;
         all.merge(&ids, |t| {
             assert_eq!(t.time, Stamp(next << 42));

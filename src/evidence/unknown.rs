@@ -8,11 +8,11 @@ use crate::base::name::is_quiet;
 use crate::base::words::count;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Degree, Name};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 use crate::evidence::source::contract::Owners;
 
 /// Adds a box for every recorded topic that lacks publishers.
-pub(crate) fn conclude(known: &mut Findings<'_>) {
+pub(crate) fn conclude(known: &mut Conclusions<'_>) {
     let owners = Owners::new();
     for topic in known.topics_of(|_| true) {
         let text = known.text(topic);
@@ -55,7 +55,13 @@ pub(crate) fn conclude(known: &mut Findings<'_>) {
 }
 
 /// Adds a box with its edge.
-fn add(known: &mut Findings<'_>, word: &str, name: &str, topic: Name, words: &dyn Fn() -> String) {
+fn add(
+    known: &mut Conclusions<'_>,
+    word: &str,
+    name: &str,
+    topic: Name,
+    words: &dyn Fn() -> String,
+) {
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
     let node = known.facts.name(name);
     let edge = (Key::Publish(node, topic), Validity::Like(Key::Node(node)));

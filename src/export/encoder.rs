@@ -223,6 +223,8 @@ pub struct Format {
     pub what: &'static str,
     /// Whether it shows the picture; the others write the graph itself, whose size no page limits.
     pub is_drawn: bool,
+    /// Whether it shows the view; the others write the whole mission.
+    pub is_viewed: bool,
     /// Whether `--max-bytes` binds it.
     pub is_limited: bool,
     /// Whether one drawing of the whole may stand in it.
@@ -238,6 +240,7 @@ pub(crate) const PICTURE: Format = Format {
     word: "",
     what: "",
     is_drawn: true,
+    is_viewed: true,
     is_limited: false,
     whole: OneDrawing::Never,
     check: None,
@@ -259,6 +262,7 @@ pub(crate) const IMAGE: Format = Format {
 /// What formats that hold the graph itself have in common.
 pub(crate) const DATA: Format = Format {
     is_drawn: false,
+    is_viewed: false,
     ..PICTURE
 };
 

@@ -5,10 +5,10 @@ use crate::base::error::Result;
 use crate::export::sequence::Sequence;
 use crate::export::sink::Sink;
 use crate::export::target::Target;
-use crate::mission::{self, Mission};
+use crate::mission::Json;
 
 struct Data<'a> {
-    mission: &'a Mission,
+    json: Json<'a>,
     target: Target,
 }
 
@@ -22,7 +22,11 @@ pub(crate) fn start<'a>(
 ) -> Result<Box<dyn Encoder + 'a>> {
     target.must_be_one("the data of all windows is one file")?;
     Ok(Box::new(Data {
-        mission: sequence.data,
+        json: Json {
+            mission: sequence.data,
+            places: sequence.places,
+            form: sequence.options.json,
+        },
         target: target.clone(),
     }))
 }
@@ -30,7 +34,7 @@ pub(crate) fn start<'a>(
 impl Encoder for Data<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut sink = Sink::create(&self.target, None)?;
-        mission::write_json(self.mission, &mut sink).map_err(sink.error())?;
+        self.json.write(&mut sink).map_err(sink.error())?;
         let mut written = Written::to(&self.target);
         written.add(sink.commit()?);
         Ok(written)

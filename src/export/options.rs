@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::base::error::{Error, Result};
 pub use crate::draw::figure::Options as FigureOptions;
 pub use crate::draw::strip::Choice;
+pub use crate::mission::Form;
 
 /// How the sequence runs.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +26,10 @@ pub struct Options {
     pub max_bytes: Option<u64>,
     /// How DOT is written.
     pub dot_profile: Profile,
+    /// How JSON is written.
+    pub json: Form,
+    /// Whether tables of elements have a row per run of equal windows.
+    pub has_runs: bool,
     /// The windows of a film strip, if one was asked for: it takes the place of a sequence of drawings too.
     pub strip: Option<Choice>,
     /// The figure, if one was asked for: it stands where a strip would.
@@ -46,6 +51,8 @@ impl Default for Options {
             scale: 1.0,
             max_bytes: None,
             dot_profile: Profile::default(),
+            json: Form::Auto,
+            has_runs: false,
             strip: None,
             figure: None,
             links: Vec::new(),

@@ -7,11 +7,11 @@ mod tables;
 
 use std::fmt::Write as _;
 
+use crate::base::notice::Notices;
 use crate::base::words;
 use crate::draw::style::{BUILTIN, Style};
 use crate::export::mermaid;
 use crate::export::sequence::Sequence;
-use crate::mission::Mission;
 use crate::view::{Counts, View};
 use escape::{address, plain};
 
@@ -40,7 +40,7 @@ pub(crate) fn report(sequence: &Sequence<'_>) -> String {
     out.push_str(&tables::nodes(mission, MOST_TABLE));
     out.push_str(&tables::topics(mission, MOST_TABLE));
     out.push_str(&tables::evidence(mission));
-    out.push_str(&notices(mission));
+    out.push_str(&notices(sequence.notices));
     out
 }
 
@@ -151,9 +151,9 @@ fn chart(view: &View) -> String {
     out
 }
 
-fn notices(mission: &Mission) -> String {
+fn notices(notices: &Notices) -> String {
     let mut out = String::new();
-    for notice in mission.notices.iter() {
+    for notice in notices.iter() {
         let times = if notice.count > 1 {
             format!(" ({} times)", notice.count)
         } else {

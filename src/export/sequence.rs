@@ -2,12 +2,13 @@
 
 pub use super::options::Options;
 
+use crate::base::notice::Notices;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Picture, Union};
 use crate::draw::scene::Scene;
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
-use crate::mission::Mission;
+use crate::mission::{Mission, Places};
 use crate::view::View;
 
 /// What draws windows.
@@ -54,6 +55,10 @@ pub struct Sequence<'a> {
     pub mission: &'a Mission,
     /// What data files hold: the whole sequence too, or the part that is viewed.
     pub data: &'a Mission,
+    /// Where everything is drawn, if it is.
+    pub places: Option<&'a Places>,
+    /// Everything worth saying.
+    pub notices: &'a Notices,
     /// What the picture shows of it.
     pub view: &'a View,
     /// What draws a window.

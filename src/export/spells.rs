@@ -75,8 +75,7 @@ pub(super) fn parts(mission: &Mission) -> (Vec<Part>, Vec<Part>) {
     let mut topics: Vec<Part> = topics.collect();
     let mut publishes: Vec<Part> = publishes.collect();
     let mut subscribes: Vec<Part> = subscribes.collect();
-    for window in &mission.windows {
-        let graph = &window.graph;
+    for (window, graph) in mission.each() {
         let seen = |id, degree, count, hz| Seen {
             id,
             degree,

@@ -4,6 +4,7 @@
 
 pub(crate) mod folder;
 mod mission;
+mod runs;
 pub(crate) mod writer;
 
 use super::{Encoder, Written};
@@ -13,7 +14,7 @@ use crate::export::sequence::Sequence;
 use crate::export::sink::Sink;
 use crate::export::target::{Target, is_special};
 use crate::mission::Mission;
-use mission::{TABLES, Table};
+use mission::{Row, TABLES, Table};
 pub(crate) use writer::TableFormat;
 use writer::Writer;
 
@@ -21,6 +22,7 @@ struct Tables<'a> {
     mission: &'a Mission,
     target: Target,
     format: TableFormat,
+    has_runs: bool,
 }
 
 /// Begins the tables as CSV.
@@ -78,14 +80,18 @@ fn start<'a>(
         mission: sequence.data,
         target: target.clone(),
         format,
+        has_runs: sequence.options.has_runs,
     }))
 }
 
 impl Encoder for Tables<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let each = TABLES.iter().zip(files(&self.target, self.format.word()));
-        let write =
-            |(table, file): (&Table, Target)| write(self.mission, table, &file, self.format);
+        let write = |(table, file): (&Table, Target)| {
+            let fill = table.fill_runs.filter(|_| self.has_runs);
+            let rows = |row: Row<'_>| fill.unwrap_or(table.fill)(self.mission, row);
+            write(rows, table, &file, self.format)
+        };
         // All of them are whole before the first one gets its name.
         let sinks: Vec<Sink> = each.map(write).collect::<Result<_>>()?;
         let mut written = Written::to(&self.target);
@@ -99,14 +105,19 @@ impl Encoder for Tables<'_> {
 /// How many rows are gathered before they are written.
 const MOST_ROWS: usize = 4096;
 
-fn write(mission: &Mission, table: &Table, target: &Target, format: TableFormat) -> Result<Sink> {
+fn write(
+    rows: impl Fn(Row<'_>),
+    table: &Table,
+    target: &Target,
+    format: TableFormat,
+) -> Result<Sink> {
     let sink = Sink::create(target, None)?;
     let failed = Error::io("write", sink.path());
     let write = || {
         let mut batch = Batch::new(table.columns);
         let mut writer = Writer::new(format, sink, &batch, &[])?;
         let mut result = Ok(());
-        (table.fill)(mission, &mut |row: &[Cell<'_>]| {
+        rows(&mut |row: &[Cell<'_>]| {
             batch.push(row);
             if batch.rows >= MOST_ROWS && result.is_ok() {
                 result = writer.write(&batch);

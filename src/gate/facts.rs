@@ -11,7 +11,7 @@ use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::lives::Bound;
-use crate::graph::{Edge, Element, NodeId, State, TopicId, TopicState};
+use crate::graph::{Edge, Element, Graph, NodeId, State, TopicId, TopicState};
 use crate::mission::activity::is_hidden_node;
 use crate::mission::ledger::{Entry, Kind};
 use crate::mission::{Mission, Window};
@@ -31,6 +31,8 @@ pub(crate) struct Facts<'a> {
     is_rewritten: bool,
     /// Nodes that are there, by role.
     roles: BTreeMap<&'a str, Vec<NodeId>>,
+    /// The graph of each window, all at hand: rules look at them in any order.
+    graphs: Vec<Graph>,
 }
 
 /// How well each element is known at its best.
@@ -95,7 +97,8 @@ impl<'a> Facts<'a> {
             subscribes: vec![Degree::Declared; elements.subscribes.len()],
         };
         let mut messages = vec![0; elements.topics.len()];
-        for graph in mission.windows.iter().map(|w| &w.graph) {
+        let graphs: Vec<Graph> = mission.graphs.iter().collect();
+        for graph in &graphs {
             raise(
                 &mut degrees.nodes,
                 graph.nodes.iter().map(|s| (s.id, s.degree)),
@@ -125,6 +128,7 @@ impl<'a> Facts<'a> {
                 .iter()
                 .any(|n| n.kind == NoticeKind::Rewritten),
             roles,
+            graphs,
         }
     }
 
@@ -278,8 +282,8 @@ impl<'a> Facts<'a> {
 
     /// The windows in which a node is, of a mission of which nothing finer is known.
     fn windows_of(&self, node: NodeId) -> impl Iterator<Item = Span> + use<'a> {
-        let is_in = move |w: &&Window| w.graph.nodes.binary_search_by_key(&node, |s| s.id).is_ok();
-        self.mission.windows.iter().filter(is_in).map(|w| w.span)
+        let rows = self.mission.graphs.rows(Element::Node(node));
+        rows.filter_map(|(at, _)| Some(self.mission.windows.get(at)?.span))
     }
 
     /// Entries of the ledger about any of these nodes, but not about their edges.
@@ -291,11 +295,11 @@ impl<'a> Facts<'a> {
 
     /// The lifecycle state that a role was last seen in.
     pub(crate) fn lifecycle(&self, nodes: &[NodeId]) -> Option<Arc<str>> {
-        let states = |w: &'a Window| {
-            let states = w.graph.nodes.iter().filter(|s| nodes.contains(&s.id));
+        let states = |graph: &Graph| {
+            let states = graph.nodes.iter().filter(|s| nodes.contains(&s.id));
             states.filter_map(|s| s.lifecycle.clone()).next_back()
         };
-        self.mission.windows.iter().rev().find_map(states)
+        self.graphs.iter().rev().find_map(states)
     }
 
     /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
@@ -308,7 +312,11 @@ impl<'a> Facts<'a> {
                 end: last.end,
             });
         }
-        let mut windows = self.mission.windows.iter().filter(|w| count(w, topic) > 0);
+        let mut windows = self
+            .mission
+            .windows
+            .iter()
+            .filter(|w| self.count(w.index, topic) > 0);
         let first = windows.next()?.span;
         Some(Span {
             start: first.start,
@@ -343,7 +351,7 @@ impl<'a> Facts<'a> {
             (span.nanos() >= w.span.nanos() / 2).then(|| Rate {
                 window: w.index,
                 span,
-                count: count(w, topic),
+                count: self.count(w.index, topic),
             })
         };
         inside.filter_map(rate).collect()
@@ -351,10 +359,8 @@ impl<'a> Facts<'a> {
 
     /// Whether a topic's messages come at even times, by the median in each of these windows.
     pub(crate) fn is_even(&self, topic: TopicId, rates: &[Rate]) -> bool {
-        let median = |rate: &Rate| {
-            let window = self.mission.windows.get(rate.window)?;
-            Some(state(window, topic)?.median_period_s? * rate.hz())
-        };
+        let median =
+            |rate: &Rate| Some(self.state(rate.window, topic)?.median_period_s? * rate.hz());
         let mut shares = rates.iter().filter_map(median).peekable();
         shares.peek().is_some() && shares.all(|share| (0.8..=1.25).contains(&share))
     }
@@ -364,7 +370,7 @@ impl<'a> Facts<'a> {
         let inside = |span: &Span| during.start <= span.start && span.end <= during.end;
         let mut all = Vec::new();
         for window in self.mission.windows.iter().filter(|w| inside(&w.span)) {
-            if let Some(gap) = state(window, topic).and_then(|s| s.max_gap_s) {
+            if let Some(gap) = self.state(window.index, topic).and_then(|s| s.max_gap_s) {
                 all.push((window.span, nanos(gap)));
             }
         }
@@ -384,8 +390,8 @@ impl<'a> Facts<'a> {
     /// Whether a topic's last message stands for it; `None` where the bag does not tell.
     pub(crate) fn is_latched(&self, topic: TopicId) -> Option<bool> {
         let own = &self.mission.elements.topics[topic as usize];
-        let states = self.mission.windows.iter().filter_map(|w| state(w, topic));
-        let states: BTreeSet<State> = states.map(|s| s.state).collect();
+        let states = self.mission.graphs.rows(Element::Topic(topic));
+        let states: BTreeSet<State> = states.map(|(_, row)| row.state).collect();
         match &own.qos {
             _ if states.contains(&State::Latched) => Some(true),
             Some(qos) => Some(qos.contains("transient_local")),
@@ -449,6 +455,18 @@ impl<'a> Facts<'a> {
         })
     }
 
+    /// A topic in the window at a place.
+    fn state(&self, window: usize, topic: TopicId) -> Option<&TopicState> {
+        let states = &self.graphs.get(window)?.topics;
+        let place = states.binary_search_by_key(&topic, |s| s.id).ok()?;
+        states.get(place)
+    }
+
+    /// Messages of a topic in the window at a place.
+    pub(crate) fn count(&self, window: usize, topic: TopicId) -> u64 {
+        self.state(window, topic).map_or(0, |s| s.count)
+    }
+
     /// A moment of the mission, for people.
     pub(crate) fn clock(&self, at: Stamp) -> String {
         words::offset_seconds(self.mission.offset(at))
@@ -458,18 +476,6 @@ impl<'a> Facts<'a> {
     pub(crate) fn stretch(&self, span: Span) -> String {
         format!("{}–{}", self.clock(span.start), self.clock(span.end))
     }
-}
-
-/// A topic in a window.
-fn state(window: &Window, topic: TopicId) -> Option<&TopicState> {
-    let states = &window.graph.topics;
-    let place = states.binary_search_by_key(&topic, |s| s.id).ok()?;
-    states.get(place)
-}
-
-/// Messages of a topic in a window.
-pub(crate) fn count(window: &Window, topic: TopicId) -> u64 {
-    state(window, topic).map_or(0, |s| s.count)
 }
 
 /// The edges of a topic that were seen.

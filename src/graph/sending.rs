@@ -1,13 +1,6 @@
 //! When messages came: for every publication and topic the stretches without a long silence, in continuous time.
 
-use std::io;
-
-use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
-use crate::evidence::claim::Name;
-use crate::evidence::collector::{Collected, spool_error};
-use crate::evidence::proof::Reliability;
-use crate::graph::Elements;
 
 /// The shortest silence that is one, whatever the rhythm.
 const SILENCE_NS: i64 = 4_000_000_000;
@@ -25,100 +18,16 @@ pub struct Sending {
     pub topics: Vec<Vec<Span>>,
 }
 
-/// The stretches of sending of all `elements`, which are those built from `collected`. A silence lasts at least four
-/// usual periods, 4 s and 1.2 % of the mission.
-///
-/// # Errors
-/// If the temporary file of times cannot be read.
-pub(crate) fn sending(collected: &mut Collected, elements: &Elements) -> Result<Sending> {
-    let mut all = Sending {
-        publishes: vec![Vec::new(); elements.publishes.len()],
-        topics: vec![Vec::new(); elements.topics.len()],
-    };
-    let span = collected.span.map_or(0, |s| s.nanos());
+/// The shortest silence in a mission of so many nanoseconds: 4 s, or 1.2 % of it.
+pub(crate) fn shortest_silence(mission: i64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "a share of an i64")]
-    let least = SILENCE_NS.max((span as f64 * SILENCE_SHARE) as i64);
-    for (id, topic) in elements.topics.iter().enumerate() {
-        let streams = streams(collected, topic.name.as_str());
-        let speakers = speakers(collected, &streams);
-        let mut runs = vec![Runs::default(); speakers.len() + 1];
-        each_message(collected, &streams, |place, time| {
-            runs[speakers.len()].hear(time, least);
-            let own = speakers.iter().position(|(_, of)| of.contains(&place));
-            if let Some(run) = own.and_then(|own| runs.get_mut(own)) {
-                run.hear(time, least);
-            }
-        })
-        .map_err(spool_error)?;
-        all.topics[id] = runs.pop().unwrap_or_default().stretches();
-        for ((node, _), run) in speakers.iter().zip(runs) {
-            let name = collected.facts.text(*node);
-            if let Some(edge) = publication(elements, &name, id) {
-                all.publishes[edge] = run.stretches();
-            }
-        }
-    }
-    Ok(all)
-}
-
-/// The places of a topic's streams.
-fn streams(collected: &Collected, topic: &str) -> Vec<usize> {
-    let Some(name) = collected.facts.known(topic) else {
-        return Vec::new();
-    };
-    let of_topic = |s: &usize| collected.streams[*s].topic == name;
-    (0..collected.streams.len()).filter(of_topic).collect()
-}
-
-/// The publishers that are believed, with the places of theirs among `streams`.
-fn speakers(collected: &Collected, streams: &[usize]) -> Vec<(Name, Vec<usize>)> {
-    let mut all: Vec<(Name, Vec<usize>)> = Vec::new();
-    for (place, stream) in streams.iter().enumerate() {
-        let stream = &collected.streams[*stream];
-        let trusted = stream.trust != Reliability::First;
-        let Some(node) = stream.speaker.filter(|_| trusted) else {
-            continue;
-        };
-        match all.iter_mut().find(|(name, _)| *name == node) {
-            Some((_, places)) => places.push(place),
-            None => all.push((node, vec![place])),
-        }
-    }
-    all
-}
-
-fn each_message(
-    collected: &mut Collected,
-    streams: &[usize],
-    mut each: impl FnMut(usize, Stamp),
-) -> io::Result<()> {
-    let ids: Vec<_> = streams
-        .iter()
-        .map(|s| collected.streams[*s].times)
-        .collect();
-    let believed = collected.believed;
-    collected.messages.merge(&ids, |timed| {
-        if believed.is_none_or(|span| span.contains(timed.time)) {
-            each(timed.series, timed.time);
-        }
-    })
-}
-
-/// The publication of a node on a topic, by name and id.
-fn publication(elements: &Elements, node: &str, topic: usize) -> Option<usize> {
-    let node = elements
-        .nodes
-        .binary_search_by(|n| n.name.as_str().cmp(node));
-    let key = (u32::try_from(node.ok()?).ok()?, u32::try_from(topic).ok()?);
-    let found = elements
-        .publishes
-        .binary_search_by_key(&key, |e| (e.node, e.topic));
-    found.ok()
+    let share = (mission as f64 * SILENCE_SHARE) as i64;
+    SILENCE_NS.max(share)
 }
 
 /// What was heard of one sequence of messages.
 #[derive(Clone, Debug, Default)]
-struct Runs {
+pub(crate) struct Runs {
     first: Option<Stamp>,
     last: Stamp,
     gaps: i64,
@@ -128,7 +37,7 @@ struct Runs {
 
 impl Runs {
     /// Takes the next message; `least` is the shortest silence.
-    fn hear(&mut self, time: Stamp, least: i64) {
+    pub(crate) fn hear(&mut self, time: Stamp, least: i64) {
         if self.first.is_none() {
             self.first = Some(time);
         } else {
@@ -152,7 +61,8 @@ impl Runs {
         (whole - gaps.iter().sum::<i64>()) / (self.gaps - long).max(1)
     }
 
-    fn stretches(&self) -> Vec<Span> {
+    /// The stretches without a silence, which lasts four usual periods and as long as was said.
+    pub(crate) fn stretches(&self) -> Vec<Span> {
         let Some(first) = self.first else {
             return Vec::new();
         };

@@ -4,6 +4,7 @@ use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
 use crate::base::time::Span;
 use crate::evidence::collector::Collector;
+use crate::evidence::conclude::Options;
 use crate::evidence::topology::Element::{Node, Subscribe};
 
 const SECOND: i64 = 1_000_000_000;
@@ -26,10 +27,10 @@ fn connection(id: u32, topic: &str, publisher: Option<&str>, latching: bool) -> 
 }
 
 fn graphs(talks: &[Talk<'_>], period: i64) -> Built {
-    built(talks, period, &Options::default())
+    built(talks, period, &Options::default(), 0)
 }
 
-fn built(talks: &[Talk<'_>], period: i64, options: &Options) -> Built {
+fn built(talks: &[Talk<'_>], period: i64, options: &Options, grace: usize) -> Built {
     let mut collector = Collector::new(crate::evidence::collector::Options::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
@@ -38,8 +39,8 @@ fn built(talks: &[Talk<'_>], period: i64, options: &Options) -> Built {
         let stamps: Vec<_> = times.iter().map(|t| Stamp(t * SECOND)).collect();
         bag.stamps(ConnectionId(id), &stamps, None);
     }
-    let mut collected = collector.finish().unwrap();
-    let span = collected.span.unwrap();
+    let recorded = collector.finish().unwrap();
+    let span = recorded.span.unwrap();
     let windows: Vec<_> = (0..1000)
         .map(|n| Span {
             start: span.start.plus(n * period * SECOND),
@@ -47,7 +48,7 @@ fn built(talks: &[Talk<'_>], period: i64, options: &Options) -> Built {
         })
         .take_while(|w| w.start < span.end)
         .collect();
-    build(&mut collected, &windows, options).unwrap()
+    build(&recorded, &windows, options, grace).unwrap()
 }
 
 /// The state of one node in each window, `-` where there is none.
@@ -143,11 +144,7 @@ fn grace_keeps_a_silent_node_for_some_windows() {
         ("/a", Some("/x"), false, &[5, 6, 7, 8, 9]),
         ("/b", Some("/y"), false, &[0, 49]),
     ];
-    let options = Options {
-        grace: 2,
-        ..Options::default()
-    };
-    let all = built(&talks, 10, &options);
+    let all = built(&talks, 10, &Options::default(), 2);
     assert_eq!(states(&all, "/x"), ["active", "active", "active", "-", "-"]);
 }
 
@@ -194,7 +191,7 @@ fn roles_fold_anonymous_nodes_into_one() {
         roles: true,
         ..Options::default()
     };
-    let all = built(&talks, 10, &options);
+    let all = built(&talks, 10, &options, 0);
     let names: Vec<_> = all.elements.nodes.iter().map(|n| n.name.as_str()).collect();
     assert_eq!(names, ["/probe", "/rosout"]);
     assert_eq!(states(&all, "/probe"), ["active"; 3]);
@@ -230,7 +227,7 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
         ("/a", Some("/x"), false, &[0, 1, 2, 3, 4, 5]),
         ("/b", Some("/y"), false, &[0, 29]),
     ];
-    let all = built(&talks, 10, &options);
+    let all = built(&talks, 10, &options, 0);
     assert_eq!(states(&all, "/x"), ["active", "-", "-"]);
     assert_eq!(states(&all, "/z"), ["-", "active", "-"]);
     let words: Vec<_> = all.elements.subscribes[0].evidence.words().collect();
@@ -245,14 +242,14 @@ fn windows_may_overlap() {
     bag.connection(&connection(0, "/a", Some("/x"), false));
     let stamps: Vec<_> = (0..40).map(|n| Stamp(n * SECOND)).collect();
     bag.stamps(ConnectionId(0), &stamps, None);
-    let mut collected = collector.finish().unwrap();
+    let recorded = collector.finish().unwrap();
     let windows: Vec<_> = (0..4)
         .map(|n| Span {
             start: Stamp(n * 10 * SECOND),
             end: Stamp((n * 10 + 20).min(40) * SECOND),
         })
         .collect();
-    let all = build(&mut collected, &windows, &Options::default()).unwrap();
+    let all = build(&recorded, &windows, &Options::default(), 0).unwrap();
     assert_eq!(all.messages, [20, 20, 20, 10]);
 }
 
@@ -302,14 +299,14 @@ fn logged(talks: &[Talk<'_>], logs: &[Log<'_>], file: &str) -> Built {
             size: 0,
         });
     }
-    let mut collected = collector.finish().unwrap();
+    let recorded = collector.finish().unwrap();
     let windows: Vec<_> = (0..10)
         .map(|n| Span {
             start: Stamp(n * 10 * SECOND),
             end: Stamp((n + 1) * 10 * SECOND),
         })
         .collect();
-    build(&mut collected, &windows, &Options::default()).unwrap()
+    build(&recorded, &windows, &Options::default(), 0).unwrap()
 }
 
 /// The windows in which a node is there.

@@ -68,6 +68,17 @@ pub struct Division {
     pub end: Option<Moment>,
     /// Where windows begin.
     pub align: Align,
+    /// A window from one turn of the mission to the next, instead of equal ones.
+    pub cut: Option<Cut>,
+}
+
+/// Where the windows of a mission begin that are not equally long.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cut {
+    /// With each phase.
+    Phases,
+    /// With each reconfiguration: what happens within seconds is one.
+    Changes,
 }
 
 /// The windows of a mission: all as long as the period, a step apart, but for those cut off by its ends.
@@ -187,6 +198,27 @@ pub fn divide(division: &Division, span: Span) -> Result<Windows> {
         step,
         spans: spans.collect(),
     })
+}
+
+/// The windows that begin at the start of `span` and at each of `turns`, sorted; none of them is partial.
+pub(crate) fn at_turns(span: Span, turns: impl Iterator<Item = Stamp>) -> Windows {
+    let turns = turns.filter(|at| span.start < *at && *at < span.end);
+    let starts: Vec<Stamp> = std::iter::once(span.start).chain(turns).collect();
+    let ends = starts.iter().skip(1).copied().chain([span.end]);
+    let spans: Vec<Span> = starts
+        .iter()
+        .zip(ends)
+        .map(|(start, end)| Span { start: *start, end })
+        .filter(|window| window.start < window.end)
+        .collect();
+    let shortest = spans.iter().map(Span::nanos).min().unwrap_or(1);
+    let period = Period::from_nanos(shortest.max(1)).unwrap_or(MINUTE);
+    Windows {
+        span,
+        period,
+        step: period,
+        spans,
+    }
 }
 
 fn first_start(division: &Division, span: Span, period: Period, step: Period) -> Stamp {

@@ -1,5 +1,7 @@
 //! What was alive and how busy, on a grid of its own that no `--period` moves: in it phases are found and figures drawn.
 
+use std::cmp::Reverse;
+
 use crate::base::name::{is_player, is_quiet, is_recorder};
 use crate::base::time::{Span, Stamp};
 use crate::graph::sending::Sending;
@@ -66,18 +68,18 @@ impl Activity {
         let many = usize::try_from(MOST_CELLS).unwrap_or(1);
         let stride = mission.windows.len().div_ceil(many).max(1);
         let chunks: Vec<_> = mission.windows.chunks(stride).collect();
+        let mut graphs = mission.graphs.iter();
         let start = |k: usize| chunks.get(k).and_then(|c| c.first()).map(|w| w.span.start);
         let cell = |(k, chunk): (usize, &&[crate::mission::Window])| {
             let last = chunk.last().map_or(mission.span.end, |w| w.span.end);
-            let busiest = chunk
-                .iter()
-                .max_by_key(|w| (w.messages, std::cmp::Reverse(w.index)))?;
+            let busy = chunk.iter().zip(graphs.by_ref());
+            let (_, graph) = busy.max_by_key(|(w, _)| (w.messages, Reverse(w.index)))?;
             Some(Cell {
                 span: Span {
                     start: start(k)?,
                     end: start(k + 1).unwrap_or(last),
                 },
-                graph: busiest.graph.clone(),
+                graph,
             })
         };
         Self {

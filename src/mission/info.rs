@@ -271,8 +271,7 @@ impl BestDegrees {
             publishes: vec![Degree::Declared; elements.publishes.len()],
             subscribes: vec![Degree::Declared; elements.subscribes.len()],
         };
-        for window in &mission.windows {
-            let graph = &window.graph;
+        for graph in &mission.graphs {
             graph
                 .nodes
                 .iter()
@@ -353,7 +352,7 @@ fn traffic(mission: &Mission, topics: &[TopicInfo]) -> Vec<Traffic> {
         own.subscribes += 1;
         *own.received.get_or_insert(0) += topics[edge.topic as usize].count;
     }
-    for state in mission.windows.iter().flat_map(|w| &w.graph.publishes) {
+    for state in mission.graphs.iter().flat_map(|graph| graph.publishes) {
         let node: NodeId = elements.publishes[state.id as usize].node;
         if let Some(count) = state.count {
             *traffic[node as usize].sent.get_or_insert(0) += count;
@@ -380,8 +379,8 @@ fn topics(mission: &Mission) -> Vec<TopicInfo> {
             activity: vec![0; mission.windows.len()],
         })
         .collect();
-    for window in &mission.windows {
-        for state in &window.graph.topics {
+    for (window, graph) in mission.each() {
+        for state in &graph.topics {
             let topic = &mut topics[state.id as usize];
             topic.count += state.count;
             topic.bytes = state

@@ -1,8 +1,11 @@
 //! A mission as JSON, written as a stream and read back.
 
+pub(crate) mod changes;
 pub(crate) mod entries;
 pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod raw;
 pub(crate) mod read;
+pub(crate) mod rows;
+pub(crate) mod runs;
 pub(crate) mod write;

@@ -21,6 +21,11 @@ use crate::mission::Window;
 pub(crate) use changes::{explain, places};
 pub(crate) use make::{Told, make, sorted};
 
+/// A launch file brings its nodes up one after the other, each within this time.
+const CLOSE_NS: i64 = 2_000_000_000;
+/// Nobody looks at more turns of a mission than windows are chosen for it.
+const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
+
 /// An entry's place in [`Ledger::entries`].
 pub type EntryId = u32;
 
@@ -200,6 +205,20 @@ impl Ledger {
     /// The headlines whose time lies in `span`, in order.
     pub fn headlines(&self, span: Span) -> impl Iterator<Item = (EntryId, &Entry)> {
         self.inside(span).filter(|(_, e)| e.is_headline())
+    }
+
+    /// When the mission reconfigured inside `span`: the first headline of each run of them that are close together.
+    pub fn turns(&self, span: Span) -> Vec<Stamp> {
+        let close = CLOSE_NS.max(span.nanos() / MOST_TURNS);
+        let mut turns = Vec::new();
+        let mut last: Option<Stamp> = None;
+        for (_, entry) in self.headlines(span) {
+            if last.is_none_or(|last| entry.time.since(last) > close) {
+                turns.push(entry.time);
+            }
+            last = Some(entry.time);
+        }
+        turns
     }
 
     /// The places of all entries' parts, in order, by the places of those entries.

@@ -132,6 +132,17 @@ pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
     }
 }
 
+/// What is shown where only the data itself is written: nothing.
+pub(super) fn unseen(drawing: &Drawing) -> Composed {
+    Composed {
+        view: View::default(),
+        options: drawing.view.clone(),
+        page: drawing.page.clone(),
+        layout: Layout::empty(),
+        notices: Notices::new(),
+    }
+}
+
 /// A layout of what some options show.
 struct Attempt {
     view: View,

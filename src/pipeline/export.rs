@@ -3,12 +3,11 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::draw::{Composed, compose, places, unplaced};
-use super::figure::name_phases;
-use super::{Drawing, Phases, Reading, Stage, Watch, captions, read};
+use super::draw::{Composed, compose, places, unplaced, unseen};
+use super::{Drawing, Phases, Reading, Stage, Watch, read};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
-use crate::base::notice::{Notice, NoticeKind};
+use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::draw::figure::Figure;
 use crate::draw::paint::raster::Painter;
@@ -36,10 +35,6 @@ pub struct Render {
     pub kept: Vec<PathBuf>,
     /// What to write.
     pub outputs: Vec<Output>,
-    /// Where captions come from: a file or a topic.
-    pub captions: Option<String>,
-    /// Where phases and their names come from.
-    pub phases: Phases,
     /// Whether data files hold the viewed graph only.
     pub is_filtered: bool,
 }
@@ -55,8 +50,6 @@ impl Render {
             drawing: Drawing::new()?,
             sequence: options::Options::default(),
             outputs,
-            captions: None,
-            phases: Phases::Found,
             kept: Vec::new(),
             is_filtered: false,
         })
@@ -67,8 +60,10 @@ impl Render {
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Rendered {
-    /// The mission, with where it was drawn and everything worth saying.
+    /// The mission, as it was read.
     pub mission: Mission,
+    /// Everything worth saying, of the mission and of how it was drawn.
+    pub notices: Notices,
     /// What was written, in the order asked for.
     pub written: Vec<Written>,
 }
@@ -117,17 +112,12 @@ fn check_figure(job: &Render) -> Result<()> {
 ///
 /// # Errors
 /// As [`render`].
-pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
-    if let Some(from) = &job.captions {
-        drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
+    if matches!(job.reading.phases, Phases::Captions(_)) {
+        drawing.page.phases = captions(&mission);
     }
-    let is_named = name_phases(&mut mission, &job.phases)?;
-    let figure = drawn_figure(job, &mission, is_named)?;
-    for remark in figure.iter().flat_map(|(figure, _)| &figure.remarks) {
-        let notice = Notice::new(NoticeKind::Note, remark.clone());
-        mission.notices.add(notice);
-    }
+    let figure = drawn_figure(job, &mission)?;
     // What is not drawn, or drawn as a figure, needs no places.
     let is_graph = |o: &Output| {
         o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
@@ -141,15 +131,16 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
         notices,
     } = if is_drawn {
         compose(&mission, &drawing, watch)
-    } else {
+    } else if job.outputs.iter().any(|o| o.format.is_viewed) {
         unplaced(&mission, &drawing)
+    } else {
+        unseen(&drawing)
     };
     let elements = &mission.elements;
     if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
         return Err(nothing(elements, &options));
     }
-    mission.notices.extend(notices.iter());
-    mission.layout = is_drawn.then(|| places(&view, &layout));
+    let places = is_drawn.then(|| places(&view, &layout));
     let nothing = View::default();
     let drawn = if is_drawn { &view } else { &nothing };
     let picture = Measured::new(drawn, &drawing.style, &drawing.fonts, page).with(layout);
@@ -157,14 +148,17 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
         Some(_) => None,
         None => side_by_side(job, &mission, &view, &picture)?,
     };
-    for remark in strip.iter().flat_map(|s| &s.remarks) {
-        let notice = Notice::new(NoticeKind::Note, remark.clone());
-        mission.notices.add(notice);
-    }
+    let mut all = mission.notices.clone();
+    all.extend(notices.iter());
+    let remarks = figure.iter().flat_map(|(figure, _)| &figure.remarks);
+    let remarks = remarks.chain(strip.iter().flat_map(|s| &s.remarks));
+    all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.clone())));
     let viewed = job.is_filtered.then(|| filtered(&mission, &options));
     let sequence = Sequence {
         mission: &mission,
         data: viewed.as_ref().unwrap_or(&mission),
+        places: places.as_ref(),
+        notices: &all,
         view: &view,
         picture: &picture,
         painter: &Painter::new(&drawing.fonts),
@@ -191,7 +185,22 @@ pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) ->
     let steps = run::Steps::default();
     let written = run::run(&sequence, &job.outputs, &steps, &mut progress)?;
     watch.shares(&steps.shares());
-    Ok(Rendered { mission, written })
+    Ok(Rendered {
+        mission,
+        notices: all,
+        written,
+    })
+}
+
+/// The name of the phase of every window: the last one that begins before its end.
+fn captions(mission: &Mission) -> Vec<String> {
+    let phases = &mission.ledger.phases;
+    let name = |end| {
+        let next = phases.partition_point(|phase| phase.span.start < end);
+        let phase = next.checked_sub(1).map(|at| phases[at].name.to_string());
+        phase.unwrap_or_default()
+    };
+    mission.windows.iter().map(|w| name(w.span.end)).collect()
 }
 
 /// More frames than this are told before they are drawn.
@@ -228,16 +237,12 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
 }
 
 /// The figure with its lines for LaTeX, if one was asked for.
-fn drawn_figure(
-    job: &Render,
-    mission: &Mission,
-    is_named: bool,
-) -> Result<Option<(Figure, String)>> {
+fn drawn_figure(job: &Render, mission: &Mission) -> Result<Option<(Figure, String)>> {
     let Some(options) = &job.sequence.figure else {
         return Ok(None);
     };
     let options = FigureOptions {
-        is_named,
+        is_named: job.reading.phases.is_named(),
         ..options.clone()
     };
     super::figure::draw(mission, &job.drawing, &options, &job.outputs).map(Some)

@@ -3,7 +3,7 @@
 mod fields;
 mod messages;
 
-use super::read::known_span;
+use super::collect::known_span;
 use super::{Stage, Watch};
 use crate::bag::{
     self, Connection, ConnectionId, Input, Message, OpenOptions, Reader, Report, Sink, Want,

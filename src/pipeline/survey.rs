@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::read::NOTHING_RECORDED;
+use super::collect::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
 use crate::bag::{self, Input, Kind};
 use crate::base::error::{Error, Result};

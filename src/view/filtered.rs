@@ -15,9 +15,12 @@ pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let mut keep = Keep::new(&mission.elements, options, &viewed);
     let ledger = keep.ledger(&mission.ledger);
     let windows = mission.windows.iter();
+    let graphs = mission.each();
+    let graphs = graphs.map(|(window, graph)| (window.span, keep.graph(&graph, options, &viewed)));
     Mission {
         elements: keep.elements(&mission.elements),
-        windows: windows.map(|w| keep.window(w, options, &viewed)).collect(),
+        windows: windows.map(|w| keep.window(w)).collect(),
+        graphs: graphs.collect(),
         ledger,
         // By ids of elements that are others here.
         activity: Activity::default(),
@@ -113,14 +116,13 @@ impl Keep {
         }
     }
 
-    fn window(&self, window: &Window, options: &ViewOptions, viewed: &Viewed) -> Window {
+    fn window(&self, window: &Window) -> Window {
         let told = window.changes.iter().zip(&window.entries);
         let kept = told.filter_map(|(change, entry)| {
             Some((self.change(change)?, new_id(&self.entries, *entry)?))
         });
         let (changes, entries) = kept.unzip();
         Window {
-            graph: self.graph(&window.graph, options, viewed),
             changes,
             entries,
             ..window.clone()

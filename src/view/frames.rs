@@ -15,11 +15,11 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
     let lives = Lives::new(mission);
     let parts = mission.ledger.all_parts();
     let mut frames = Vec::with_capacity(mission.windows.len());
-    for window in &mission.windows {
+    for (window, graph) in mission.each() {
         let span = window.span;
         let alive = lives.during(span);
         let paused = lives.paused(span, &alive);
-        let now = present(&window.graph, options, viewed, (&alive, &paused));
+        let now = present(&graph, options, viewed, (&alive, &paused));
         let turn = Turn {
             before: Presence::of(viewed, &lives.before(span.start)),
             after: Presence::of(viewed, &lives.before(span.end)),

@@ -18,12 +18,14 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         .map(|w| w.split_whitespace().map(Word::new).collect())
         .collect();
     let elements = elements(&parsed);
-    let windows = parsed.iter().zip(0..).map(|(words, index)| Window {
+    let graphs = parsed.iter().zip(0..);
+    let graphs = graphs.map(|(words, index)| (span(index), graph(words, &elements)));
+    let graphs = graphs.collect();
+    let windows = (0..parsed.len()).map(|index| Window {
         index,
         span: span(index),
         partial: false,
         messages: 0,
-        graph: graph(words, &elements),
         changes: Vec::new(),
         entries: Vec::new(),
     });
@@ -41,6 +43,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         step: period,
         elements,
         windows,
+        graphs,
         ledger: crate::mission::Ledger::default(),
         activity: crate::mission::Activity::default(),
         layout: None,
@@ -246,8 +249,7 @@ pub(crate) fn text(mission: &Mission) -> Vec<String> {
         let node = all.nodes[edge.node as usize].name.to_string();
         (node, all.topics[edge.topic as usize].name.to_string())
     };
-    let windows = mission.windows.iter().map(|window| {
-        let graph = &window.graph;
+    let windows = mission.graphs.iter().map(|graph| {
         let nodes = graph
             .nodes
             .iter()

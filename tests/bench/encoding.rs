@@ -80,6 +80,8 @@ fn main() {
     let sequence = Sequence {
         mission: &mission,
         data: &mission,
+        places: None,
+        notices: &mission.notices,
         view: &view,
         picture: &picture,
         painter: &painter,

@@ -15,7 +15,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of};
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 /// An edge that the code declares for a node of the bag.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ pub(crate) struct Outcome {
 }
 
 /// Adds what the code says of the nodes that the bag names, and the only places that can be meant if asked for.
-pub(crate) fn conclude(code: &Code, known: &mut Findings<'_>) -> Outcome {
+pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>) -> Outcome {
     let recorded = Recorded::of(known);
     let named = named(known);
     let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
@@ -191,7 +191,7 @@ fn remarks_on(instance: &Instance, node: &str, recorded: &Recorded) -> Vec<Strin
 }
 
 impl Recorded {
-    fn of(known: &Findings<'_>) -> Self {
+    fn of(known: &Conclusions<'_>) -> Self {
         let mut all = Self {
             topics: BTreeMap::new(),
             told: BTreeSet::new(),
@@ -224,7 +224,7 @@ impl Recorded {
 }
 
 /// The nodes that the bag names by more than a declaration, by their names, with the words of what names them.
-fn named(known: &Findings<'_>) -> BTreeMap<String, (Name, BTreeSet<&'static str>)> {
+fn named(known: &Conclusions<'_>) -> BTreeMap<String, (Name, BTreeSet<&'static str>)> {
     let mut named: BTreeMap<String, (Name, BTreeSet<&str>)> = BTreeMap::new();
     for proof in known.proofs.iter().filter(|p| p.degree != Degree::Declared) {
         let node = match proof.what {
@@ -323,7 +323,7 @@ fn remapped(topic: &str, node: &str, remaps: &[(String, String)]) -> String {
 /// Adds an edge, unless the bag knows it already or knows better; tells whether it was added.
 fn draw(
     code: &Code,
-    known: &mut Findings<'_>,
+    known: &mut Conclusions<'_>,
     recorded: &Recorded,
     (node, words): (Name, &BTreeSet<&str>),
     found: &Match<'_>,
@@ -348,7 +348,7 @@ fn draw(
 
 /// Whether a topic may have a publisher that is not known yet: its messages do not name theirs, and more publishers were
 /// offered than are known.
-fn has_room(known: &Findings<'_>, recorded: &Recorded, topic: Name) -> bool {
+fn has_room(known: &Conclusions<'_>, recorded: &Recorded, topic: Name) -> bool {
     let publishers = known.publishers(topic).count();
     let offered = known.offers(topic).map_or(1, |n| n.max(1) as usize);
     !recorded.told.contains(&topic) && publishers < offered

@@ -13,7 +13,7 @@ use super::matching::{Match, Recorded, matches, resolved, row};
 use super::workspace::{Instance, Placed};
 use crate::base::words::count;
 use crate::evidence::claim::{Degree, Name};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 use crate::evidence::topology::launch::join;
 
 /// Why a place is not drawn.
@@ -64,7 +64,11 @@ pub(super) struct Bag<'a> {
 }
 
 /// Adds the only places that can be meant, if that was asked for; tells which places were not drawn and why.
-pub(super) fn conclude(code: &Code, known: &mut Findings<'_>, bag: &Bag<'_>) -> (usize, Undrawn) {
+pub(super) fn conclude(
+    code: &Code,
+    known: &mut Conclusions<'_>,
+    bag: &Bag<'_>,
+) -> (usize, Undrawn) {
     let candidates = candidates(code, bag);
     let places = places(code, bag.recorded, &candidates);
     let launches = best_launches(&candidates);
@@ -188,7 +192,7 @@ fn is_launched_by(instance: &Instance, launches: &BTreeSet<&str>) -> bool {
 /// What speaks against an edge; `None` if nothing does.
 fn reason(
     candidates: &[&Candidate<'_>],
-    known: &Findings<'_>,
+    known: &Conclusions<'_>,
     bag: &Bag<'_>,
     (places, launches): (&BTreeSet<(&str, usize)>, &BTreeSet<&str>),
 ) -> Option<Reason> {
@@ -220,7 +224,7 @@ fn reason(
 }
 
 /// Adds the node, with a question mark, and its edge.
-fn draw(code: &Code, known: &mut Findings<'_>, candidate: &Candidate<'_>) {
+fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     let node = known.facts.name(&format!("{} ?", candidate.node));
     let topic = candidate.found.topic;
     let edge = match candidate.found.role {
@@ -245,7 +249,7 @@ fn draw(code: &Code, known: &mut Findings<'_>, candidate: &Candidate<'_>) {
 }
 
 /// `/talker publishes /chatter (p/talker.py:5  create_publisher(String, 'chatter', 10))`
-fn words(known: &Findings<'_>, candidate: &Candidate<'_>) -> String {
+fn words(known: &Conclusions<'_>, candidate: &Candidate<'_>) -> String {
     let does = match candidate.found.role {
         Role::Publishes => "publishes",
         Role::Subscribes => "subscribes",

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Collected;
+use super::Recorded;
 use crate::evidence::claim::{Claim, Name};
 
 /// A service whose calls were recorded.
@@ -19,7 +19,7 @@ pub struct Service {
     pub clients: usize,
 }
 
-impl Collected {
+impl Recorded {
     /// Every service with recorded calls, sorted by name.
     pub fn services(&self) -> Vec<Service> {
         let mut calls: BTreeMap<Name, [u64; 4]> = BTreeMap::new();

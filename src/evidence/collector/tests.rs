@@ -321,10 +321,10 @@ fn flow() -> Collector {
 
 #[test]
 fn a_node_that_passes_stamps_on_subscribes_their_source() {
-    let mut collected = flow().finish().unwrap();
-    let span = collected.span.unwrap();
-    let options = crate::graph::Options::default();
-    let built = crate::graph::build(&mut collected, &[span], &options).unwrap();
+    let recorded = flow().finish().unwrap();
+    let span = recorded.span.unwrap();
+    let options = crate::evidence::conclude::Options::default();
+    let built = crate::graph::build(&recorded, &[span], &options, 0).unwrap();
     let all = &built.elements;
     let inferred = all
         .subscribes
@@ -335,11 +335,7 @@ fn a_node_that_passes_stamps_on_subscribes_their_source() {
         format!("{} {}", topic.name, node.name)
     });
     assert_eq!(names.collect::<Vec<_>>(), ["/image /detector"]);
-    let texts: Vec<_> = collected
-        .why()
-        .into_iter()
-        .map(|piece| piece.text)
-        .collect();
+    let texts: Vec<_> = built.lines.into_iter().map(|line| line.text).collect();
     let text = "20 of 20 messages of /boxes carry the stamp of a message of /image just before";
     assert!(texts.iter().any(|t| t == text), "{texts:?}");
 }

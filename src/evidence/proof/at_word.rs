@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::{Findings, Key, Proof, Validity};
+use super::{Conclusions, Key, Proof, Validity};
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, ClaimRecord, SourceId};
 
-impl Findings<'_> {
+impl Conclusions<'_> {
     /// All claims of one source with their signs and ends, sorted.
     pub(crate) fn claims(
         &mut self,

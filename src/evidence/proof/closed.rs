@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Findings, Key, Reliability};
+use super::{Conclusions, Key, Reliability};
 use crate::base::time::Span;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Name};
@@ -21,7 +21,7 @@ pub(crate) struct Closed {
 }
 
 impl Closed {
-    pub(crate) fn new(known: &Findings<'_>) -> Self {
+    pub(crate) fn new(known: &Conclusions<'_>) -> Self {
         let mut closed = Self::default();
         let mut heard: BTreeMap<Name, Span> = BTreeMap::new();
         for fact in &known.facts.list {
@@ -54,7 +54,7 @@ impl Closed {
         closed
     }
 
-    fn tell(&mut self, known: &Findings<'_>) {
+    fn tell(&mut self, known: &Conclusions<'_>) {
         let mut untold = BTreeSet::new();
         for stream in known.streams {
             match stream.publisher {

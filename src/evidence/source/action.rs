@@ -6,7 +6,7 @@ use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::definition::{HEADER, Shape};
-use crate::evidence::proof::{Findings, Key};
+use crate::evidence::proof::{Conclusions, Key};
 use std::collections::BTreeMap;
 
 /// `actionlib_msgs/GoalStatusArray`.
@@ -63,7 +63,7 @@ const TAKES: [&str; 2] = ["goal", "cancel"];
 /// The parts of an action that a bag holds or somebody names, by the action's name.
 type Actions = BTreeMap<String, BTreeMap<&'static str, Name>>;
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (action, parts) in ros1_actions(known) {
         let mut all = BTreeMap::new();
         for part in SENDS.iter().chain(&TAKES) {
@@ -79,7 +79,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 /// Draws all edges that follow from those known.
 fn tie(
     source: SourceId,
-    known: &mut Findings<'_>,
+    known: &mut Conclusions<'_>,
     parts: &BTreeMap<&'static str, Name>,
     all: &BTreeMap<&'static str, Name>,
 ) {
@@ -104,7 +104,7 @@ fn tie(
 }
 
 /// Actions of ROS 1: a status topic, or a goal topic of a goal's type.
-fn ros1_actions(known: &mut Findings<'_>) -> Actions {
+fn ros1_actions(known: &mut Conclusions<'_>) -> Actions {
     let status = known.topics_of(|kind| kind == "actionlib_msgs/GoalStatusArray");
     let goals = known.topics_of(|kind| kind.ends_with("ActionGoal"));
     let mut actions = Actions::new();
@@ -131,7 +131,7 @@ fn ros1_actions(known: &mut Findings<'_>) -> Actions {
 }
 
 /// Actions of ROS 2: a status or feedback topic below `_action`.
-fn ros2_actions(known: &mut Findings<'_>) -> Actions {
+fn ros2_actions(known: &mut Conclusions<'_>) -> Actions {
     let mut actions = Actions::new();
     for topic in known
         .topics_of(|kind| kind.contains("/action/") || kind == "action_msgs/msg/GoalStatusArray")

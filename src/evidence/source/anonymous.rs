@@ -2,12 +2,12 @@
 
 use crate::base::role::start;
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 /// A node that started longer before the recording than this was named by a clock that was not set.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (first, last) = known.mission;
     for node in known.nodes().clone() {
         let Some(start) = start(&known.text(node)) else {

@@ -1,9 +1,9 @@
 //! Bonds: whoever publishes a bond topic (`bond/Status`) also subscribes it.
 
 use crate::evidence::claim::SourceId;
-use crate::evidence::proof::Findings;
+use crate::evidence::proof::Conclusions;
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for topic in known.topics_of(|kind| matches!(kind, "bond/Status" | "bond/msg/Status")) {
         for node in known.publishers(topic).collect::<Vec<_>>() {
             known.subscribes_as_well(source, node, topic, topic);

@@ -1,10 +1,10 @@
 //! ROS 1 connection headers and MCAP channel metadata: who publishes each message (`callerid`).
 
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Findings, Key, Proof, Reliability, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Reliability, Validity};
 
 /// Every stream proves its topic, and its publisher as far as that is believed.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {
         let proof = |what, when| Proof {

@@ -15,7 +15,7 @@ use crate::base::name::{last_part, namespace};
 use crate::evidence::claim::{Claim, Degree, Name, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Findings, Key};
+use crate::evidence::proof::{Conclusions, Key};
 
 const TABLE: &str = include_str!("contracts.csv");
 
@@ -73,7 +73,7 @@ fn contract(row: &[String]) -> Option<Contract> {
     })
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let files = files(known);
     let mut streams = known.streams.iter();
     let is_ros1 = streams.any(|s| s.connection.encoding == Encoding::Ros1);
@@ -109,7 +109,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 }
 
 /// Draws the publishers of a topic, unless there would be more than the bag says there were.
-fn publish(source: SourceId, known: &mut Findings<'_>, topic: Name, nodes: &[(Name, Contract)]) {
+fn publish(source: SourceId, known: &mut Conclusions<'_>, topic: Name, nodes: &[(Name, Contract)]) {
     let all: BTreeSet<Name> = known
         .publishers(topic)
         .chain(nodes.iter().map(|n| n.0))
@@ -122,7 +122,7 @@ fn publish(source: SourceId, known: &mut Findings<'_>, topic: Name, nodes: &[(Na
     }
 }
 
-fn words(known: &Findings<'_>, node: Name, contract: &Contract) -> String {
+fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
     let verb = if contract.publishes {
         "publishes"
     } else {
@@ -157,7 +157,7 @@ impl Owners {
 }
 
 /// The files that each node logs from.
-fn files(known: &Findings<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
+fn files(known: &Conclusions<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
     let mut files: BTreeMap<Name, BTreeSet<Arc<str>>> = BTreeMap::new();
     for fact in &known.facts.list {
         if let Claim::LogsFrom(logger, file) = fact.claim

@@ -6,7 +6,7 @@ use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::definition::{HEADER, HEADER2, Shape};
-use crate::evidence::proof::{Findings, Key, Proof, Reliability, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Reliability, Validity};
 use std::collections::BTreeSet;
 
 /// `diagnostic_msgs/DiagnosticArray`, since `diagnostic_msgs` 1.2.
@@ -82,7 +82,7 @@ fn node(name: &str) -> Option<&str> {
 }
 
 /// Names in statuses count where the header does not tell who publishes them.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let told = |topic| {
         let mut of = known.streams.iter().filter(|s| s.topic == topic);
         of.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)

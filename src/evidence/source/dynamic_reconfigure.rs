@@ -2,11 +2,11 @@
 //! caller of another name, unless the topic lies below it, runs that node as a nodelet.
 
 use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let is_config = |kind: &str| {
         matches!(
             kind,
@@ -43,7 +43,7 @@ fn is_nodelet(caller: &str, node: &str) -> bool {
 }
 
 /// A node whose topic comes from nobody known publishes it itself.
-fn own(source: SourceId, known: &mut Findings<'_>, node: Name, topic: Name) {
+fn own(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.topic == topic {
             known.prove(Proof {

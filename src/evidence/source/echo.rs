@@ -10,7 +10,7 @@ use crate::evidence::claim::{Degree, Name, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::dynamic::{Schema, Value};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 use crate::evidence::texts::{Said, Shown};
 
 /// Fewer different values than this are chance; numbers are more often equal than words.
@@ -115,7 +115,7 @@ struct Echo {
 /// A node, the text before and after the value, a topic.
 type Form = (Name, String, String, Name);
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (said, shown) = known.facts.spoken.sorted();
     let echoes = echoes(known, &said, &shown);
     let mut by_node: BTreeMap<Name, Vec<&str>> = BTreeMap::new();
@@ -150,7 +150,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 }
 
 /// Everything that could be an echo.
-fn echoes(known: &Findings<'_>, said: &[Said], shown: &[Shown]) -> BTreeMap<Form, Echo> {
+fn echoes(known: &Conclusions<'_>, said: &[Said], shown: &[Shown]) -> BTreeMap<Form, Echo> {
     let mut echoes: BTreeMap<Form, Echo> = BTreeMap::new();
     for text in said {
         let Some(node) = known.owner(&text.logger) else {
@@ -234,7 +234,7 @@ fn verb(before: &str, after: &str) -> Option<bool> {
 
 /// The edge that an echo tells of: by the publishers known, else by the verb, else by who was first.
 fn end(
-    known: &Findings<'_>,
+    known: &Conclusions<'_>,
     node: Name,
     topic: Name,
     before: &str,
@@ -260,7 +260,7 @@ fn end(
 
 fn tell(
     source: SourceId,
-    known: &mut Findings<'_>,
+    known: &mut Conclusions<'_>,
     what: Key,
     (before, after): (&str, &str),
     echo: &Echo,

@@ -12,7 +12,7 @@ use crate::base::time::Stamp;
 use crate::evidence::claim::{Name, SourceId};
 use crate::evidence::message::cursor::Cursor;
 use crate::evidence::message::definition::outline;
-use crate::evidence::proof::{Findings, Key};
+use crate::evidence::proof::{Conclusions, Key};
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
 
@@ -119,7 +119,7 @@ struct Flows {
     pairs: BTreeMap<(usize, usize), Pair>,
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let flows = flows(known);
     for (output, flow) in flows.all.iter().enumerate() {
         let copied = flow
@@ -147,7 +147,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 }
 
 /// The flow that an output answers, if only one can be meant.
-fn input(known: &Findings<'_>, flows: &Flows, output: usize) -> Option<usize> {
+fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize> {
     let flow = &flows.all[output];
     let own = flows.pairs.range((output, 0)..=(output, usize::MAX));
     let good = own.filter(|((_, input), pair)| {
@@ -208,7 +208,7 @@ fn without_siblings(
 }
 
 /// Pools the streams and compares their stamps.
-fn flows(known: &mut Findings<'_>) -> Flows {
+fn flows(known: &mut Conclusions<'_>) -> Flows {
     let streams: Vec<usize> = known.facts.headers.keys().copied().collect();
     let series: Vec<_> = known.facts.headers.values().copied().collect();
     let mut pooled: BTreeMap<(String, String), Flow> = BTreeMap::new();
@@ -257,7 +257,7 @@ fn flows(known: &mut Findings<'_>) -> Flows {
 }
 
 /// The node that publishes a stream, as far as it is known to be one.
-fn publisher(known: &Findings<'_>, at: usize) -> Option<Name> {
+fn publisher(known: &Conclusions<'_>, at: usize) -> Option<Name> {
     let stream = &known.streams[at];
     stream.publisher.or_else(|| {
         let mut all = known.publishers(stream.topic);

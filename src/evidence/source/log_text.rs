@@ -5,7 +5,7 @@ use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
     let record = LogRecord::read(payload)?;
@@ -79,7 +79,7 @@ fn named(text: &str) -> Option<(bool, &str)> {
 }
 
 /// Only topics of the bag count: a text may mean a device or a file.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (fact, signs, ends) in known.claims(source) {
         let (logger, topic, publishes) = match fact.claim {
             Claim::SaysPublish(logger, topic) => (logger, topic, true),

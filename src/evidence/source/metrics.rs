@@ -5,7 +5,7 @@ use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::definition::{Shape, TIME2};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 /// `statistics_msgs/msg/MetricsMessage`.
 pub(crate) const SHAPE: Shape = Shape {
@@ -45,7 +45,7 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 }
 
 /// The source names itself without its namespace.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (fact, signs, ends) in known.claims(source) {
         if let Claim::Reports(node, topic) = fact.claim {
             let node = known.meant(node);

@@ -1,7 +1,7 @@
 //! A topic whose messages name no publisher, and which only one node is known to publish: its messages are that node's.
 
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 /// Topics that any node may publish, so that one known publisher says nothing about the others.
 const SHARED: [&str; 8] = [
@@ -15,7 +15,7 @@ const SHARED: [&str; 8] = [
     "/clock",
 ];
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.publisher.is_some() || SHARED.contains(&stream.connection.topic.as_str()) {
             continue;

@@ -11,7 +11,7 @@ use std::hash::Hasher as _;
 use super::SourceContext;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Findings, Key};
+use crate::evidence::proof::{Conclusions, Key};
 use crate::evidence::spread::Spread;
 
 /// Fewer equal messages than this are chance.
@@ -62,7 +62,7 @@ struct Matches {
     distinct: BTreeMap<usize, u64>,
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (flows, matches) = matches(known);
     for (output, total) in &matches.distinct {
         let (basis, _) = flows[*output];
@@ -90,7 +90,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 }
 
 /// The node that publishes a flow, as far as it is known to be one.
-fn publisher(known: &Findings<'_>, (topic, publisher): Flow) -> Option<Name> {
+fn publisher(known: &Conclusions<'_>, (topic, publisher): Flow) -> Option<Name> {
     publisher.or_else(|| {
         let mut all = known.publishers(topic);
         all.next().filter(|_| all.next().is_none())
@@ -98,7 +98,7 @@ fn publisher(known: &Findings<'_>, (topic, publisher): Flow) -> Option<Name> {
 }
 
 /// Goes through all messages in order of time.
-fn matches(known: &mut Findings<'_>) -> (Vec<Flow>, Matches) {
+fn matches(known: &mut Conclusions<'_>) -> (Vec<Flow>, Matches) {
     let kept = known.facts.payloads.clone();
     let kept = kept.into_iter().filter(|(at, _)| {
         let topic = &known.streams[*at].connection.topic;
@@ -187,7 +187,7 @@ impl Walk {
 
 /// The flows of the same type by others that had enough of an output's messages first.
 fn inputs(
-    known: &Findings<'_>,
+    known: &Conclusions<'_>,
     flows: &[Flow],
     matches: &Matches,
     output: usize,

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::Findings;
+use crate::evidence::proof::Conclusions;
 
 /// Beginnings of the last part of names that others publish: goals for an action, commands for a controller.
 const TAKEN: [&str; 16] = [
@@ -26,7 +26,7 @@ const TAKEN: [&str; 16] = [
     "sub_",
 ];
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let nodes: Nodes = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
     let spaces = spaces(&nodes);
     for topic in known.topics_of(|_| true) {

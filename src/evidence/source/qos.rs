@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::SourceContext;
 use crate::base::yaml;
 use crate::evidence::claim::{Claim, Degree, SourceId};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 /// What one publisher offers.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,7 +55,7 @@ pub(crate) fn announced(heard: &mut SourceContext<'_>) {
 }
 
 /// A topic with an offer is declared, even if it never carries a message.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for fact in known.facts.list.clone() {
         if let Claim::Quality(topic, _) = fact.claim
             && fact.source == source

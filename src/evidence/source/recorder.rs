@@ -7,7 +7,7 @@ use crate::base::name::is_recorder;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 /// Where the recorder's source lies, whatever the folder above: of `rosbag` and of `rosbag2_transport`.
 const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
@@ -26,7 +26,7 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 }
 
 /// With one recorder among the nodes it is the one that wrote the bag; several cannot be told apart.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let told = known.facts.list.iter().filter(|fact| fact.source == source);
     let told = told.filter_map(|fact| match fact.claim {
         Claim::Node(node) => Some(node),

@@ -10,7 +10,7 @@ use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
 use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::proof::{Findings, Key, Proof, Reliability, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Reliability, Validity};
 
 pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
     let seq = payload.header()?;
@@ -68,7 +68,7 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
 /// subscription. If nobody is known to publish it, a recorder of all topics knows whether somebody advertises it.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let advertised = advertised(known);
     for (fact, signs, ends) in known.claims(source) {
         let Claim::Lists(node, topic) = fact.claim else {
@@ -101,13 +101,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 }
 
 /// Whether headers tell all publishers of a topic.
-fn is_told(known: &Findings<'_>, topic: Name) -> bool {
+fn is_told(known: &Conclusions<'_>, topic: Name) -> bool {
     let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
     of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
 }
 
 /// Whether a node that differs in an anonymous suffix only publishes a topic whose headers do not tell all publishers.
-fn has_twin(known: &Findings<'_>, node: Name, topic: Name) -> bool {
+fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     let own = known.text(node);
     let base = role(&own);
     let mut publishers = known.publishers(topic);
@@ -118,7 +118,7 @@ fn has_twin(known: &Findings<'_>, node: Name, topic: Name) -> bool {
 
 /// Whether a node that names `/tf` as its own sends it rather than listens: a listener of tf2 names `/tf_static` too. Asked
 /// only where headers do not tell all publishers.
-fn is_broadcaster(known: &mut Findings<'_>, node: Name, topic: Name) -> bool {
+fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool {
     let told = is_told(known, topic);
     let text = known.text(topic);
     let twin = match text.strip_suffix("/tf_static") {
@@ -138,7 +138,7 @@ fn is_broadcaster(known: &mut Findings<'_>, node: Name, topic: Name) -> bool {
 
 /// Every topic that a recorder of all topics has seen advertised; `None` if none tells. Such a recorder goes on to
 /// subscribe long after its start; one that was given names does not.
-fn advertised(known: &mut Findings<'_>) -> Option<BTreeSet<Name>> {
+fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
     let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
     let mut seen: Option<(Stamp, Stamp)> = None;
     for fact in known.facts.list.clone() {

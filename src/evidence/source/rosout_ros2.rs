@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree, SourceId};
 use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
 pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
     payload.time()?;
@@ -39,7 +39,7 @@ const PARTS: [&str; 5] = [
 ];
 
 /// A logger is a part of the nearest node or logger above it, and a node if there is none; the node publishes the log.
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let claims = known.claims(source);
     let loggers = claims
         .iter()

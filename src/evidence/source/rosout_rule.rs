@@ -3,9 +3,9 @@
 
 use crate::bag::Encoding;
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let ros1 = known
         .streams
         .iter()

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Findings, Key};
+use crate::evidence::proof::{Conclusions, Key};
 
 /// Twins publish at least so many topics of their namespace: one alone may be chance.
 const FEWEST: usize = 2;
@@ -18,7 +18,7 @@ struct Twin {
     own: BTreeSet<String>,
 }
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for twins in families(known)
         .into_values()
         .filter(|twins| twins.len() <= MOST)
@@ -35,7 +35,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
 }
 
 /// The nodes that share their last part, each with its namespace and publications.
-fn families(known: &Findings<'_>) -> BTreeMap<String, Vec<Twin>> {
+fn families(known: &Conclusions<'_>) -> BTreeMap<String, Vec<Twin>> {
     let mut published: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
     for (node, topic) in known.publications() {
         published.entry(node).or_default().push(topic);
@@ -72,7 +72,7 @@ fn inside(topic: &str, space: &str) -> Option<String> {
 }
 
 /// What `from` subscribes, `to` subscribes as well, if the bag has that topic.
-fn copy(source: SourceId, known: &mut Findings<'_>, from: &Twin, to: &Twin) {
+fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
     let subscribed = known.subscriptions().filter(|(_, node)| *node == from.node);
     let topics: Vec<Name> = subscribed.map(|(topic, _)| topic).collect();
     for topic in topics {

@@ -1,11 +1,11 @@
 //! A listener of `/tf` is a listener of `/tf_static`, and the other way round: tf2 always subscribes both.
 
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Findings, Key};
+use crate::evidence::proof::{Conclusions, Key};
 
 const PAIR: [&str; 2] = ["tf", "tf_static"];
 
-pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
+pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let listened: Vec<(Name, Name)> = known.subscriptions().collect();
     for (topic, node) in listened {
         let text = known.text(topic);

@@ -31,11 +31,7 @@ impl Stamps {
     ///
     /// # Errors
     /// If the unnamed file cannot be read.
-    pub(crate) fn merge(
-        &mut self,
-        ids: &[SeriesId],
-        mut each: impl FnMut(Timed),
-    ) -> io::Result<()> {
+    pub(crate) fn merge(&self, ids: &[SeriesId], mut each: impl FnMut(Timed)) -> io::Result<()> {
         let mut waiting = self.blocks(ids);
         let mut open: BinaryHeap<Reverse<Open>> = BinaryHeap::new();
         loop {

@@ -13,10 +13,11 @@ use crate::base::geometry::Rect;
 use crate::base::time::Stamp;
 use crate::base::words;
 use crate::base::words::visible;
+use crate::draw::picture::chips;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
-use crate::view::Arrow;
 use crate::view::runs::{ElementRuns, Runs};
+use crate::view::{Arrow, Frame, View};
 
 /// From this many bytes on, data is deflated.
 const LONG: usize = 1_000_000;
@@ -36,6 +37,8 @@ struct Data<'a> {
     labels: &'a [String],
     /// Per item, then per arrow.
     lives: Vec<&'a ElementRuns>,
+    /// Of each window with headlines its place, how many there are, and the words of the three chips.
+    told: Vec<(usize, usize, String, String, String)>,
     /// Seconds from the start of the first window to that of each.
     starts: Vec<f64>,
     /// To the end of the last.
@@ -86,6 +89,7 @@ pub(super) fn json(page: &Page<'_>, runs: &Runs) -> String {
             .iter()
             .chain(order.iter().map(|at| &runs.arrows[*at]))
             .collect(),
+        told: told(view),
         starts: view.frames.iter().map(|f| secs(f.span.start)).collect(),
         end: view.frames.last().map_or(0.0, |f| secs(f.span.end)),
         epoch: start.0.div_euclid(1_000_000),
@@ -95,6 +99,16 @@ pub(super) fn json(page: &Page<'_>, runs: &Runs) -> String {
     json.replace(".0,", ",")
         .replace(".0]", "]")
         .replace('<', "\\u003c")
+}
+
+fn told(view: &View) -> Vec<(usize, usize, String, String, String)> {
+    let frames = view.frames.iter().enumerate();
+    let frames = frames.filter(|(_, frame)| !frame.headlines.is_empty());
+    let told = |(at, frame): (usize, &Frame)| {
+        let [came, went, changed] = chips(&frame.counts).map(|(text, _)| text);
+        (at, frame.counts.total(), came, went, changed)
+    };
+    frames.map(told).collect()
 }
 
 /// The text for the page and its type.

@@ -85,7 +85,7 @@ fn words(evidence: Evidence) -> String {
 pub(super) fn nodes(mission: &Mission, most: usize) -> String {
     let elements = &mission.elements;
     let mut presence = vec![Presence::default(); elements.nodes.len()];
-    for state in mission.windows.iter().flat_map(|w| &w.graph.nodes) {
+    for state in mission.graphs.iter().flat_map(|graph| graph.nodes) {
         if let Some(one) = presence.get_mut(state.id as usize) {
             one.add(state.hz);
         }
@@ -109,7 +109,7 @@ pub(super) fn nodes(mission: &Mission, most: usize) -> String {
 pub(super) fn topics(mission: &Mission, most: usize) -> String {
     let elements = &mission.elements;
     let mut presence = vec![(Presence::default(), 0_u64); elements.topics.len()];
-    for state in mission.windows.iter().flat_map(|w| &w.graph.topics) {
+    for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
         if let Some((one, messages)) = presence.get_mut(state.id as usize) {
             one.add(state.hz);
             *messages += state.count;

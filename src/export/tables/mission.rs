@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::runs;
 use crate::base::table::{Cell, Kind};
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
@@ -11,13 +12,15 @@ use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Mission, Window};
 
 /// Takes a row.
-type Row<'a> = &'a mut dyn FnMut(&[Cell<'_>]);
+pub(super) type Row<'a> = &'a mut dyn FnMut(&[Cell<'_>]);
 
 /// A table: its word in the file's name, its columns, and what fills it.
 pub(super) struct Table {
     pub(super) word: &'static str,
     pub(super) columns: &'static [(&'static str, Kind)],
     pub(super) fill: fn(&Mission, Row<'_>),
+    /// The same by runs of equal windows, where it is about windows.
+    pub(super) fill_runs: Option<fn(&Mission, Row<'_>)>,
 }
 
 /// The first columns of every table about windows.
@@ -47,6 +50,7 @@ pub(super) const TABLES: &[Table] = &[
             ("last_ns", Kind::Time),
         ],
         fill: edges,
+        fill_runs: Some(runs::edges),
     },
     Table {
         word: "topics",
@@ -70,6 +74,7 @@ pub(super) const TABLES: &[Table] = &[
             ("last_ns", Kind::Time),
         ],
         fill: topics,
+        fill_runs: Some(runs::topics),
     },
     Table {
         word: "nodes",
@@ -89,6 +94,7 @@ pub(super) const TABLES: &[Table] = &[
             ("last_ns", Kind::Time),
         ],
         fill: nodes,
+        fill_runs: Some(runs::nodes),
     },
     Table {
         word: "changes",
@@ -108,6 +114,7 @@ pub(super) const TABLES: &[Table] = &[
             ("to_value", Kind::Text),
         ],
         fill: changes,
+        fill_runs: None,
     },
     Table {
         word: "ledger",
@@ -132,6 +139,7 @@ pub(super) const TABLES: &[Table] = &[
             ("weight", Kind::I64),
         ],
         fill: ledger,
+        fill_runs: None,
     },
     Table {
         word: "phases",
@@ -146,6 +154,7 @@ pub(super) const TABLES: &[Table] = &[
             ("same_as", Kind::I64),
         ],
         fill: phases,
+        fill_runs: None,
     },
     Table {
         word: "bags",
@@ -159,6 +168,7 @@ pub(super) const TABLES: &[Table] = &[
             ("file_bytes", Kind::I64),
         ],
         fill: bags,
+        fill_runs: None,
     },
 ];
 
@@ -177,9 +187,9 @@ fn bags(mission: &Mission, row: Row<'_>) {
 }
 
 fn nodes(mission: &Mission, row: Row<'_>) {
-    for window in &mission.windows {
+    for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
-        for state in &window.graph.nodes {
+        for state in &graph.nodes {
             let node = &mission.elements.nodes[state.id as usize];
             row(&[
                 win.clone(),
@@ -201,9 +211,9 @@ fn nodes(mission: &Mission, row: Row<'_>) {
 }
 
 fn topics(mission: &Mission, row: Row<'_>) {
-    for window in &mission.windows {
+    for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
-        for state in &window.graph.topics {
+        for state in &graph.topics {
             let topic = &mission.elements.topics[state.id as usize];
             row(&[
                 win.clone(),
@@ -230,7 +240,7 @@ fn topics(mission: &Mission, row: Row<'_>) {
 
 fn edges(mission: &Mission, row: Row<'_>) {
     let elements = &mission.elements;
-    for window in &mission.windows {
+    for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
         let mut edge = |what: &'static str, edge: &Edge, state: &EdgeState| {
             row(&[
@@ -250,10 +260,10 @@ fn edges(mission: &Mission, row: Row<'_>) {
                 time(edge.last),
             ]);
         };
-        for state in &window.graph.publishes {
+        for state in &graph.publishes {
             edge("publish", &elements.publishes[state.id as usize], state);
         }
-        for state in &window.graph.subscribes {
+        for state in &graph.subscribes {
             edge("subscribe", &elements.subscribes[state.id as usize], state);
         }
     }
@@ -416,14 +426,14 @@ fn cells_of(window: &Window) -> [Cell<'static>; 4] {
     ]
 }
 
-fn words(evidence: Evidence) -> Cell<'static> {
+pub(super) fn words(evidence: Evidence) -> Cell<'static> {
     Cell::text(evidence.words().collect::<Vec<_>>().join(" "))
 }
 
-fn text(text: Option<&str>) -> Cell<'_> {
+pub(super) fn text(text: Option<&str>) -> Cell<'_> {
     Cell::known(text, Cell::text)
 }
 
-fn time(stamp: Option<Stamp>) -> Cell<'static> {
+pub(super) fn time(stamp: Option<Stamp>) -> Cell<'static> {
     Cell::known(stamp, Cell::Time)
 }

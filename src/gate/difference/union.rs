@@ -112,14 +112,21 @@ pub(crate) fn union(
         span,
         partial: false,
         messages: seen.topics.values().map(|t| t.count).sum(),
-        graph: graph(&elements, seen),
         changes: Vec::new(),
         entries: Vec::new(),
     };
-    let windows = match side {
-        Side::Each => vec![window(0, span(0), &a), window(1, span(SECOND), &b)],
-        Side::Both => vec![window(0, span(SECOND), &b)],
+    let shown = match side {
+        Side::Each => vec![(span(0), &a), (span(SECOND), &b)],
+        Side::Both => vec![(span(SECOND), &b)],
     };
+    let windows = shown.iter().enumerate();
+    let windows: Vec<Window> = windows
+        .map(|(at, (span, seen))| window(at, *span, seen))
+        .collect();
+    let graphs = shown
+        .iter()
+        .map(|(span, seen)| (*span, graph(&elements, seen)));
+    let graphs = graphs.collect();
     let whole = Span {
         start: windows.first().map_or(at, |w| w.span.start),
         end: Stamp(2 * SECOND),
@@ -145,6 +152,7 @@ pub(crate) fn union(
         },
         elements,
         windows,
+        graphs,
         activity: Activity::default(),
         undrawn: Vec::new(),
         layout: None,

@@ -4,7 +4,7 @@ use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{Place, TopicFacts, While};
-use crate::gate::facts::{Rate, SHUTDOWN_NS, count};
+use crate::gate::facts::{Rate, SHUTDOWN_NS};
 use crate::gate::finding::{Finding, Kind};
 use crate::gate::range::Range;
 use crate::graph::TopicId;
@@ -67,11 +67,11 @@ impl Judge<'_> {
         };
         let seconds = window.span.nanos().max(1) as f64 / 1e9;
         match whilst {
-            While::Rate(pattern, range) => self
-                .facts
-                .topics(pattern)
-                .iter()
-                .any(|topic| range.holds(count(window, *topic) as f64 / seconds)),
+            While::Rate(pattern, range) => {
+                self.facts.topics(pattern).iter().any(|topic| {
+                    range.holds(self.facts.count(window.index, *topic) as f64 / seconds)
+                })
+            }
             While::Node(pattern) => self.facts.nodes(pattern).iter().any(|(_, nodes)| {
                 let lives = self.facts.lives(nodes);
                 lives

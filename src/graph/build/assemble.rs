@@ -1,417 +1,259 @@
-//! The elements with their ids, and the graph of each window.
+//! The graph of each window: who is there, in which state, how busy.
 
 use std::collections::BTreeMap;
+use std::io;
 
-use super::Built;
-use super::liveness::{Lifetime, Liveness};
-use super::rates::{Rates, Sums};
-use super::values::Values;
+use super::history::{Course, History};
+use super::rates::{Sums, rates};
+use super::senders::sender;
 use super::windows::Windows;
-use crate::base::role::role;
-use crate::base::time::{Span, Stamp};
+use crate::base::error::Result;
+use crate::base::time::Span;
+use crate::evidence::Degree;
 use crate::evidence::claim::Name;
-use crate::evidence::collector::Collected;
-use crate::evidence::proof::{Key, Reliability, offers};
-use crate::graph::lives::{Known, Life, Stretch, Transition, Voice, all_silent, silences};
+use crate::evidence::collector::{Recorded, spool_error};
+use crate::evidence::conclude::Findings;
 use crate::graph::{
-    Edge, EdgeId, EdgeState, Graph, Node, NodeId, NodeState, State, Topic, TopicState,
+    Column, ColumnWriter, Cursor, EdgeId, EdgeState, Graphs, GraphsWriter, NodeState, Row, State,
+    TopicState, per_second,
 };
 
-/// What happened on each topic: its streams, and their messages per window.
-pub(crate) type Traffic = BTreeMap<Name, (Vec<usize>, Rates)>;
-
-/// Who looks when.
-#[derive(Clone, Copy)]
-pub(crate) struct Sight<'a> {
-    pub(crate) windows: &'a Windows<'a>,
-    /// Windows of silence before somebody who never speaks again counts as gone.
-    pub(crate) grace: usize,
-    /// The first and the last moment of the mission.
-    pub(crate) mission: (Stamp, Stamp),
+/// The graphs of the windows of one division of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Windowed {
+    /// A graph per window.
+    pub graphs: Graphs,
+    /// Messages per window.
+    pub messages: Vec<u64>,
 }
 
-/// Windows shorter than this have no rates.
-const SHORTEST_NS: i64 = 1_000_000;
-
-/// Lists every element and its state in every window. Tracks come in the order of the elements' names.
-pub(crate) fn assemble(
-    tracks: &BTreeMap<Key, Liveness>,
-    traffic: &Traffic,
-    values: &Values,
-    sight: &Sight<'_>,
-    collected: &Collected,
-) -> Built {
-    let many = sight.windows.len();
+/// The graph of each window. Windows are sorted by start, none inside another; they may overlap. Somebody who never
+/// speaks again counts as gone after `grace` windows of silence.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub(crate) fn graphs(
+    recorded: &Recorded,
+    findings: &Findings,
+    history: &History,
+    windows: &[Span],
+    grace: usize,
+) -> Result<Windowed> {
     let mut all = Assembly {
-        built: Built {
-            graphs: vec![Graph::default(); many],
-            messages: vec![0; many],
-            ..Built::default()
-        },
-        sight,
-        collected,
-        values,
-        traffic,
-        nodes: BTreeMap::new(),
-        topics: BTreeMap::new(),
-        publishers: BTreeMap::new(),
-        offers: offers(&collected.facts.offers, &collected.streams),
+        graphs: GraphsWriter::new(windows.to_vec()),
+        messages: vec![0; windows.len()],
+        windows: Windows(windows),
+        grace,
+        findings,
+        history,
+        published: BTreeMap::new(),
         sent: BTreeMap::new(),
+        topics: BTreeMap::new(),
     };
-    all.count_sent();
-    for (what, track) in tracks {
-        if let (Key::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
-            *all.publishers.entry(*topic).or_default() += 1;
-        }
-    }
-    for (what, track) in tracks {
-        match *what {
-            Key::Node(node) => all.node(node, track),
-            Key::Topic(topic) => all.topic(topic, track),
-            Key::Publish(node, topic) => all.publish(node, topic, track),
-            Key::Subscribe(topic, node) => all.subscribe(topic, node, track),
-        }
-    }
-    all.voices();
-    all.built
+    all.topics(recorded).map_err(spool_error)?;
+    all.nodes();
+    all.publishes();
+    all.subscribes();
+    Ok(Windowed {
+        graphs: all.graphs.finish(),
+        messages: all.messages,
+    })
 }
 
 struct Assembly<'a> {
-    built: Built,
-    sight: &'a Sight<'a>,
-    collected: &'a Collected,
-    values: &'a Values,
-    traffic: &'a Traffic,
-    nodes: BTreeMap<Name, NodeId>,
-    topics: BTreeMap<Name, u32>,
-    /// How many nodes are known to publish each topic.
-    publishers: BTreeMap<Name, u32>,
-    /// How many publishers the bags count on each topic.
-    offers: BTreeMap<Name, u32>,
-    /// Messages of each known publisher: per topic, then per window.
-    sent: BTreeMap<Name, BTreeMap<Name, BTreeMap<usize, u64>>>,
+    graphs: GraphsWriter,
+    messages: Vec<u64>,
+    windows: Windows<'a>,
+    /// Windows of silence before somebody who never speaks again counts as gone.
+    grace: usize,
+    findings: &'a Findings,
+    history: &'a History,
+    /// Messages of each known publisher on each topic, in windows with any.
+    published: BTreeMap<(Name, Name), Column>,
+    /// Messages of each known publisher per window.
+    sent: BTreeMap<Name, Vec<u64>>,
+    /// The states of each topic in the windows in which it is there.
+    topics: BTreeMap<u32, Column>,
 }
 
 impl Assembly<'_> {
-    /// Tells what every sender sent, and when nodes changed their states.
-    fn voices(&mut self) {
-        for (topic, (_, rates)) in self.traffic {
-            let Some(id) = self.topics.get(topic) else {
-                continue;
-            };
-            for sender in rates.senders.iter().filter(|s| !s.stretches.is_empty()) {
-                self.built.lives.voices.push(Voice {
-                    topic: *id,
-                    node: sender.node.and_then(|node| self.nodes.get(&node)).copied(),
-                    is_latched: sender.latched,
-                    stretches: sender.stretches.clone(),
-                });
+    /// Counts messages, topic by topic.
+    fn topics(&mut self, recorded: &Recorded) -> io::Result<()> {
+        let history = self.history;
+        for (topic, streams) in &history.streams {
+            let sums = rates(recorded, streams, &self.windows)?;
+            self.count(*topic, streams, &sums);
+            if let Some(id) = history.topic_ids.get(topic) {
+                self.topic(*id, Some(&sums));
             }
         }
-        for (node, id) in &self.nodes {
-            let states = self
-                .values
-                .transitions(*node)
-                .map(|(time, state)| Transition {
-                    node: *id,
-                    time: *time,
-                    state: std::sync::Arc::clone(state),
-                });
-            self.built.lives.transitions.extend(states);
+        for (name, id) in &history.topic_ids {
+            if !history.streams.contains_key(name) {
+                self.topic(*id, None);
+            }
         }
-        let order = |t: &Transition| (t.time, t.node);
-        self.built.lives.transitions.sort_by_key(order);
-    }
-
-    /// How the known sender of an edge sends on its topic.
-    fn stretches(&self, node: Option<Name>, topic: Name) -> &[Stretch] {
-        let senders = self.traffic.get(&topic).map(|(_, rates)| &rates.senders);
-        let sender = senders.and_then(|all| all.iter().find(|s| s.node == node));
-        sender.map_or(&[], |s| &s.stretches)
-    }
-
-    /// When all are silent who send on a topic.
-    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let Some((_, rates)) = self.traffic.get(&topic) else {
-            return Vec::new();
-        };
-        let of: Vec<&[Stretch]> = rates.senders.iter().map(|s| &s.stretches[..]).collect();
-        all_silent(&of, lives)
-    }
-
-    /// When all is silent that a node sends.
-    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let senders = self.traffic.values().flat_map(|(_, rates)| &rates.senders);
-        let own = senders.filter(|s| s.node == Some(node) && !s.latched);
-        let of: Vec<&[Stretch]> = own.map(|s| &s.stretches[..]).collect();
-        all_silent(&of, lives)
+        Ok(())
     }
 
     /// Adds up the messages of each publisher.
-    fn count_sent(&mut self) {
-        for (topic, (streams, rates)) in self.traffic {
-            for tally in &rates.tallies {
-                self.built.messages[tally.window] += tally.count;
+    fn count(&mut self, topic: Name, streams: &[usize], sums: &[Sums]) {
+        for sum in sums {
+            self.messages[sum.window] += sum.count;
+        }
+        let of = |stream: &usize| sender(&self.findings.streams[*stream]);
+        let mut places: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        for (place, node) in streams.iter().map(of).enumerate() {
+            if let Some(node) = node {
+                places.entry(node).or_default().push(place);
             }
-            for (place, stream) in streams.iter().enumerate() {
-                let stream = &self.collected.streams[*stream];
-                let Some(node) = stream
-                    .speaker
-                    .filter(|_| stream.trust != Reliability::First)
-                else {
-                    continue;
-                };
-                let of = self
-                    .sent
-                    .entry(node)
-                    .or_default()
-                    .entry(*topic)
-                    .or_default();
-                for tally in rates.tallies.iter().filter(|t| t.streams[place] > 0) {
-                    *of.entry(tally.window).or_default() += tally.streams[place];
+        }
+        for (node, places) in places {
+            let many = self.windows.len();
+            let sent = self.sent.entry(node).or_insert_with(|| vec![0; many]);
+            let mut column = ColumnWriter::default();
+            for sum in sums {
+                let count: u64 = places.iter().map(|place| sum.streams[*place]).sum();
+                sent[sum.window] += count;
+                if count > 0 {
+                    column.push(sum.window, counted(count));
                 }
             }
+            self.published.insert((node, topic), column.finish());
         }
     }
 
-    fn node(&mut self, name: Name, track: &Liveness) {
-        let id = next(self.nodes.len());
-        self.nodes.insert(name, id);
-        let (first, last) = track.bounds();
-        let text = self.collected.facts.text(name);
-        self.built.elements.nodes.push(Node {
-            role: role(&text).into(),
-            name: text.into(),
-            evidence: track.evidence,
-            first,
-            last,
-            runs: spans(track),
-        });
-        let sent = self.sent.get(&name);
-        let silent = self.node_silences(name, &spans(track));
-        self.built.lives.nodes.push(known(track, self.sight));
-        for (window, span) in self.sight.windows.0.iter().enumerate() {
-            if !self.sight.sees(track, *span) {
+    fn topic(&mut self, id: u32, sums: Option<&[Sums]>) {
+        let course = &self.history.topics[id as usize];
+        let mut list = sums.unwrap_or_default().iter().peekable();
+        let mut states = ColumnWriter::default();
+        for (at, window) in self.windows.0.iter().enumerate() {
+            let sum = list.next_if(|sum| sum.window == at);
+            if !self.sees(course, *window) {
                 continue;
             }
-            let state = match () {
-                () if track.is_declared() => State::Declared,
-                () if track.is_latched() && !track.speaks => State::Latched,
-                () if is_silent(&silent, *span) => State::Silent,
-                () => State::Active,
-            };
-            let count = sent.map(|topics| topics.values().filter_map(|w| w.get(&window)).sum());
-            self.built.graphs[window].nodes.push(NodeState {
+            let count = sum.map_or(0, |sum| sum.count);
+            let state = TopicState {
                 id,
-                state,
-                degree: track.degree,
-                hz: count.and_then(|n| per_second(n, *span)),
-                lifecycle: self.values.lifecycle(name, *span),
-            });
-        }
-    }
-
-    fn topic(&mut self, name: Name, track: &Liveness) {
-        let id = next(self.topics.len());
-        self.topics.insert(name, id);
-        let (first, last) = track.bounds();
-        let traffic = self.traffic.get(&name);
-        let mut types: Vec<_> = traffic
-            .iter()
-            .flat_map(|(streams, _)| streams)
-            .map(|s| self.collected.streams[*s].connection.type_name.clone())
-            .chain(self.values.types(name))
-            .filter(|name| !name.is_empty())
-            .collect();
-        types.sort_unstable();
-        types.dedup();
-        self.built.elements.topics.push(Topic {
-            name: self.collected.facts.text(name).into(),
-            types,
-            evidence: track.evidence,
-            first,
-            last,
-            qos: self.values.quality(name),
-            runs: spans(track),
-            unknown_publishers: self.unknown_publishers(name),
-        });
-        let tallies = traffic.map_or(&[][..], |(_, rates)| &rates.tallies);
-        let mut tallies = tallies.iter().peekable();
-        let silent = self.topic_silences(name, &spans(track));
-        self.built.lives.topics.push(known(track, self.sight));
-        for (window, span) in self.sight.windows.0.iter().enumerate() {
-            let tally = tallies.next_if(|t| t.window == window);
-            if self.sight.sees(track, *span) {
-                let state = match tally {
-                    _ if track.is_declared() => State::Declared,
-                    _ if track.is_latched() => State::Latched,
-                    None if track.senders.0 == 0 || is_silent(&silent, *span) => State::Silent,
-                    _ => State::Active,
-                };
-                self.built.graphs[window].topics.push(TopicState {
-                    id,
-                    state,
-                    degree: track.degree,
-                    count: tally.map_or(0, |t| t.count),
-                    bytes: bytes(tally, traffic.is_some()),
-                    hz: per_second(tally.map_or(0, |t| t.count), *span),
-                    median_period_s: tally.and_then(|t| t.median_period_s),
-                    max_gap_s: tally.and_then(|t| t.max_gap_s),
-                });
-            }
-        }
-    }
-
-    /// How many publishers of a topic the bag counts beyond those that are known.
-    fn unknown_publishers(&self, topic: Name) -> Option<u32> {
-        let counted = *self.offers.get(&topic)?;
-        let known = self.publishers.get(&topic).copied().unwrap_or(0);
-        Some(counted.saturating_sub(known))
-    }
-
-    fn publish(&mut self, node: Name, topic: Name, track: &Liveness) {
-        let id = next(self.built.elements.publishes.len());
-        let edge = self.edge(node, topic, track);
-        self.built.elements.publishes.push(edge);
-        let sent = self.sent.get(&node).and_then(|topics| topics.get(&topic));
-        let silent = silences(self.stretches(Some(node), topic), &spans(track));
-        self.built.lives.publishes.push(known(track, self.sight));
-        for (window, span) in self.sight.windows.0.iter().enumerate() {
-            if !self.sight.sees(track, *span) {
-                continue;
-            }
-            let count = sent.map(|windows| windows.get(&window).copied().unwrap_or(0));
-            let state = match count {
-                _ if track.is_declared() => State::Declared,
-                _ if track.is_latched() => State::Latched,
-                None | Some(0) if track.senders.0 == 0 || is_silent(&silent, *span) => {
-                    State::Silent
-                }
-                _ => State::Active,
+                state: course.state(*window, sum.is_some()),
+                degree: course.degree,
+                count,
+                bytes: bytes(sum, sums.is_some()),
+                hz: per_second(count, *window),
+                median_period_s: sum.and_then(|sum| sum.median_period_s),
+                max_gap_s: sum.and_then(|sum| sum.max_gap_s),
             };
-            let state = edge_state(id, track, state, *span, count);
-            self.built.graphs[window].publishes.push(state);
+            states.push(at, Row::new(state.state, state.degree));
+            self.graphs.topic(at, &state);
+        }
+        self.topics.insert(id, states.finish());
+    }
+
+    fn nodes(&mut self) {
+        for (name, id) in &self.history.node_ids {
+            let course = &self.history.nodes[*id as usize];
+            let sent = self.sent.get(name);
+            for (at, window) in self.windows.0.iter().enumerate() {
+                if !self.sees(course, *window) {
+                    continue;
+                }
+                let state = NodeState {
+                    id: *id,
+                    state: course.state(*window, false),
+                    degree: course.degree,
+                    hz: sent.and_then(|of| per_second(of[at], *window)),
+                    lifecycle: self.findings.values.lifecycle(*name, *window),
+                };
+                self.graphs.node(at, &state);
+            }
+        }
+    }
+
+    fn publishes(&mut self) {
+        let names = |ids: &BTreeMap<Name, u32>| -> BTreeMap<u32, Name> {
+            ids.iter().map(|(name, id)| (*id, *name)).collect()
+        };
+        let nodes = names(&self.history.node_ids);
+        let topics = names(&self.history.topic_ids);
+        let edges = self.history.elements.publishes.iter();
+        for ((id, edge), course) in (0..).zip(edges).zip(&self.history.publishes) {
+            let ends = nodes.get(&edge.node).zip(topics.get(&edge.topic));
+            let sent = ends.and_then(|(node, topic)| self.published.get(&(*node, *topic)));
+            let mut sent = sent.map(Column::cursor);
+            for (at, window) in self.windows.0.iter().enumerate() {
+                let count = sent.as_mut().map(|counts| {
+                    let row = counts.next();
+                    row.and_then(|row| row.count).unwrap_or(0)
+                });
+                if self.sees(course, *window) {
+                    let state = course.state(*window, count.is_some_and(|n| n > 0));
+                    let state = edge_state(id, course.degree, state, *window, count);
+                    self.graphs.publish(at, &state);
+                }
+            }
         }
     }
 
     /// A subscription is as lively as its topic.
-    fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
-        let id = next(self.built.elements.subscribes.len());
-        let edge = self.edge(node, topic, track);
-        let of = edge.topic;
-        self.built.elements.subscribes.push(edge);
-        self.built.lives.subscribes.push(known(track, self.sight));
-        for (window, span) in self.sight.windows.0.iter().enumerate() {
-            if !self.sight.sees(track, *span) {
-                continue;
+    fn subscribes(&mut self) {
+        let edges = self.history.elements.subscribes.iter();
+        for ((id, edge), course) in (0..).zip(edges).zip(&self.history.subscribes) {
+            let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
+            for (at, window) in self.windows.0.iter().enumerate() {
+                let topic = topic.as_mut().and_then(Cursor::next);
+                if !self.sees(course, *window) {
+                    continue;
+                }
+                let state = match topic {
+                    _ if course.is_declared() => State::Declared,
+                    Some(row) => row.state,
+                    None => State::Silent,
+                };
+                let state = edge_state(id, course.degree, state, *window, None);
+                self.graphs.subscribe(at, &state);
             }
-            let graph = &mut self.built.graphs[window];
-            let topics = &graph.topics;
-            let place = topics.binary_search_by_key(&of, |t| t.id);
-            let state = match place.map(|at| topics[at].state) {
-                _ if track.is_declared() => State::Declared,
-                Ok(state) => state,
-                Err(_) => State::Silent,
-            };
-            graph
-                .subscribes
-                .push(edge_state(id, track, state, *span, None));
         }
     }
 
-    fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Edge {
-        let (first, last) = track.bounds();
-        Edge {
-            node: self.nodes.get(&node).copied().unwrap_or(NodeId::MAX),
-            topic: self.topics.get(&topic).copied().unwrap_or(u32::MAX),
-            evidence: track.evidence,
-            first,
-            last,
-            runs: spans(track),
-        }
-    }
-}
-
-impl Sight<'_> {
     /// Whether an element is seen in a window.
-    fn sees(&self, track: &Liveness, span: Span) -> bool {
-        let last = track.lives.len().saturating_sub(1);
-        track.lives.iter().enumerate().any(|(at, life)| {
+    fn sees(&self, course: &Course, window: Span) -> bool {
+        let last = course.lives.len().saturating_sub(1);
+        course.lives.iter().enumerate().any(|(at, life)| {
             let to = if at == last && self.grace > 0 {
                 self.windows.last_moment(life.to, self.grace)
             } else {
                 life.to
             };
-            life.from < span.end && span.start <= to
+            life.from < window.end && window.start <= to
         })
     }
 }
 
-/// When an element is there, half-open.
-fn spans(track: &Liveness) -> Vec<Span> {
-    let span = |life: &Lifetime| Span {
-        start: life.from,
-        end: life.to.plus(1),
-    };
-    track.lives.iter().map(span).collect()
-}
-
-/// What is known of an element's lives.
-fn known(track: &Liveness, sight: &Sight<'_>) -> Known {
-    let within = |bound: crate::graph::lives::Bound| crate::graph::lives::Bound {
-        earliest: bound.earliest.max(sight.mission.0),
-        latest: bound.latest.min(sight.mission.1),
-        ..bound
-    };
-    let lives = spans(track).into_iter().zip(&track.lives);
-    Known {
-        degree: track.degree,
-        lives: lives
-            .map(|(span, life)| Life {
-                span,
-                began: life.began.map(within),
-                ended: life.ended.map(within),
-            })
-            .collect(),
+fn counted(count: u64) -> Row {
+    Row {
+        count: Some(count),
+        ..Row::new(State::Active, Degree::Measured)
     }
-}
-
-/// Whether a window lies in a silence.
-fn is_silent(silences: &[(Stamp, Option<Stamp>)], span: Span) -> bool {
-    let covers = |(from, to): &(Stamp, Option<Stamp>)| {
-        *from < span.start && to.is_none_or(|to| span.end <= to)
-    };
-    silences.iter().any(covers)
 }
 
 fn edge_state(
     id: EdgeId,
-    track: &Liveness,
+    degree: Degree,
     state: State,
-    span: Span,
+    window: Span,
     count: Option<u64>,
 ) -> EdgeState {
     EdgeState {
         id,
         state,
-        degree: track.degree,
+        degree,
         count,
-        hz: count.and_then(|n| per_second(n, span)),
+        hz: count.and_then(|n| per_second(n, window)),
     }
 }
 
-fn bytes(tally: Option<&Sums>, recorded: bool) -> Option<u64> {
-    match tally {
-        Some(tally) => tally.bytes,
+fn bytes(sum: Option<&Sums>, recorded: bool) -> Option<u64> {
+    match sum {
+        Some(sum) => sum.bytes,
         None => recorded.then_some(0),
     }
-}
-
-fn per_second(count: u64, span: Span) -> Option<f64> {
-    let nanos = span.nanos();
-    (nanos >= SHORTEST_NS).then(|| count as f64 / (nanos as f64 / 1e9))
-}
-
-fn next(len: usize) -> u32 {
-    u32::try_from(len).unwrap_or(u32::MAX)
 }

@@ -1,7 +1,7 @@
 //! When something is alive: from its first sign to its last, held on by latched messages, ended by proofs of an end.
 
-use super::restarts::Restart;
 use crate::base::time::Stamp;
+use crate::evidence::restarts::Restart;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::lives::{Bound, Stretch};
 

@@ -4,13 +4,12 @@
 
 use std::collections::BTreeMap;
 
-use super::Traffic;
 use super::liveness::{Liveness, Pulse};
-use super::rates::Sender;
+use super::senders::{Sender, Traffic};
 use crate::base::role::{role, start};
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
-use crate::evidence::collector::Collected;
+use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{Key, Reliability};
 use crate::graph::lives::Stretch;
 
@@ -19,14 +18,14 @@ use crate::graph::lives::Stretch;
 pub(crate) fn fall_silent(
     tracks: &mut BTreeMap<Key, Liveness>,
     traffic: &Traffic,
-    collected: &Collected,
-    end: Stamp,
+    findings: &Findings,
 ) {
+    let end = findings.mission.1;
     for (topic, nodes) in publishers(tracks) {
-        let Some(sender) = merged(traffic, collected, topic) else {
+        let Some(sender) = merged(traffic, findings, topic) else {
             continue;
         };
-        for (node, stretches) in turns(&nodes, sender, collected) {
+        for (node, stretches) in turns(&nodes, sender, findings) {
             let pulse = Pulse::of(stretches, &[]).filter(|pulse| pulse.broke_off(end));
             if let (Some(pulse), Some(track)) = (pulse, tracks.get_mut(&Key::Publish(node, topic)))
             {
@@ -50,11 +49,11 @@ fn publishers(tracks: &BTreeMap<Key, Liveness>) -> BTreeMap<Name, Vec<Name>> {
 }
 
 /// The sender that stands for all of a merged topic's, unless messages outlive it.
-fn merged<'a>(traffic: &'a Traffic, collected: &Collected, topic: Name) -> Option<&'a Sender> {
-    let (streams, rates) = traffic.get(&topic)?;
-    let is_merged = |at: &usize| collected.streams[*at].trust == Reliability::First;
-    let sender = rates.senders.iter().find(|sender| sender.node.is_none())?;
-    (streams.iter().all(is_merged) && !sender.latched).then_some(sender)
+fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<&'a Sender> {
+    let of = traffic.get(&topic)?;
+    let is_merged = |at: &usize| findings.streams[*at].trust == Reliability::First;
+    let sender = of.list.iter().find(|sender| sender.node.is_none())?;
+    (of.streams.iter().all(is_merged) && !sender.latched).then_some(sender)
 }
 
 /// What each of the publishers sent: one alone all of it, those of one role in turns, each from its start to the next
@@ -62,12 +61,12 @@ fn merged<'a>(traffic: &'a Traffic, collected: &Collected, topic: Name) -> Optio
 fn turns<'a>(
     nodes: &[Name],
     sender: &'a Sender,
-    collected: &Collected,
+    findings: &Findings,
 ) -> Vec<(Name, &'a [Stretch])> {
     if let [only] = nodes {
         return vec![(*only, &sender.stretches)];
     }
-    let text = |node: &Name| collected.facts.text(*node);
+    let text = |node: &Name| findings.text(*node);
     let born = |node: &Name| Some((start(&text(node))?, *node));
     let births: Option<Vec<(Stamp, Name)>> = nodes.iter().map(born).collect();
     let is_one_role = nodes

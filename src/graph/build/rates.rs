@@ -1,16 +1,13 @@
-//! How often: messages of each topic and of each of its streams per window, their bytes, periods and gaps; and how each
-//! of its senders sent over the whole mission.
+//! How often: messages of each topic and of each of its streams per window, their bytes, periods and gaps.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
+use std::sync::Arc;
 
-use super::tempo::stretches;
 use super::windows::Windows;
-use crate::base::time::Stamp;
-use crate::evidence::claim::Name;
-use crate::evidence::collector::Collected;
-use crate::evidence::proof::Reliability;
-use crate::graph::lives::Stretch;
+use crate::base::error::Result;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::collector::{Recorded, spool_error};
 
 /// What one topic did in one window.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,26 +21,38 @@ pub(crate) struct Sums {
     pub(crate) streams: Vec<u64>,
 }
 
-/// What one topic did in the whole mission.
-#[derive(Debug, Default)]
-pub(crate) struct Rates {
-    /// Windows with messages, in order.
-    pub(crate) tallies: Vec<Sums>,
-    /// The first and the last message of each stream; `None` if it has none.
-    pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
-    /// What each sender sent: those that are known, sorted, after the unknown ones together.
-    pub(crate) senders: Vec<Sender>,
-    /// The place of each stream's sender among those.
-    pub(crate) of: Vec<usize>,
+/// How many messages a topic has in a window.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct TopicCount {
+    /// The topic's name.
+    pub topic: Arc<str>,
+    /// The window's place.
+    pub window: usize,
+    /// Messages, 1...
+    pub count: u64,
 }
 
-/// What one sender sent on one topic, over all its streams: a split recording has one per part.
-#[derive(Debug)]
-pub(crate) struct Sender {
-    /// `None` for all who are not known.
-    pub(crate) node: Option<Name>,
-    pub(crate) latched: bool,
-    pub(crate) stretches: Vec<Stretch>,
+/// Every count of a topic in a window, before anything is concluded. Windows are as for [`super::graphs`].
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicCount>> {
+    let mut streams: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (at, stream) in recorded.streams.iter().enumerate() {
+        let topic = stream.connection.topic.as_str();
+        streams.entry(topic).or_default().push(at);
+    }
+    let mut all = Vec::new();
+    for (topic, streams) in streams {
+        let topic: Arc<str> = topic.into();
+        let sums = rates(recorded, &streams, &Windows(windows)).map_err(spool_error)?;
+        all.extend(sums.into_iter().map(|sum| TopicCount {
+            topic: Arc::clone(&topic),
+            window: sum.window,
+            count: sum.count,
+        }));
+    }
+    Ok(all)
 }
 
 /// A window that messages still fall into.
@@ -60,40 +69,26 @@ struct Open {
 /// The most gaps kept per window for their median (8 MB); a window with more has no median.
 const MOST_GAPS: usize = 1 << 20;
 
-/// Counts the messages of some streams, which together are one topic.
+/// Counts the messages of some streams, which together are one topic: each window with messages, in order.
 pub(crate) fn rates(
-    collected: &mut Collected,
+    recorded: &Recorded,
     streams: &[usize],
     windows: &Windows<'_>,
-) -> io::Result<Rates> {
-    let ids: Vec<_> = streams
-        .iter()
-        .map(|s| collected.streams[*s].times)
-        .collect();
-    let sized = ids.iter().all(|id| collected.messages.sized(*id));
-    let believed = collected.believed;
-    let mut all = Rates {
-        tallies: Vec::new(),
-        traces: vec![None; streams.len()],
-        senders: Vec::new(),
-        of: Vec::new(),
-    };
-    let (of, mut heard) = senders(collected, streams);
+) -> io::Result<Vec<Sums>> {
+    let ids: Vec<_> = streams.iter().map(|s| recorded.streams[*s].times).collect();
+    let sized = ids.iter().all(|id| recorded.messages.sized(*id));
+    let mut all = Vec::new();
     let mut open: VecDeque<Open> = VecDeque::new();
     let mut next = 0;
-    collected.messages.merge(&ids, |timed| {
-        if believed.is_some_and(|span| !span.contains(timed.time)) {
+    recorded.messages.merge(&ids, |timed| {
+        if !recorded.believes(timed.time) {
             return;
         }
-        let trace = &mut all.traces[timed.series];
-        *trace = Some((trace.map_or(timed.time, |t| t.0), timed.time));
-        heard[of[timed.series]].hear(timed.time);
         while open
             .front()
             .is_some_and(|o| windows.end(o.window) <= timed.time)
         {
-            all.tallies
-                .extend(open.pop_front().and_then(|o| o.close(sized)));
+            all.extend(open.pop_front().and_then(|o| o.close(sized)));
         }
         while windows.start(next).is_some_and(|start| start <= timed.time) {
             if timed.time < windows.end(next) {
@@ -105,86 +100,8 @@ pub(crate) fn rates(
             window.take(timed.time, timed.series, timed.size);
         }
     })?;
-    all.tallies
-        .extend(open.into_iter().filter_map(|o| o.close(sized)));
-    all.of = of;
-    all.senders = heard.into_iter().map(Heard::into_sender).collect();
+    all.extend(open.into_iter().filter_map(|o| o.close(sized)));
     Ok(all)
-}
-
-/// What is heard of one sender.
-struct Heard {
-    node: Option<Name>,
-    latched: bool,
-    times: Vec<Stamp>,
-    /// Of so many messages one is kept, unless it comes late.
-    every: usize,
-    passed: usize,
-}
-
-/// The most times kept per sender (32 MB); of more, every second goes.
-const MOST_TIMES: usize = 1 << 22;
-/// A message after so much silence is kept in any case, and the one before it.
-const LATE_NS: i64 = 500_000_000;
-
-impl Heard {
-    fn hear(&mut self, time: Stamp) {
-        let late = self
-            .times
-            .last()
-            .is_none_or(|last| time.since(*last) > LATE_NS);
-        self.passed += 1;
-        if !late && self.passed < self.every {
-            return;
-        }
-        self.passed = 0;
-        self.times.push(time);
-        if self.times.len() > MOST_TIMES {
-            self.every *= 2;
-            let mut kept = false;
-            self.times.retain(|_| {
-                kept = !kept;
-                kept
-            });
-        }
-    }
-
-    fn into_sender(self) -> Sender {
-        let mut stretches = stretches(&self.times);
-        for stretch in &mut stretches {
-            stretch.count = (stretch.count - 1) * self.every as u64 + 1;
-            stretch.period /= i64::try_from(self.every).unwrap_or(i64::MAX);
-        }
-        Sender {
-            node: self.node,
-            latched: self.latched,
-            stretches,
-        }
-    }
-}
-
-/// The sender of each stream, and what is heard of each sender: nothing yet.
-fn senders(collected: &Collected, streams: &[usize]) -> (Vec<usize>, Vec<Heard>) {
-    let of = |at: &usize| {
-        let stream = &collected.streams[*at];
-        stream
-            .speaker
-            .filter(|_| stream.trust != Reliability::First)
-    };
-    let mut latched: BTreeMap<Option<Name>, bool> = BTreeMap::new();
-    for at in streams {
-        *latched.entry(of(at)).or_insert(true) &= collected.streams[*at].latched;
-    }
-    let place = |at: &usize| latched.range(..of(at)).count();
-    let places = streams.iter().map(place).collect();
-    let heard = latched.iter().map(|(node, latched)| Heard {
-        node: *node,
-        latched: *latched,
-        times: Vec::new(),
-        every: 1,
-        passed: 0,
-    });
-    (places, heard.collect())
 }
 
 impl Open {

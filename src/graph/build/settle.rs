@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::liveness::{Lifetime, Liveness};
-use super::restarts::Restarts;
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::proof::{Key, Proof, Validity};
+use crate::evidence::restarts::Restarts;
 
 /// Works out all lives; `mission` is its first and its last moment.
 pub(crate) fn settle(

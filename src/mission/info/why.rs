@@ -140,11 +140,8 @@ fn describe(
         at(first),
         at(last)
     )?;
-    let windows = mission
-        .windows
-        .iter()
-        .filter(|w| shows(&w.graph, element))
-        .count();
+    let graphs = mission.graphs.iter();
+    let windows = graphs.filter(|graph| shows(graph, element)).count();
     writeln!(
         out,
         "  there in {windows} of {} parts of the mission",

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::write::{Named, words};
+use super::changes::Named;
+use super::write::words;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, Elements, NodeId};

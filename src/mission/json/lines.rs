@@ -6,29 +6,33 @@ use serde_json::ser::Formatter;
 
 use crate::base::words::visible_json;
 
-/// Breaks lines down to the lists inside a window; everything deeper stays on its line.
+/// Breaks lines down to a depth; everything deeper stays on its line.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     depth: usize,
+    deepest: usize,
 }
 
-/// The mission's keys, its windows, their keys, and the elements in their lists.
-const DEEPEST: usize = 4;
-
 impl Lines {
+    /// Breaks lines so deep: 1 the mission's keys, 2 its windows, 3 their keys, 4 the elements in their lists.
+    pub(crate) fn down_to(deepest: usize) -> Self {
+        Self { depth: 0, deepest }
+    }
+
     fn open<W: ?Sized + Write>(&mut self, writer: &mut W, bracket: &[u8]) -> io::Result<()> {
         self.depth += 1;
         writer.write_all(bracket)
     }
 
     fn item<W: ?Sized + Write>(&self, writer: &mut W, first: bool) -> io::Result<()> {
-        match (first, self.depth <= DEEPEST) {
+        match (first, self.depth <= self.deepest) {
             (true, true) => self.new_line(writer),
             (false, true) => {
                 writer.write_all(b",")?;
                 self.new_line(writer)
             }
             (true, false) => Ok(()),
+            (false, false) if self.deepest < 4 => writer.write_all(b","),
             (false, false) => writer.write_all(b", "),
         }
     }

@@ -50,36 +50,49 @@ impl Names {
     }
 
     pub(crate) fn window(&mut self, window: &RawWindow) {
-        for raw in &window.nodes {
-            let node = self.node(&raw.name);
-            if let Some(role) = &raw.role {
-                node.role = role.as_str().into();
-            }
-            node.evidence = node.evidence.and(raw.rest.evidence());
-            widen(&mut node.first, &mut node.last, raw.rest.life());
-            keep(&mut node.runs, raw.rest.runs());
+        window.nodes.iter().for_each(|raw| self.take_node(raw));
+        window.topics.iter().for_each(|raw| self.take_topic(raw));
+        window
+            .publishes
+            .iter()
+            .for_each(|raw| self.take_publish(raw));
+        window
+            .subscribes
+            .iter()
+            .for_each(|raw| self.take_subscribe(raw));
+    }
+
+    pub(crate) fn take_node(&mut self, raw: &RawNode) {
+        let node = self.node(&raw.name);
+        if let Some(role) = &raw.role {
+            node.role = role.as_str().into();
         }
-        for raw in &window.topics {
-            let topic = self.topic(&raw.name);
-            topic
-                .types
-                .extend(raw.types.iter().map(|t| Arc::from(t.as_str())));
-            topic.types.sort();
-            topic.types.dedup();
-            topic.evidence = topic.evidence.and(raw.rest.evidence());
-            topic.qos = raw.qos.as_deref().map(Arc::from).or(topic.qos.take());
-            topic.unknown_publishers = raw.unknown_publishers.or(topic.unknown_publishers);
-            widen(&mut topic.first, &mut topic.last, raw.rest.life());
-            keep(&mut topic.runs, raw.rest.runs());
-        }
-        for raw in &window.publishes {
-            self.ends(raw);
-            edge(&mut self.publishes, (&raw.node, &raw.topic), raw);
-        }
-        for raw in &window.subscribes {
-            self.ends(raw);
-            edge(&mut self.subscribes, (&raw.topic, &raw.node), raw);
-        }
+        node.evidence = node.evidence.and(raw.rest.evidence());
+        widen(&mut node.first, &mut node.last, raw.rest.life());
+        keep(&mut node.runs, raw.rest.runs());
+    }
+
+    pub(crate) fn take_topic(&mut self, raw: &RawTopic) {
+        let topic = self.topic(&raw.name);
+        let types = raw.types.iter();
+        topic.types.extend(types.map(|t| Arc::from(t.as_str())));
+        topic.types.sort();
+        topic.types.dedup();
+        topic.evidence = topic.evidence.and(raw.rest.evidence());
+        topic.qos = raw.qos.as_deref().map(Arc::from).or(topic.qos.take());
+        topic.unknown_publishers = raw.unknown_publishers.or(topic.unknown_publishers);
+        widen(&mut topic.first, &mut topic.last, raw.rest.life());
+        keep(&mut topic.runs, raw.rest.runs());
+    }
+
+    pub(crate) fn take_publish(&mut self, raw: &RawEdge) {
+        self.ends(raw);
+        edge(&mut self.publishes, (&raw.node, &raw.topic), raw);
+    }
+
+    pub(crate) fn take_subscribe(&mut self, raw: &RawEdge) {
+        self.ends(raw);
+        edge(&mut self.subscribes, (&raw.topic, &raw.node), raw);
     }
 
     fn ends(&mut self, raw: &RawEdge) {
@@ -170,6 +183,26 @@ pub(crate) struct Ids {
 }
 
 impl Ids {
+    /// The place of a node that was taken in.
+    pub(crate) fn of_node(&self, name: &str) -> u32 {
+        self.nodes[name]
+    }
+
+    /// The place of a topic.
+    pub(crate) fn of_topic(&self, name: &str) -> u32 {
+        self.topics[name]
+    }
+
+    /// The place of a publication.
+    pub(crate) fn of_publish(&self, raw: &RawEdge) -> u32 {
+        self.publishes[&(Arc::from(raw.node.as_str()), Arc::from(raw.topic.as_str()))]
+    }
+
+    /// The place of a subscription.
+    pub(crate) fn of_subscribe(&self, raw: &RawEdge) -> u32 {
+        self.subscribes[&(Arc::from(raw.topic.as_str()), Arc::from(raw.node.as_str()))]
+    }
+
     /// The graph of a window; an element listed twice counts once, and the ends of an edge are there.
     pub(crate) fn graph(&self, window: &RawWindow) -> Graph {
         let pair = |a: &str, b: &str| (Arc::from(a), Arc::from(b));

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use super::entries::{PhaseRow, RawEntry};
+use super::runs::RawWhole;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{EdgeState, State};
@@ -18,6 +19,15 @@ pub(crate) struct Raw {
     pub(crate) period_ns: Option<i64>,
     pub(crate) step_ns: Option<i64>,
     pub(crate) windows: Vec<RawWindow>,
+    #[serde(default)]
+    pub(crate) nodes: Vec<RawWhole<RawNode>>,
+    #[serde(default)]
+    pub(crate) topics: Vec<RawWhole<RawTopic>>,
+    #[serde(default)]
+    pub(crate) publishes: Vec<RawWhole<RawEdge>>,
+    #[serde(default)]
+    pub(crate) subscribes: Vec<RawWhole<RawEdge>>,
+    pub(crate) form: Option<String>,
     pub(crate) ledger: Option<Vec<RawEntry>>,
     #[serde(default)]
     pub(crate) phases: Vec<PhaseRow>,
@@ -36,7 +46,10 @@ pub(crate) struct RawBag {
     pub(crate) compression: Vec<String>,
     #[serde(default)]
     pub(crate) tier: String,
+    pub(crate) tier_reason: Option<String>,
     pub(crate) complete: Option<bool>,
+    #[serde(default)]
+    pub(crate) file_bytes: u64,
 }
 
 #[derive(Deserialize)]
@@ -134,17 +147,11 @@ pub(crate) struct RawEdge {
 
 impl RawState {
     pub(crate) fn state(&self) -> State {
-        let known = State::ALL
-            .into_iter()
-            .find(|s| self.state.as_deref() == Some(s.word()));
-        known.unwrap_or(State::Active)
+        state_of(self.state.as_deref())
     }
 
     pub(crate) fn degree(&self) -> Degree {
-        let known = Degree::ALL
-            .into_iter()
-            .find(|d| self.degree.as_deref() == Some(d.word()));
-        known.unwrap_or(Degree::Stated)
+        degree_of(self.degree.as_deref())
     }
 
     pub(crate) fn evidence(&self) -> Evidence {
@@ -174,4 +181,16 @@ impl RawState {
             hz: self.hz,
         }
     }
+}
+
+/// The state of this word; active for another, or none.
+pub(crate) fn state_of(word: Option<&str>) -> State {
+    let known = State::ALL.into_iter().find(|s| word == Some(s.word()));
+    known.unwrap_or(State::Active)
+}
+
+/// The degree of this word; stated for another, or none.
+pub(crate) fn degree_of(word: Option<&str>) -> Degree {
+    let known = Degree::ALL.into_iter().find(|d| word == Some(d.word()));
+    known.unwrap_or(Degree::Stated)
 }

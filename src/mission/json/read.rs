@@ -7,7 +7,8 @@ use std::path::Path;
 
 use super::names::Names;
 use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice};
-use super::write::{OLD_SCHEMA, SCHEMA};
+use super::runs::RawElements;
+use super::write::{OLD_SCHEMA, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Rect;
@@ -79,6 +80,22 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
 fn build(raw: Raw, spans: &[Span]) -> Mission {
     let mut names = Names::default();
     raw.windows.iter().for_each(|w| names.window(w));
+    let runs = RawElements {
+        nodes: raw.nodes,
+        topics: raw.topics,
+        publishes: raw.publishes,
+        subscribes: raw.subscribes,
+    };
+    runs.nodes.iter().for_each(|n| names.take_node(&n.element));
+    runs.topics
+        .iter()
+        .for_each(|t| names.take_topic(&t.element));
+    runs.publishes
+        .iter()
+        .for_each(|e| names.take_publish(&e.element));
+    runs.subscribes
+        .iter()
+        .for_each(|e| names.take_subscribe(&e.element));
     let (elements, places) = names.elements();
     let start = spans.iter().map(|s| s.start).min().unwrap_or_default();
     let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
@@ -111,13 +128,21 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
                 span: *span,
                 partial: window.partial.unwrap_or(span.nanos() < period.nanos()),
                 messages: window.messages.unwrap_or_else(counts),
-                graph: places.graph(window),
                 changes: Vec::new(),
                 entries: Vec::new(),
             }
         })
         .collect();
+    let graphs = if raw.form.as_deref() == Some(RUNS) {
+        super::runs::graphs(&runs, &places, spans)
+    } else {
+        let graphs = spans.iter().zip(&raw.windows);
+        graphs
+            .map(|(span, window)| (*span, places.graph(window)))
+            .collect()
+    };
     Mission {
+        graphs,
         bags: raw.bags.into_iter().map(report).collect(),
         span,
         messages: raw.messages.unwrap_or_else(|| {
@@ -153,10 +178,10 @@ fn report(raw: RawBag) -> Report {
             .into_iter()
             .find(|t| t.word() == raw.tier)
             .unwrap_or(Tier::Forward),
-        tier_reason: None,
+        tier_reason: raw.tier_reason,
         complete: raw.complete.unwrap_or(true),
         bytes_read: 0,
-        file_bytes: 0,
+        file_bytes: raw.file_bytes,
         facts: Vec::new(),
     }
 }
@@ -211,9 +236,9 @@ mod tests {
             .map(|n| n.name.as_str())
             .collect();
         assert_eq!(names, ["/a", "/b"]);
-        assert_eq!(mission.windows[0].graph.nodes[0].state, State::Silent);
+        assert_eq!(mission.graphs.get(0).unwrap().nodes[0].state, State::Silent);
         assert_eq!(
-            mission.windows[0].graph.topics.len(),
+            mission.graphs.get(0).unwrap().topics.len(),
             1,
             "an edge brings its ends"
         );

@@ -3,16 +3,17 @@
 use std::io::Write;
 
 use serde::Serialize;
-use serde::ser::{SerializeMap as _, SerializeSeq as _, Serializer};
+use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 
+use super::changes::ChangeRow;
 use super::entries::{PhaseRow, entries};
 use super::lines::Lines;
+use super::rows::{NodeRow, PublishRow, SubscribeRow, TopicRow};
+use super::runs;
 use crate::bag::Report;
-use crate::base::time::{Span, Stamp};
 use crate::evidence::Evidence;
-use crate::graph::diff::Change;
-use crate::graph::{Edge, EdgeState, Element, Elements, NodeState, TopicState};
-use crate::mission::{EntryId, Mission, Place, Places, Window};
+use crate::graph::{Elements, Graph};
+use crate::mission::{Mission, Place, Places, Window};
 
 /// The schema that is written, and read.
 pub(crate) const SCHEMA: &str = "bagreel.evolution/2";
@@ -25,35 +26,102 @@ pub(crate) const OLD_SCHEMA: &str = "bagreel.evolution/1";
 /// # Errors
 /// Whatever `out` refuses.
 pub fn write_json(mission: &Mission, out: &mut dyn Write) -> std::io::Result<()> {
-    let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Lines::default());
-    mission.serialize(&mut serializer)?;
-    out.write_all(b"\n")
+    let json = Json {
+        mission,
+        places: mission.layout.as_ref(),
+        form: Form::Auto,
+    };
+    json.write(out)
 }
 
-impl Serialize for Mission {
+/// How the windows of a mission are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Form {
+    /// By their number: as windows up to 2000, as runs beyond.
+    #[default]
+    Auto,
+    /// Each with all that is there in it.
+    Windows,
+    /// Each element once, with what it says in which windows.
+    Runs,
+}
+
+/// Tools read windows one by one; beyond so many the file would be larger than the bag.
+const MOST_WINDOWS: usize = 2000;
+/// The word of the form that is no list of windows with everything in them.
+pub(crate) const RUNS: &str = "runs";
+
+/// A mission as it is written.
+pub(crate) struct Json<'a> {
+    /// The data.
+    pub mission: &'a Mission,
+    /// Where everything was drawn, if it was.
+    pub places: Option<&'a Places>,
+    /// How its windows are written.
+    pub form: Form,
+}
+
+impl Json<'_> {
+    fn is_runs(&self) -> bool {
+        match self.form {
+            Form::Auto => self.mission.windows.len() > MOST_WINDOWS,
+            Form::Windows => false,
+            Form::Runs => true,
+        }
+    }
+
+    /// Writes it, as [`write_json`] does.
+    ///
+    /// # Errors
+    /// Whatever `out` refuses.
+    pub(crate) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        let lines = Lines::down_to(if self.is_runs() { 3 } else { 4 });
+        let mut serializer = serde_json::Serializer::with_formatter(&mut *out, lines);
+        self.serialize(&mut serializer)?;
+        out.write_all(b"\n")
+    }
+}
+
+impl Serialize for Json<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self {
+            mission, places, ..
+        } = *self;
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("schema", SCHEMA)?;
-        map.serialize_entry("bags", &List(self.bags.iter().map(BagRow::new)))?;
-        map.serialize_entry("start_ns", &self.span.start.0)?;
-        map.serialize_entry("end_ns", &self.span.end.0)?;
-        map.serialize_entry("messages", &self.messages)?;
-        map.serialize_entry("period_ns", &self.period.nanos())?;
-        map.serialize_entry("step_ns", &self.step.nanos())?;
-        let windows = self.windows.iter().map(|window| WindowOf {
-            window,
-            elements: &self.elements,
-        });
-        map.serialize_entry("ledger", &List(entries(&self.ledger, &self.elements)))?;
-        let phases = self.ledger.phases.iter().map(PhaseRow::from);
+        if self.is_runs() {
+            map.serialize_entry("form", RUNS)?;
+        }
+        map.serialize_entry("bags", &List(mission.bags.iter().map(BagRow::new)))?;
+        map.serialize_entry("start_ns", &mission.span.start.0)?;
+        map.serialize_entry("end_ns", &mission.span.end.0)?;
+        map.serialize_entry("messages", &mission.messages)?;
+        map.serialize_entry("period_ns", &mission.period.nanos())?;
+        map.serialize_entry("step_ns", &mission.step.nanos())?;
+        map.serialize_entry("ledger", &List(entries(&mission.ledger, &mission.elements)))?;
+        let phases = mission.ledger.phases.iter().map(PhaseRow::from);
         map.serialize_entry("phases", &List(phases))?;
-        map.serialize_entry("windows", &List(windows))?;
-        if let Some(places) = &self.layout {
+        let elements = &mission.elements;
+        if self.is_runs() {
+            let windows = mission.windows.iter();
+            let windows = windows.map(|window| WindowRow { window, elements });
+            map.serialize_entry("windows", &List(windows))?;
+            runs::elements(mission, &mut map)?;
+        } else {
+            let windows = mission.windows.iter().zip(&mission.graphs);
+            let windows = windows.map(|(window, graph)| WindowOf {
+                window,
+                graph,
+                elements,
+            });
+            map.serialize_entry("windows", &List(windows))?;
+        }
+        if let Some(places) = places {
             map.serialize_entry("layout", &LayoutRow::new(places))?;
         }
         map.serialize_entry(
             "notices",
-            &List(self.notices.iter().map(|n| NoticeRow {
+            &List(mission.notices.iter().map(|n| NoticeRow {
                 kind: n.kind.word(),
                 count: n.count,
                 text: n.text,
@@ -85,6 +153,7 @@ struct BagRow<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     tier_reason: Option<&'a str>,
     complete: bool,
+    file_bytes: u64,
 }
 
 impl<'a> BagRow<'a> {
@@ -96,6 +165,7 @@ impl<'a> BagRow<'a> {
             tier: bag.tier.word(),
             tier_reason: bag.tier_reason.as_deref(),
             complete: bag.complete,
+            file_bytes: bag.file_bytes,
         }
     }
 }
@@ -146,20 +216,16 @@ impl<'a> LayoutRow<'a> {
 
 struct WindowOf<'a> {
     window: &'a Window,
+    graph: Graph,
     elements: &'a Elements,
 }
 
 impl Serialize for WindowOf<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let (window, elements) = (self.window, self.elements);
-        let graph = &window.graph;
+        let graph = &self.graph;
         let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("index", &window.index)?;
-        map.serialize_entry("start_ns", &window.span.start.0)?;
-        map.serialize_entry("end_ns", &window.span.end.0)?;
-        map.serialize_entry("length_ns", &window.span.nanos())?;
-        map.serialize_entry("partial", &window.partial)?;
-        map.serialize_entry("messages", &window.messages)?;
+        head(window, &mut map)?;
         map.serialize_entry(
             "nodes",
             &List(graph.nodes.iter().map(|s| NodeRow::new(s, elements))),
@@ -181,298 +247,43 @@ impl Serialize for WindowOf<'_> {
                     .map(|s| SubscribeRow::new(s, elements)),
             ),
         )?;
-        map.serialize_entry(
-            "changes",
-            &List(
-                window
-                    .changes
-                    .iter()
-                    .zip(&window.entries)
-                    .map(|(c, entry)| ChangeRow::new(c, *entry, elements)),
-            ),
-        )?;
+        map.serialize_entry("changes", &changes(window, elements))?;
         map.end()
     }
 }
 
-/// When an element is there, as pairs of nanoseconds.
-struct Runs<'a>(&'a [Span]);
+/// A window without what is in it.
+struct WindowRow<'a> {
+    window: &'a Window,
+    elements: &'a Elements,
+}
 
-impl Serialize for Runs<'_> {
+impl Serialize for WindowRow<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.0.iter().map(|run| [run.start.0, run.end.0]))
+        let mut map = serializer.serialize_map(None)?;
+        head(self.window, &mut map)?;
+        map.serialize_entry("changes", &changes(self.window, self.elements))?;
+        map.end()
     }
+}
+
+fn head<M: SerializeMap>(window: &Window, map: &mut M) -> Result<(), M::Error> {
+    map.serialize_entry("index", &window.index)?;
+    map.serialize_entry("start_ns", &window.span.start.0)?;
+    map.serialize_entry("end_ns", &window.span.end.0)?;
+    map.serialize_entry("length_ns", &window.span.nanos())?;
+    map.serialize_entry("partial", &window.partial)?;
+    map.serialize_entry("messages", &window.messages)
+}
+
+fn changes<'a>(
+    window: &'a Window,
+    elements: &'a Elements,
+) -> List<impl Iterator<Item = ChangeRow<'a>> + Clone> {
+    let changes = window.changes.iter().zip(&window.entries);
+    List(changes.map(|(change, entry)| ChangeRow::new(change, *entry, elements)))
 }
 
 pub(crate) fn words(evidence: Evidence) -> Vec<&'static str> {
     evidence.words().collect()
-}
-
-fn nanos(stamp: Option<Stamp>) -> Option<i64> {
-    stamp.map(|s| s.0)
-}
-
-#[derive(Serialize)]
-struct NodeRow<'a> {
-    name: &'a str,
-    role: &'a str,
-    state: &'a str,
-    degree: &'a str,
-    evidence: Vec<&'static str>,
-    first_ns: Option<i64>,
-    last_ns: Option<i64>,
-    runs: Runs<'a>,
-    hz: Option<f64>,
-    lifecycle: Option<&'a str>,
-}
-
-impl<'a> NodeRow<'a> {
-    fn new(state: &'a NodeState, elements: &'a Elements) -> Self {
-        let node = &elements.nodes[state.id as usize];
-        Self {
-            name: node.name.as_str(),
-            role: &node.role,
-            state: state.state.word(),
-            degree: state.degree.word(),
-            evidence: words(node.evidence),
-            first_ns: nanos(node.first),
-            last_ns: nanos(node.last),
-            runs: Runs(&node.runs),
-            hz: state.hz,
-            lifecycle: state.lifecycle.as_deref(),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct TopicRow<'a> {
-    name: &'a str,
-    types: Vec<&'a str>,
-    state: &'a str,
-    degree: &'a str,
-    evidence: Vec<&'static str>,
-    count: u64,
-    bytes: Option<u64>,
-    hz: Option<f64>,
-    median_period_s: Option<f64>,
-    max_gap_s: Option<f64>,
-    qos: Option<&'a str>,
-    unknown_publishers: Option<u32>,
-    first_ns: Option<i64>,
-    last_ns: Option<i64>,
-    runs: Runs<'a>,
-}
-
-impl<'a> TopicRow<'a> {
-    fn new(state: &'a TopicState, elements: &'a Elements) -> Self {
-        let topic = &elements.topics[state.id as usize];
-        Self {
-            name: topic.name.as_str(),
-            types: topic.types.iter().map(AsRef::as_ref).collect(),
-            state: state.state.word(),
-            degree: state.degree.word(),
-            evidence: words(topic.evidence),
-            count: state.count,
-            bytes: state.bytes,
-            hz: state.hz,
-            median_period_s: state.median_period_s,
-            max_gap_s: state.max_gap_s,
-            qos: topic.qos.as_deref(),
-            unknown_publishers: topic.unknown_publishers,
-            first_ns: nanos(topic.first),
-            last_ns: nanos(topic.last),
-            runs: Runs(&topic.runs),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct PublishRow<'a> {
-    node: &'a str,
-    topic: &'a str,
-    #[serde(flatten)]
-    rest: EdgeRow<'a>,
-}
-
-#[derive(Serialize)]
-struct SubscribeRow<'a> {
-    topic: &'a str,
-    node: &'a str,
-    #[serde(flatten)]
-    rest: EdgeRow<'a>,
-}
-
-#[derive(Serialize)]
-struct EdgeRow<'a> {
-    state: &'a str,
-    degree: &'a str,
-    evidence: Vec<&'static str>,
-    count: Option<u64>,
-    hz: Option<f64>,
-    first_ns: Option<i64>,
-    last_ns: Option<i64>,
-    runs: Runs<'a>,
-}
-
-impl<'a> EdgeRow<'a> {
-    fn new(state: &'a EdgeState, edge: &'a Edge) -> Self {
-        Self {
-            state: state.state.word(),
-            degree: state.degree.word(),
-            evidence: words(edge.evidence),
-            count: state.count,
-            hz: state.hz,
-            first_ns: nanos(edge.first),
-            last_ns: nanos(edge.last),
-            runs: Runs(&edge.runs),
-        }
-    }
-}
-
-fn ends<'a>(edge: &Edge, elements: &'a Elements) -> (&'a str, &'a str) {
-    let node = elements.nodes[edge.node as usize].name.as_str();
-    (node, elements.topics[edge.topic as usize].name.as_str())
-}
-
-impl<'a> PublishRow<'a> {
-    fn new(state: &'a EdgeState, elements: &'a Elements) -> Self {
-        let edge = &elements.publishes[state.id as usize];
-        let (node, topic) = ends(edge, elements);
-        Self {
-            node,
-            topic,
-            rest: EdgeRow::new(state, edge),
-        }
-    }
-}
-
-impl<'a> SubscribeRow<'a> {
-    fn new(state: &'a EdgeState, elements: &'a Elements) -> Self {
-        let edge = &elements.subscribes[state.id as usize];
-        let (node, topic) = ends(edge, elements);
-        Self {
-            topic,
-            node,
-            rest: EdgeRow::new(state, edge),
-        }
-    }
-}
-
-/// An element by its name, or an edge by its two.
-#[derive(Serialize)]
-pub(crate) struct Named<'a> {
-    what: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    name: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    node: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    topic: Option<&'a str>,
-}
-
-impl<'a> Named<'a> {
-    pub(crate) fn new(what: Element, elements: &'a Elements) -> Self {
-        let alone = |name: &'a str| Self {
-            what: what.word(),
-            name: Some(name),
-            node: None,
-            topic: None,
-        };
-        let between = |edge: &Edge| {
-            let (node, topic) = ends(edge, elements);
-            Self {
-                what: what.word(),
-                name: None,
-                node: Some(node),
-                topic: Some(topic),
-            }
-        };
-        match what {
-            Element::Node(id) => alone(elements.nodes[id as usize].name.as_str()),
-            Element::Topic(id) => alone(elements.topics[id as usize].name.as_str()),
-            Element::Publish(id) => between(&elements.publishes[id as usize]),
-            Element::Subscribe(id) => between(&elements.subscribes[id as usize]),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct ChangeRow<'a> {
-    kind: &'static str,
-    entry: EntryId,
-    #[serde(flatten)]
-    named: Named<'a>,
-    #[serde(flatten)]
-    rest: ChangeValues<'a>,
-}
-
-#[derive(Serialize)]
-#[serde(untagged)]
-enum ChangeValues<'a> {
-    Time {
-        time_ns: Option<i64>,
-    },
-    Rate {
-        from_hz: f64,
-        to_hz: f64,
-    },
-    Hands {
-        from: Vec<&'a str>,
-        to: Vec<&'a str>,
-    },
-    Value {
-        from: String,
-        to: String,
-    },
-}
-
-impl<'a> ChangeRow<'a> {
-    fn new(change: &Change, entry: EntryId, elements: &'a Elements) -> Self {
-        let names = |nodes: &[u32]| {
-            nodes
-                .iter()
-                .map(|n| elements.nodes[*n as usize].name.as_str())
-                .collect()
-        };
-        let time = |time: Option<Stamp>| ChangeValues::Time {
-            time_ns: nanos(time),
-        };
-        let (what, rest) = match change {
-            Change::Added { what, time: at } | Change::Removed { what, time: at } => {
-                (*what, time(*at))
-            }
-            Change::Restarted { node, time: at } => (Element::Node(*node), time(Some(*at))),
-            Change::Rate {
-                what,
-                from_hz,
-                to_hz,
-            } => (
-                *what,
-                ChangeValues::Rate {
-                    from_hz: *from_hz,
-                    to_hz: *to_hz,
-                },
-            ),
-            Change::HandedOver { topic, from, to } => (
-                Element::Topic(*topic),
-                ChangeValues::Hands {
-                    from: names(from),
-                    to: names(to),
-                },
-            ),
-            Change::Value { what, from, to, .. } => (
-                *what,
-                ChangeValues::Value {
-                    from: from.to_string(),
-                    to: to.to_string(),
-                },
-            ),
-        };
-        Self {
-            kind: change.word(),
-            entry,
-            named: Named::new(what, elements),
-            rest,
-        }
-    }
 }

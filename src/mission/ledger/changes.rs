@@ -9,18 +9,18 @@ use crate::graph::{Element, Elements, Graph};
 use crate::mission::Window;
 
 /// What is different in each window from the one before, with the places of the entries that tell why.
-pub(crate) fn explain<'g>(
-    windows: impl Iterator<Item = (Span, &'g Graph)>,
+pub(crate) fn explain(
+    windows: impl Iterator<Item = (Span, Graph)>,
     elements: &Elements,
     ledger: &Ledger,
 ) -> Vec<(Vec<Change>, Vec<EntryId>)> {
     let turns = Turns::new(ledger);
-    let mut before: Option<(Span, &Graph)> = None;
+    let mut before: Option<(Span, Graph)> = None;
     let mut all = Vec::new();
     for (span, graph) in windows {
         let mut list = Vec::new();
-        if let Some((old_span, old)) = before {
-            structure(old, graph, span, elements, &turns, &mut list);
+        if let Some((old_span, old)) = &before {
+            structure(old, &graph, span, elements, &turns, &mut list);
             let news = Span {
                 start: old_span.end.max(span.start),
                 end: span.end,

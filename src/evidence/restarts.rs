@@ -6,8 +6,8 @@ use std::io;
 
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
-use crate::evidence::collector::Collected;
-use crate::evidence::proof::{Key, Proof, Reliability, Validity};
+use crate::evidence::collector::Recorded;
+use crate::evidence::proof::{Key, Proof, Reliability, Stream, Validity};
 use crate::evidence::times::SeriesId;
 
 /// A break in a node's life: its last sign before, its first one after.
@@ -30,18 +30,21 @@ const RHYTHM: usize = 5;
 const LATCHED: u64 = 20;
 
 /// Finds the restarts of all nodes; `proofs` tell what others say about a node, which may lag behind its end.
-pub(crate) fn restarts(collected: &mut Collected, proofs: &[Proof]) -> io::Result<Restarts> {
+pub(crate) fn restarts(
+    recorded: &Recorded,
+    streams: &[Stream],
+    proofs: &[Proof],
+) -> io::Result<Restarts> {
     let mut all = Restarts::new();
-    for (node, streams) in own_streams(collected) {
-        let mut breaks = fallen_back(collected, &streams)?;
-        if breaks.is_empty() && !streams.iter().any(|s| may_be_sent_again(collected, *s)) {
+    for (node, own) in own_streams(streams) {
+        let mut breaks = fallen_back(recorded, &own)?;
+        let own: Vec<&Stream> = own.iter().map(|at| &streams[*at]).collect();
+        if breaks.is_empty() && !own.iter().any(|s| may_be_sent_again(recorded, s)) {
             continue;
         }
-        let times = streams
-            .iter()
-            .map(|s| collected.messages.times(collected.streams[*s].times));
+        let times = own.iter().map(|s| recorded.messages.times(s.times));
         let times = times.collect::<io::Result<Vec<_>>>()?;
-        breaks.extend(sent_again(collected, &streams, &times));
+        breaks.extend(sent_again(recorded, &own, &times));
         let breaks = narrowed(breaks);
         if !breaks.is_empty() {
             let mut signs: Vec<Stamp> = times.concat();
@@ -57,9 +60,9 @@ pub(crate) fn restarts(collected: &mut Collected, proofs: &[Proof]) -> io::Resul
 }
 
 /// The streams of each publisher that is believed.
-fn own_streams(collected: &Collected) -> BTreeMap<Name, Vec<usize>> {
+fn own_streams(streams: &[Stream]) -> BTreeMap<Name, Vec<usize>> {
     let mut of: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
-    for (at, stream) in collected.streams.iter().enumerate() {
+    for (at, stream) in streams.iter().enumerate() {
         if let Some(node) = stream
             .speaker
             .filter(|_| stream.trust == Reliability::Whole)
@@ -87,18 +90,18 @@ fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
 }
 
 /// Stretches of time in which a sequence number of these streams falls back.
-fn fallen_back(collected: &mut Collected, streams: &[usize]) -> io::Result<Vec<(Stamp, Stamp)>> {
+fn fallen_back(recorded: &Recorded, streams: &[usize]) -> io::Result<Vec<(Stamp, Stamp)>> {
     let mut topics: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
     for stream in streams {
-        if let Some(id) = collected.facts.sequences.get(stream) {
-            let topic = collected.streams[*stream].topic;
+        if let Some(id) = recorded.facts.sequences.get(stream) {
+            let topic = recorded.streams[*stream].topic;
             topics.entry(topic).or_default().push(*id);
         }
     }
     let mut found = Vec::new();
     for ids in topics.values() {
         let mut before: Option<(Stamp, u32)> = None;
-        collected.facts.times.merge(ids, |timed| {
+        recorded.facts.times.merge(ids, |timed| {
             let (time, number) = (timed.time, timed.size);
             if let Some((last, highest)) = before
                 && number < highest
@@ -114,19 +117,19 @@ fn fallen_back(collected: &mut Collected, streams: &[usize]) -> io::Result<Vec<(
 
 /// Stretches of time that end with a latched message sent again, in which no stream with a rhythm spoke.
 fn sent_again(
-    collected: &Collected,
-    streams: &[usize],
+    recorded: &Recorded,
+    streams: &[&Stream],
     times: &[Vec<Stamp>],
 ) -> Vec<(Stamp, Stamp)> {
     let rhythms: Vec<&Vec<Stamp>> = streams
         .iter()
         .zip(times)
-        .filter(|(s, times)| !collected.streams[**s].latched && times.len() >= RHYTHM)
+        .filter(|(s, times)| !s.latched && times.len() >= RHYTHM)
         .map(|(_, times)| times)
         .collect();
     let mut found = Vec::new();
     for (stream, latched) in streams.iter().zip(times) {
-        if !may_be_sent_again(collected, *stream) || rhythms.is_empty() {
+        if !may_be_sent_again(recorded, stream) || rhythms.is_empty() {
             continue;
         }
         for again in latched.iter().skip(1) {
@@ -141,9 +144,8 @@ fn sent_again(
 }
 
 /// Whether a latched stream has few messages, but more than one.
-fn may_be_sent_again(collected: &Collected, stream: usize) -> bool {
-    let stream = &collected.streams[stream];
-    stream.latched && (2..=LATCHED).contains(&collected.messages.count(stream.times))
+fn may_be_sent_again(recorded: &Recorded, stream: &Stream) -> bool {
+    stream.latched && (2..=LATCHED).contains(&recorded.messages.count(stream.times))
 }
 
 /// Since when a stream with a rhythm is silent at `at`, if that is long for it and it spoke before and after.

@@ -17,13 +17,13 @@ pub(crate) struct Values {
 }
 
 impl Values {
-    pub(crate) fn new(facts: &mut Claims, role: impl Fn(Name) -> Name) -> io::Result<Self> {
+    pub(crate) fn new(facts: &Claims, role: impl Fn(Name) -> Name) -> io::Result<Self> {
         let mut all = Self::default();
-        for fact in facts.list.clone() {
+        for fact in &facts.list {
             match fact.claim {
                 Claim::Lifecycle(node, state) => {
                     let state = facts.text(state);
-                    let times = facts.times(&fact)?.into_iter();
+                    let times = facts.times(fact)?.into_iter();
                     let states = all.states.entry(role(node)).or_default();
                     states.extend(times.map(|time| (time, Arc::clone(&state))));
                 }

@@ -1,31 +1,81 @@
-//! Everything that is known about a mission: what sources conclude and the user tells, under names in order.
+//! From everything recorded to what follows from it: the proofs of all sources and of the user's files, values that
+//! somebody states, restarts. Made once, for whatever windows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::Arc;
 
-use super::Options;
+use super::collector::{Recorded, spool_error};
+use super::restarts::{Restarts, restarts};
 use super::values::Values;
-use crate::base::notice::{Notice, NoticeKind};
+use crate::base::error::Result;
+use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::role::role;
 use crate::base::time::Stamp;
-use crate::evidence::claim::Name;
-use crate::evidence::code::matching;
-use crate::evidence::collector::Collected;
-use crate::evidence::proof::{Findings, Key, Proof, Validity};
+use crate::evidence::claim::{Claims, Name};
+use crate::evidence::code::{Code, matching};
+use crate::evidence::proof::{Conclusions, Key, Proof, Stream, Validity, offers};
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::nearest::nearest;
-use crate::evidence::topology::{Element, Entry};
+use crate::evidence::topology::{Element, Entry, Topology};
 use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
 
-/// All proofs and stated values, and which of the user's names are strange. Names are numbered anew in the order of their texts.
-pub(crate) fn prove(
-    collected: &mut Collected,
-    options: &Options,
-) -> io::Result<(Vec<Proof>, Values, matching::Outcome)> {
-    let start = collected.span.map_or(Stamp(0), |s| s.start);
-    let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
-    let mut known = Findings::new(&collected.streams, &mut collected.facts, (start, end));
+/// What is added to what the bags tell.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Whether nodes whose names differ only in an anonymous suffix are one, under the name of their role.
+    pub roles: bool,
+    /// Nodes and edges that the user knows of.
+    pub topology: Topology,
+    /// What source code declares.
+    pub code: Option<Arc<Code>>,
+}
+
+/// What follows from everything recorded, under names that are numbered in the order of their texts.
+#[derive(Debug)]
+pub struct Findings {
+    /// The mission's first and last moment.
+    pub(crate) mission: (Stamp, Stamp),
+    /// The connections, as in [`Recorded`] but for the numbers of names.
+    pub(crate) streams: Vec<Stream>,
+    /// Every reason to believe in an element.
+    pub(crate) proofs: Vec<Proof>,
+    /// When nodes began anew under the same name.
+    pub(crate) restarts: Restarts,
+    /// What somebody states of elements besides their being there.
+    pub(crate) values: Values,
+    /// How many publishers the bags count on each topic.
+    pub(crate) offers: BTreeMap<Name, u32>,
+    /// The texts of all names.
+    names: Vec<Arc<str>>,
+    /// Every piece of evidence on what [`super::collector::Options::why`] asks for, in order of time, source and text.
+    pub lines: Vec<EvidenceLine>,
+    /// What is worth saying about what the user gave.
+    pub notices: Notices,
+    /// What source code offers and was not drawn, a line each.
+    pub undrawn: Vec<String>,
+}
+
+impl Findings {
+    /// The text of a name.
+    pub(crate) fn text(&self, name: Name) -> Arc<str> {
+        let text = self.names.get(name.0 as usize);
+        text.map_or_else(|| "".into(), Arc::clone)
+    }
+}
+
+/// Draws every conclusion.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub fn conclude(recorded: &Recorded, options: &Options) -> Result<Findings> {
+    findings(recorded, options).map_err(spool_error)
+}
+
+fn findings(recorded: &Recorded, options: &Options) -> io::Result<Findings> {
+    let start = recorded.span.map_or(Stamp(0), |s| s.start);
+    let end = recorded.span.map_or(Stamp(0), |s| s.end.plus(-1));
+    let mut known = Conclusions::new(&recorded.streams, recorded.facts.clone(), (start, end));
     known.take_at_their_word();
     for (row, source) in SOURCES.iter().enumerate() {
         for conclude in source.conclude {
@@ -37,38 +87,62 @@ pub(crate) fn prove(
         told(&mut known, entry, (start, end));
     }
     let code = options.code.as_ref();
-    let told_by_code = code.map(|code| matching::conclude(code, &mut known));
+    let code = code.map(|code| matching::conclude(code, &mut known));
+    let code = code.unwrap_or_default();
     unknown::conclude(&mut known);
-    explain(&mut known, &collected.messages);
+    explain(&mut known, &recorded.messages);
     if let Some(error) = known.failed {
         return Err(error);
     }
-    let mut proofs = known.proofs;
+    let Conclusions {
+        mut facts,
+        mut proofs,
+        ..
+    } = known;
     let roles = if options.roles {
-        fold(&mut proofs, collected)
+        fold(&mut proofs, &mut facts)
     } else {
         BTreeMap::new()
     };
-    let new = collected.facts.renumber();
+    let new = facts.renumber();
     let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
     for proof in &mut proofs {
         proof.rename(&to);
     }
     let roles: BTreeMap<Name, Name> = roles.into_iter().map(|(a, b)| (to(a), to(b))).collect();
     let role = |name: Name| roles.get(&name).copied().unwrap_or(name);
-    for stream in &mut collected.streams {
-        stream.topic = to(stream.topic);
-        stream.publisher = stream.publisher.map(to);
-        stream.speaker = stream.publisher.map(role);
-    }
-    let values = Values::new(&mut collected.facts, role)?;
-    let mut code = told_by_code.unwrap_or_default();
-    code.notices.extend(strange);
-    Ok((proofs, values, code))
+    let renamed = |stream: &Stream| {
+        let publisher = stream.publisher.map(to);
+        Stream {
+            topic: to(stream.topic),
+            publisher,
+            speaker: publisher.map(role),
+            ..stream.clone()
+        }
+    };
+    let streams: Vec<Stream> = recorded.streams.iter().map(renamed).collect();
+    let mut notices = Notices::new();
+    let told = options.topology.notices.iter().cloned();
+    notices.extend(told.chain(code.notices).chain(strange));
+    let mut lines = std::mem::take(&mut facts.pieces);
+    lines.sort_unstable();
+    lines.dedup();
+    Ok(Findings {
+        mission: (start, end),
+        restarts: restarts(recorded, &streams, &proofs)?,
+        values: Values::new(&facts, role)?,
+        offers: offers(&facts.offers, &streams),
+        names: facts.into_texts(),
+        streams,
+        proofs,
+        lines,
+        notices,
+        undrawn: code.undrawn,
+    })
 }
 
 /// Names of the user's that nothing in the bags bears: topics, and nodes that come close to one that is known.
-fn strangers(known: &Findings<'_>, entries: &[Entry]) -> Vec<Notice> {
+fn strangers(known: &Conclusions<'_>, entries: &[Entry]) -> Vec<Notice> {
     let texts = |names: &mut dyn Iterator<Item = Name>| -> BTreeSet<Arc<str>> {
         names.map(|name| known.text(name)).collect()
     };
@@ -105,7 +179,7 @@ fn strangers(known: &Findings<'_>, entries: &[Entry]) -> Vec<Notice> {
 }
 
 /// Puts into words what rests on no single message, for elements that somebody asked about.
-fn explain(known: &mut Findings<'_>, messages: &Stamps) {
+fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     let name = |name: Name| known.facts.text(name);
     let told = |what| match what {
         Key::Node(node) => format!("{} lives", name(node)),
@@ -164,7 +238,7 @@ fn explain(known: &mut Findings<'_>, messages: &Stamps) {
 }
 
 /// Adds what the user's file says to what is known.
-fn told(known: &mut Findings<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
+fn told(known: &mut Conclusions<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
     let mut name = |text: &String| known.facts.name(text);
     let what = match &entry.element {
         Element::Node(node) => Key::Node(name(node)),
@@ -208,14 +282,14 @@ fn told(known: &mut Findings<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
 }
 
 /// Puts every node under the name of its role; tells which names changed.
-fn fold(proofs: &mut [Proof], collected: &mut Collected) -> BTreeMap<Name, Name> {
+fn fold(proofs: &mut [Proof], facts: &mut Claims) -> BTreeMap<Name, Name> {
     let mut roles = BTreeMap::new();
     let mut to = |node: Name| {
-        let text = collected.facts.text(node);
+        let text = facts.text(node);
         match role(&text) {
             same if *same == *text => node,
             role => {
-                let role = collected.facts.name(role);
+                let role = facts.name(role);
                 roles.insert(node, role);
                 role
             }

@@ -1,0 +1,203 @@
+//! The tables of elements with a row per run of windows in which an element is the same, for `--runs`.
+
+use std::collections::BTreeSet;
+
+use super::mission::{Row, text, time, words};
+use crate::base::table::Cell;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::Degree;
+use crate::graph::diff::Change;
+use crate::graph::{self, Edge, Element, State};
+use crate::mission::Mission;
+
+/// Neighbouring windows in which an element has one state, and between which the ledger tells no change of its rate.
+struct Run {
+    first: usize,
+    last: usize,
+    state: State,
+    degree: Degree,
+    lifecycle: u32,
+    count: Option<u64>,
+    bytes: Option<u64>,
+    gap: Option<f64>,
+    median: Option<f64>,
+}
+
+impl Run {
+    fn of(at: usize, row: &graph::Row) -> Self {
+        Self {
+            first: at,
+            last: at,
+            state: row.state,
+            degree: row.degree,
+            lifecycle: row.lifecycle,
+            count: row.count,
+            bytes: row.bytes,
+            gap: row.gap.value(),
+            median: row.median.value(),
+        }
+    }
+
+    fn goes_on(&self, at: usize, row: &graph::Row) -> bool {
+        let look = (self.state, self.degree, self.lifecycle);
+        self.last + 1 == at && look == (row.state, row.degree, row.lifecycle)
+    }
+
+    /// Takes in the next window, of which a median and the gap to the one before are not known.
+    fn take(&mut self, at: usize, row: &graph::Row) {
+        self.last = at;
+        self.count = add(self.count, row.count);
+        self.bytes = add(self.bytes, row.bytes);
+        (self.gap, self.median) = (None, None);
+    }
+
+    /// Its first window, its times, and its length.
+    fn cells(&self, mission: &Mission) -> [Cell<'static>; 4] {
+        let span = self.span(mission);
+        [
+            Cell::count(self.first as u64),
+            time(Some(span.start)),
+            time(Some(span.end)),
+            Cell::Int(span.nanos()),
+        ]
+    }
+
+    fn span(&self, mission: &Mission) -> Span {
+        let at = |place: usize| mission.windows.get(place).map(|w| w.span);
+        Span {
+            start: at(self.first).map_or(Stamp(0), |span| span.start),
+            end: at(self.last).map_or(Stamp(0), |span| span.end),
+        }
+    }
+
+    /// Messages in it, and how many a second; unknown where windows overlap and count messages twice.
+    fn sent(&self, mission: &Mission) -> (Option<u64>, Option<f64>) {
+        let is_one = self.first == self.last || mission.step == mission.period;
+        let count = self.count.filter(|_| is_one);
+        let hz = count.and_then(|count| graph::per_second(count, self.span(mission)));
+        (count, hz)
+    }
+}
+
+fn add(a: Option<u64>, b: Option<u64>) -> Option<u64> {
+    Some(a?.saturating_add(b?))
+}
+
+/// The runs of an element, in order.
+fn runs(mission: &Mission, turns: &BTreeSet<(Element, usize)>, what: Element) -> Vec<Run> {
+    let mut all: Vec<Run> = Vec::new();
+    for (at, row) in mission.graphs.rows(what) {
+        let turns = turns.contains(&(what, at));
+        match all.last_mut() {
+            Some(run) if !turns && run.goes_on(at, &row) => run.take(at, &row),
+            _ => all.push(Run::of(at, &row)),
+        }
+    }
+    all
+}
+
+/// The windows in which the rate of an element changes.
+fn turns(mission: &Mission) -> BTreeSet<(Element, usize)> {
+    let changes = mission.windows.iter().enumerate();
+    let changes = changes.flat_map(|(at, w)| w.changes.iter().map(move |change| (at, change)));
+    let rate = |(at, change): (usize, &Change)| match change {
+        Change::Rate { what, .. } => Some((*what, at)),
+        _ => None,
+    };
+    changes.filter_map(rate).collect()
+}
+
+pub(super) fn nodes(mission: &Mission, row: Row<'_>) {
+    let turns = turns(mission);
+    for (id, node) in (0..).zip(&mission.elements.nodes) {
+        for run in runs(mission, &turns, Element::Node(id)) {
+            let [win, start, end, length] = run.cells(mission);
+            let lifecycle = mission.graphs.lifecycle_of(run.lifecycle);
+            row(&[
+                win,
+                start,
+                end,
+                length,
+                Cell::text(node.name.as_str()),
+                Cell::text(&*node.role),
+                Cell::text(run.state.word()),
+                Cell::text(run.degree.word()),
+                words(node.evidence),
+                Cell::known(run.sent(mission).1, Cell::Float),
+                text(lifecycle),
+                time(node.first),
+                time(node.last),
+            ]);
+        }
+    }
+}
+
+pub(super) fn topics(mission: &Mission, row: Row<'_>) {
+    let turns = turns(mission);
+    for (id, topic) in (0..).zip(&mission.elements.topics) {
+        for run in runs(mission, &turns, Element::Topic(id)) {
+            let [win, start, end, length] = run.cells(mission);
+            let (count, hz) = run.sent(mission);
+            row(&[
+                win,
+                start,
+                end,
+                length,
+                Cell::text(topic.name.as_str()),
+                Cell::text(topic.types.join(" ")),
+                Cell::text(run.state.word()),
+                Cell::text(run.degree.word()),
+                words(topic.evidence),
+                Cell::known(count, Cell::count),
+                Cell::known(run.bytes.filter(|_| count.is_some()), Cell::count),
+                Cell::known(hz, Cell::Float),
+                Cell::known(run.median, Cell::Float),
+                Cell::known(run.gap, Cell::Float),
+                text(topic.qos.as_deref()),
+                time(topic.first),
+                time(topic.last),
+            ]);
+        }
+    }
+}
+
+pub(super) fn edges(mission: &Mission, row: Row<'_>) {
+    let turns = turns(mission);
+    let all = &mission.elements;
+    let publishes = (0..).zip(&all.publishes);
+    let publishes = publishes.map(|(id, edge)| (Element::Publish(id), edge));
+    let subscribes = (0..).zip(&all.subscribes);
+    let subscribes = subscribes.map(|(id, edge)| (Element::Subscribe(id), edge));
+    for (what, edge) in publishes.chain(subscribes) {
+        edge_rows(mission, &turns, (what, edge), row);
+    }
+}
+
+fn edge_rows(
+    mission: &Mission,
+    turns: &BTreeSet<(Element, usize)>,
+    (what, edge): (Element, &Edge),
+    row: Row<'_>,
+) {
+    let elements = &mission.elements;
+    for run in runs(mission, turns, what) {
+        let [win, start, end, length] = run.cells(mission);
+        let (count, hz) = run.sent(mission);
+        row(&[
+            win,
+            start,
+            end,
+            length,
+            Cell::text(what.word()),
+            Cell::text(elements.nodes[edge.node as usize].name.as_str()),
+            Cell::text(elements.topics[edge.topic as usize].name.as_str()),
+            Cell::text(run.state.word()),
+            Cell::text(run.degree.word()),
+            words(edge.evidence),
+            Cell::known(count, Cell::count),
+            Cell::known(hz, Cell::Float),
+            time(edge.first),
+            time(edge.last),
+        ]);
+    }
+}

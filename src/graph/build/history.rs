@@ -1,0 +1,339 @@
+//! The elements of the mission with all that holds whatever the windows: when each lived, how it sent, when it was
+//! silent.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::Arc;
+
+use super::liveness::{Lifetime, Liveness};
+use super::merged::fall_silent;
+use super::senders::{Traffic, traffic};
+use super::settle::settle;
+use super::tracks::{Tracks, tracks};
+use crate::base::error::Result;
+use crate::base::role::role;
+use crate::base::time::{Span, Stamp};
+use crate::evidence::Degree;
+use crate::evidence::claim::Name;
+use crate::evidence::collector::{Recorded, spool_error};
+use crate::evidence::conclude::Findings;
+use crate::evidence::proof::Key;
+use crate::graph::lives::{
+    Bound, Known, Life, Lives, Stretch, Transition, Voice, all_silent, silences,
+};
+use crate::graph::sending::Sending;
+use crate::graph::{Edge, Elements, Node, NodeId, State, Topic, TopicId};
+
+/// The elements of a mission, and what holds of them whatever the windows.
+#[derive(Debug, Default)]
+pub(crate) struct History {
+    /// Everything that ever is in it.
+    pub elements: Elements,
+    /// When everything lived, and how it sent.
+    pub lives: Lives,
+    /// When messages came, as figures show it.
+    pub sending: Sending,
+    /// Of each node, in order.
+    pub(crate) nodes: Vec<Course>,
+    /// Of each topic.
+    pub(crate) topics: Vec<Course>,
+    /// Of each publication.
+    pub(crate) publishes: Vec<Course>,
+    /// Of each subscription.
+    pub(crate) subscribes: Vec<Course>,
+    pub(crate) node_ids: BTreeMap<Name, NodeId>,
+    pub(crate) topic_ids: BTreeMap<Name, TopicId>,
+    /// The places of each topic's streams.
+    pub(crate) streams: BTreeMap<Name, Vec<usize>>,
+}
+
+/// How one element looks over the mission but for its messages.
+#[derive(Clone, Debug)]
+pub(crate) struct Course {
+    pub(crate) lives: Vec<Lifetime>,
+    pub(crate) degree: Degree,
+    /// The state that nothing changes while it lives: declared or latched.
+    fixed: Option<State>,
+    /// Whether it is silent without a message in the window.
+    needs_messages: bool,
+    /// When it was silent although it lived.
+    silences: Vec<(Stamp, Option<Stamp>)>,
+}
+
+impl Course {
+    fn new(track: &Liveness, silences: Vec<(Stamp, Option<Stamp>)>) -> Self {
+        let fixed = match () {
+            () if track.is_declared() => Some(State::Declared),
+            () if track.is_latched() => Some(State::Latched),
+            () => None,
+        };
+        Self {
+            lives: track.lives.clone(),
+            degree: track.degree,
+            fixed,
+            needs_messages: track.senders.0 == 0,
+            silences,
+        }
+    }
+
+    /// Its state in a window where it lives, with messages of its own or without.
+    pub(crate) fn state(&self, window: Span, has_messages: bool) -> State {
+        let covers = |(from, to): &(Stamp, Option<Stamp>)| {
+            *from < window.start && to.is_none_or(|to| window.end <= to)
+        };
+        match self.fixed {
+            Some(state) => state,
+            None if has_messages => State::Active,
+            None if self.needs_messages || self.silences.iter().any(covers) => State::Silent,
+            None => State::Active,
+        }
+    }
+
+    /// Whether nothing but a header or a file tells of it.
+    pub(crate) fn is_declared(&self) -> bool {
+        self.fixed == Some(State::Declared)
+    }
+}
+
+/// Works out who lived when, and how it sent.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub(crate) fn history(recorded: &Recorded, findings: &Findings) -> Result<History> {
+    told(recorded, findings).map_err(spool_error)
+}
+
+fn told(recorded: &Recorded, findings: &Findings) -> io::Result<History> {
+    let traffic = traffic(recorded, findings)?;
+    let mut tracks = tracks(recorded, findings, &traffic)?;
+    fall_silent(&mut tracks, &traffic, findings);
+    let (proofs, restarts) = (&findings.proofs, &findings.restarts);
+    settle(&mut tracks, proofs, restarts, findings.mission);
+    Ok(assembled(&tracks, &traffic, findings))
+}
+
+/// Lists every element. Tracks come in the order of the elements' names.
+fn assembled(tracks: &Tracks, traffic: &Traffic, findings: &Findings) -> History {
+    let streams = traffic
+        .iter()
+        .map(|(topic, of)| (*topic, of.streams.clone()));
+    let mut all = Assembly {
+        history: History {
+            streams: streams.collect(),
+            ..History::default()
+        },
+        findings,
+        traffic,
+        publishers: BTreeMap::new(),
+    };
+    for (what, track) in tracks {
+        if let (Key::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
+            *all.publishers.entry(*topic).or_default() += 1;
+        }
+    }
+    for (what, track) in tracks {
+        match *what {
+            Key::Node(node) => all.node(node, track),
+            Key::Topic(topic) => all.topic(topic, track),
+            Key::Publish(node, topic) => all.publish(node, topic, track),
+            Key::Subscribe(topic, node) => all.subscribe(topic, node, track),
+        }
+    }
+    all.voices();
+    all.transitions();
+    all.history
+}
+
+struct Assembly<'a> {
+    history: History,
+    findings: &'a Findings,
+    traffic: &'a Traffic,
+    /// How many nodes are known to publish each topic.
+    publishers: BTreeMap<Name, u32>,
+}
+
+impl Assembly<'_> {
+    /// Tells what every sender sent.
+    fn voices(&mut self) {
+        for (topic, of) in self.traffic {
+            let Some(id) = self.history.topic_ids.get(topic) else {
+                continue;
+            };
+            for sender in of.list.iter().filter(|s| !s.stretches.is_empty()) {
+                let node = sender.node.and_then(|n| self.history.node_ids.get(&n));
+                self.history.lives.voices.push(Voice {
+                    topic: *id,
+                    node: node.copied(),
+                    is_latched: sender.latched,
+                    stretches: sender.stretches.clone(),
+                });
+            }
+        }
+    }
+
+    /// Tells when nodes changed their lifecycle states.
+    fn transitions(&mut self) {
+        for (node, id) in &self.history.node_ids {
+            let states = self.findings.values.transitions(*node);
+            let states = states.map(|(time, state)| Transition {
+                node: *id,
+                time: *time,
+                state: Arc::clone(state),
+            });
+            self.history.lives.transitions.extend(states);
+        }
+        let order = |t: &Transition| (t.time, t.node);
+        self.history.lives.transitions.sort_by_key(order);
+    }
+
+    fn node(&mut self, name: Name, track: &Liveness) {
+        let silent = self.node_silences(name, &spans(track));
+        let all = &mut self.history;
+        all.node_ids.insert(name, next(all.elements.nodes.len()));
+        let (first, last) = track.bounds();
+        let text = self.findings.text(name);
+        all.elements.nodes.push(Node {
+            role: role(&text).into(),
+            name: text.into(),
+            evidence: track.evidence,
+            first,
+            last,
+            runs: spans(track),
+        });
+        all.lives.nodes.push(known(track, self.findings.mission));
+        let mut course = Course::new(track, silent);
+        // A node lives by more than messages.
+        course.needs_messages = false;
+        if track.speaks && !course.is_declared() {
+            course.fixed = None;
+        }
+        all.nodes.push(course);
+    }
+
+    fn topic(&mut self, name: Name, track: &Liveness) {
+        let silent = self.topic_silences(name, &spans(track));
+        let unknown_publishers = self.unknown_publishers(name);
+        let traffic = self.traffic.get(&name);
+        let streams = traffic.iter().flat_map(|of| &of.streams);
+        let values = &self.findings.values;
+        let mut types: Vec<_> = streams
+            .map(|s| self.findings.streams[*s].connection.type_name.clone())
+            .chain(values.types(name))
+            .filter(|name| !name.is_empty())
+            .collect();
+        types.sort_unstable();
+        types.dedup();
+        let (first, last) = track.bounds();
+        let all = &mut self.history;
+        all.topic_ids.insert(name, next(all.elements.topics.len()));
+        all.elements.topics.push(Topic {
+            name: self.findings.text(name).into(),
+            types,
+            evidence: track.evidence,
+            first,
+            last,
+            qos: values.quality(name),
+            runs: spans(track),
+            unknown_publishers,
+        });
+        let sending = traffic.map(|of| of.sending.clone());
+        all.sending.topics.push(sending.unwrap_or_default());
+        all.lives.topics.push(known(track, self.findings.mission));
+        all.topics.push(Course::new(track, silent));
+    }
+
+    /// How many publishers of a topic the bag counts beyond those that are known.
+    fn unknown_publishers(&self, topic: Name) -> Option<u32> {
+        let counted = *self.findings.offers.get(&topic)?;
+        let known = self.publishers.get(&topic).copied().unwrap_or(0);
+        Some(counted.saturating_sub(known))
+    }
+
+    fn publish(&mut self, node: Name, topic: Name, track: &Liveness) {
+        let edge = self.edge(node, topic, track);
+        let senders = self.traffic.get(&topic).map(|of| &of.list);
+        let sender = senders.and_then(|all| all.iter().find(|s| s.node == Some(node)));
+        let stretches = sender.map_or(&[][..], |s| &s.stretches);
+        let all = &mut self.history;
+        all.elements.publishes.push(edge);
+        let sending = sender.map(|s| s.sending.clone());
+        all.sending.publishes.push(sending.unwrap_or_default());
+        let silent = silences(stretches, &spans(track));
+        all.lives
+            .publishes
+            .push(known(track, self.findings.mission));
+        all.publishes.push(Course::new(track, silent));
+    }
+
+    fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
+        let edge = self.edge(node, topic, track);
+        let all = &mut self.history;
+        all.elements.subscribes.push(edge);
+        all.lives
+            .subscribes
+            .push(known(track, self.findings.mission));
+        all.subscribes.push(Course::new(track, Vec::new()));
+    }
+
+    fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Edge {
+        let (first, last) = track.bounds();
+        let (nodes, topics) = (&self.history.node_ids, &self.history.topic_ids);
+        Edge {
+            node: nodes.get(&node).copied().unwrap_or(NodeId::MAX),
+            topic: topics.get(&topic).copied().unwrap_or(TopicId::MAX),
+            evidence: track.evidence,
+            first,
+            last,
+            runs: spans(track),
+        }
+    }
+
+    /// When all are silent who send on a topic.
+    fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+        let Some(of) = self.traffic.get(&topic) else {
+            return Vec::new();
+        };
+        let of: Vec<&[Stretch]> = of.list.iter().map(|s| &s.stretches[..]).collect();
+        all_silent(&of, lives)
+    }
+
+    /// When all is silent that a node sends.
+    fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+        let senders = self.traffic.values().flat_map(|of| &of.list);
+        let own = senders.filter(|s| s.node == Some(node) && !s.latched);
+        let of: Vec<&[Stretch]> = own.map(|s| &s.stretches[..]).collect();
+        all_silent(&of, lives)
+    }
+}
+
+/// When an element is there, half-open.
+fn spans(track: &Liveness) -> Vec<Span> {
+    let span = |life: &Lifetime| Span {
+        start: life.from,
+        end: life.to.plus(1),
+    };
+    track.lives.iter().map(span).collect()
+}
+
+/// What is known of an element's lives, inside the mission.
+fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Known {
+    let within = |bound: Bound| Bound {
+        earliest: bound.earliest.max(mission.0),
+        latest: bound.latest.min(mission.1),
+        ..bound
+    };
+    let lives = spans(track).into_iter().zip(&track.lives);
+    let life = |(span, life): (Span, &Lifetime)| Life {
+        span,
+        began: life.began.map(within),
+        ended: life.ended.map(within),
+    };
+    Known {
+        degree: track.degree,
+        lives: lives.map(life).collect(),
+    }
+}
+
+fn next(len: usize) -> u32 {
+    u32::try_from(len).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,153 @@
+//! Every proof on the track of its element: signs, ends and rhythms, from which lives follow.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+
+use super::liveness::{Extent, Liveness, Pulse};
+use super::senders::{Senders, Traffic};
+use crate::base::time::Stamp;
+use crate::evidence::collector::Recorded;
+use crate::evidence::conclude::Findings;
+use crate::evidence::proof::{Key, Proof, Validity};
+use crate::evidence::restarts::Restart;
+use crate::evidence::{Evidence, SOURCES};
+
+/// What is known about the life of every element.
+pub(crate) type Tracks = BTreeMap<Key, Liveness>;
+
+/// Puts the signs of every proof on the track of its element.
+pub(crate) fn tracks(
+    recorded: &Recorded,
+    findings: &Findings,
+    traffic: &Traffic,
+) -> io::Result<Tracks> {
+    let mut tracks = Tracks::new();
+    let sent = sent(&findings.proofs);
+    for proof in &findings.proofs {
+        let node = match proof.what {
+            Key::Node(node) | Key::Publish(node, _) | Key::Subscribe(_, node) => Some(node),
+            Key::Topic(_) => None,
+        };
+        let restarts = node.and_then(|node| findings.restarts.get(&node));
+        let restarts = restarts.map_or(&[][..], Vec::as_slice);
+        let deaths: Vec<Stamp> = restarts.iter().map(|r| r.death).collect();
+        let track = tracks.entry(proof.what).or_default();
+        track.lasts |= lasts(&proof.when);
+        track.evidence = track.evidence.and(Evidence::row(proof.source));
+        track.degree = track.degree.min(proof.degree);
+        match &proof.when {
+            Validity::Messages(at) => {
+                let stream = &findings.streams[*at];
+                let Some(senders) = traffic.get(&stream.topic) else {
+                    continue;
+                };
+                let place = senders.streams.iter().position(|s| s == at).unwrap_or(0);
+                let what = Followed {
+                    known: node.is_none() && sent.contains(at),
+                    beats: stream.connection.topic.as_str() != "/rosout",
+                    restarts,
+                };
+                follow(track, senders, place, &what);
+                if !deaths.is_empty() {
+                    let times = recorded.messages.times(stream.times)?;
+                    track.bound_all(&times, &deaths);
+                }
+            }
+            Validity::First(at) => {
+                let stream = &findings.streams[*at];
+                if let Some(senders) = traffic.get(&stream.topic)
+                    && let Some(place) = senders.streams.iter().position(|s| s == at)
+                    && let Some((first, _)) = senders.traces[place]
+                {
+                    track.bound_all(&[first], &[]);
+                }
+            }
+            Validity::Signs { signs, ends } => {
+                let ends = together(ends, &deaths);
+                track.sign_all(signs, &ends);
+                if SOURCES.get(proof.source).is_some_and(|s| s.own) {
+                    track.heard = track.heard.max(signs.last().copied());
+                    track.speaks = true;
+                }
+            }
+            Validity::Begins { signs, ends } => {
+                let ends = together(ends, &deaths);
+                track.bound_all(signs, &ends);
+            }
+            Validity::Moments(signs) => track.bound_all(signs, &deaths),
+            Validity::Unending => track.unending = true,
+            Validity::Like(_) => {}
+            Validity::Whole => track.extent = track.extent.max(Extent::Whole),
+            Validity::Always => track.extent = Extent::Always,
+        }
+    }
+    for (node, restarts) in &findings.restarts {
+        let track = tracks.entry(Key::Node(*node)).or_default();
+        for restart in restarts {
+            track.signs.extend([restart.death, restart.birth]);
+            track.ends.push(restart.death);
+        }
+    }
+    Ok(tracks)
+}
+
+/// The streams whose messages are somebody's: they prove a publication.
+fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
+    let sent = proofs.iter().filter_map(|proof| match proof {
+        Proof {
+            what: Key::Publish(..),
+            when: Validity::Messages(at),
+            ..
+        } => Some(*at),
+        _ => None,
+    });
+    sent.collect()
+}
+
+/// Whether a reason holds on after its last sign.
+fn lasts(when: &Validity) -> bool {
+    !matches!(when, Validity::Moments(_) | Validity::Like(_))
+}
+
+/// Two lists of times as one, sorted.
+fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
+    let mut all = [a, b].concat();
+    all.sort_unstable();
+    all
+}
+
+/// A latched topic with more messages than this is published anew all the time.
+const LATCHED: u64 = 20;
+
+/// What is known of a stream that is followed.
+struct Followed<'a> {
+    /// Whether it is a topic's, whose senders are known: it lives as long as its publications.
+    known: bool,
+    /// Whether its rhythm tells that its sender is there; nobody logs for that.
+    beats: bool,
+    restarts: &'a [Restart],
+}
+
+/// Puts the messages of one stream on a track: of a publication, or of a topic.
+fn follow(track: &mut Liveness, senders: &Senders, place: usize, what: &Followed<'_>) {
+    let sender = senders.of.get(place).and_then(|of| senders.list.get(*of));
+    let spoke = senders.traces.get(place).copied().flatten();
+    let (Some((first, last)), Some(sender)) = (spoke, sender) else {
+        track.extent = track.extent.max(Extent::Whole);
+        return;
+    };
+    let count: u64 = sender.stretches.iter().map(|s| s.count).sum();
+    let latched = sender.latched && count <= LATCHED;
+    track.senders.0 += 1;
+    track.senders.1 += u32::from(latched);
+    if what.known {
+        track.seen.extend([first, last]);
+        return;
+    }
+    track.signs.extend([first, last]);
+    track.heard = track.heard.max(Some(last));
+    let pulse = Pulse::of(&sender.stretches, what.restarts);
+    track
+        .pulses
+        .extend(pulse.filter(|_| what.beats && !latched));
+}

@@ -1,0 +1,288 @@
+//! The graphs of all windows in little memory: per element the windows in which it stays the same, and differences
+//! where it does not. Memory grows with what changes, not with how often one looks.
+
+mod column;
+mod row;
+
+pub(crate) use column::{Column, ColumnWriter, Cursor};
+pub(crate) use row::{Number, Row};
+
+use std::sync::Arc;
+
+use super::{EdgeState, Element, Graph, NodeState, TopicState};
+use crate::base::time::Span;
+
+/// A graph per window, in order.
+#[derive(Clone, Debug, Default)]
+pub struct Graphs {
+    /// The windows' times.
+    spans: Vec<Span>,
+    /// The lifecycle states that occur; rows name them by place, counted from 1.
+    lifecycles: Vec<Arc<str>>,
+    /// What becomes of each node, by id; those behind the last one that is ever there may be left out.
+    nodes: Vec<Column>,
+    topics: Vec<Column>,
+    publishes: Vec<Column>,
+    subscribes: Vec<Column>,
+}
+
+impl Graphs {
+    /// How many windows there are.
+    pub fn len(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// Whether there is no window.
+    pub fn is_empty(&self) -> bool {
+        self.spans.is_empty()
+    }
+
+    /// The graphs in order, each made as it is asked for.
+    pub fn iter(&self) -> Iter<'_> {
+        fn cursors(columns: &[Column]) -> Vec<Cursor<'_>> {
+            columns.iter().map(Column::cursor).collect()
+        }
+        Iter {
+            all: self,
+            next: 0,
+            nodes: cursors(&self.nodes),
+            topics: cursors(&self.topics),
+            publishes: cursors(&self.publishes),
+            subscribes: cursors(&self.subscribes),
+        }
+    }
+
+    /// The graph of one window, found by going through those before it: for many, take [`Self::iter`].
+    pub fn get(&self, window: usize) -> Option<Graph> {
+        self.iter().nth(window)
+    }
+
+    /// What an element says in the windows in which it is there, in order, with their places.
+    pub(crate) fn rows(&self, what: Element) -> impl Iterator<Item = (usize, Row)> + '_ {
+        let (columns, id) = match what {
+            Element::Node(id) => (&self.nodes, id),
+            Element::Topic(id) => (&self.topics, id),
+            Element::Publish(id) => (&self.publishes, id),
+            Element::Subscribe(id) => (&self.subscribes, id),
+        };
+        let mut cursor = columns.get(id as usize).map(Column::cursor);
+        let row = move |at| {
+            let row = cursor.as_mut().and_then(Cursor::next);
+            row.map(|row| (at, row))
+        };
+        (0..self.spans.len()).filter_map(row)
+    }
+
+    /// The lifecycle state that a row names.
+    pub(crate) fn lifecycle(&self, row: &Row) -> Option<&str> {
+        self.lifecycle_of(row.lifecycle)
+    }
+
+    /// The lifecycle state of a place, counted from 1.
+    pub(crate) fn lifecycle_of(&self, place: u32) -> Option<&str> {
+        let place = (place as usize).checked_sub(1);
+        place
+            .and_then(|at| self.lifecycles.get(at))
+            .map(|word| &**word)
+    }
+}
+
+impl PartialEq for Graphs {
+    /// Whether all graphs are equal; the numbers of lifecycle states are nobody's business.
+    fn eq(&self, other: &Self) -> bool {
+        self.spans == other.spans && self.iter().eq(other)
+    }
+}
+
+/// The graphs of a mission's windows, one after the other.
+#[derive(Clone, Debug)]
+pub struct Iter<'a> {
+    all: &'a Graphs,
+    next: usize,
+    nodes: Vec<Cursor<'a>>,
+    topics: Vec<Cursor<'a>>,
+    publishes: Vec<Cursor<'a>>,
+    subscribes: Vec<Cursor<'a>>,
+}
+
+impl Iterator for Iter<'_> {
+    type Item = Graph;
+
+    fn next(&mut self) -> Option<Graph> {
+        let span = *self.all.spans.get(self.next)?;
+        self.next += 1;
+        let lifecycles = &self.all.lifecycles;
+        Some(Graph {
+            nodes: states(&mut self.nodes, |id, row| row.node(id, span, lifecycles)),
+            topics: states(&mut self.topics, |id, row| row.topic(id, span)),
+            publishes: states(&mut self.publishes, |id, row| row.edge(id, span)),
+            subscribes: states(&mut self.subscribes, |id, row| row.edge(id, span)),
+        })
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = self.all.spans.len() - self.next;
+        (left, Some(left))
+    }
+
+    fn nth(&mut self, many: usize) -> Option<Graph> {
+        let columns = [
+            &mut self.nodes,
+            &mut self.topics,
+            &mut self.publishes,
+            &mut self.subscribes,
+        ];
+        let passed = many.min(self.all.spans.len() - self.next);
+        for cursor in columns.into_iter().flatten() {
+            (0..passed).for_each(|_| _ = cursor.next());
+        }
+        self.next += passed;
+        self.next()
+    }
+}
+
+impl ExactSizeIterator for Iter<'_> {}
+
+impl<'a> IntoIterator for &'a Graphs {
+    type Item = Graph;
+    type IntoIter = Iter<'a>;
+
+    fn into_iter(self) -> Iter<'a> {
+        self.iter()
+    }
+}
+
+/// What is there in the next window, by id.
+fn states<T>(cursors: &mut [Cursor<'_>], state: impl Fn(u32, &Row) -> T) -> Vec<T> {
+    let rows = (0..).zip(cursors);
+    rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?)))
+        .collect()
+}
+
+/// Takes in the graphs of windows, state by state: each element's in order of the windows, elements in any order.
+#[derive(Debug, Default)]
+pub(crate) struct GraphsWriter {
+    spans: Vec<Span>,
+    lifecycles: Vec<Arc<str>>,
+    nodes: Vec<ColumnWriter>,
+    topics: Vec<ColumnWriter>,
+    publishes: Vec<ColumnWriter>,
+    subscribes: Vec<ColumnWriter>,
+}
+
+impl GraphsWriter {
+    /// Nothing is there yet in these windows.
+    pub(crate) fn new(spans: Vec<Span>) -> Self {
+        Self {
+            spans,
+            ..Self::default()
+        }
+    }
+
+    /// Takes in the state of a node in the window at a place.
+    pub(crate) fn node(&mut self, at: usize, state: &NodeState) {
+        let lifecycle = state
+            .lifecycle
+            .as_ref()
+            .map_or(0, |word| self.lifecycle(word));
+        let row = Row::of_node(state, self.spans[at], lifecycle);
+        self.node_row(state.id, at, row);
+    }
+
+    /// Takes in the state of a topic.
+    pub(crate) fn topic(&mut self, at: usize, state: &TopicState) {
+        self.topic_row(state.id, at, Row::of_topic(state, self.spans[at]));
+    }
+
+    /// Takes in the state of a publication.
+    pub(crate) fn publish(&mut self, at: usize, state: &EdgeState) {
+        self.publish_row(state.id, at, Row::of_edge(state, self.spans[at]));
+    }
+
+    /// Takes in the state of a subscription.
+    pub(crate) fn subscribe(&mut self, at: usize, state: &EdgeState) {
+        self.subscribe_row(state.id, at, Row::of_edge(state, self.spans[at]));
+    }
+
+    /// Takes in what a node says in the window at a place.
+    pub(crate) fn node_row(&mut self, id: u32, at: usize, row: Row) {
+        column(&mut self.nodes, id).push(at, row);
+    }
+
+    /// The same of a topic.
+    pub(crate) fn topic_row(&mut self, id: u32, at: usize, row: Row) {
+        column(&mut self.topics, id).push(at, row);
+    }
+
+    /// The same of a publication.
+    pub(crate) fn publish_row(&mut self, id: u32, at: usize, row: Row) {
+        column(&mut self.publishes, id).push(at, row);
+    }
+
+    /// The same of a subscription.
+    pub(crate) fn subscribe_row(&mut self, id: u32, at: usize, row: Row) {
+        column(&mut self.subscribes, id).push(at, row);
+    }
+
+    /// The number of a lifecycle state in rows.
+    pub(crate) fn lifecycle(&mut self, word: &Arc<str>) -> u32 {
+        place(&mut self.lifecycles, word)
+    }
+
+    /// Takes in everything of the window at a place.
+    pub(crate) fn graph(&mut self, at: usize, graph: &Graph) {
+        graph.nodes.iter().for_each(|state| self.node(at, state));
+        graph.topics.iter().for_each(|state| self.topic(at, state));
+        let publishes = graph.publishes.iter();
+        publishes.for_each(|state| self.publish(at, state));
+        let subscribes = graph.subscribes.iter();
+        subscribes.for_each(|state| self.subscribe(at, state));
+    }
+
+    /// The graphs.
+    pub(crate) fn finish(self) -> Graphs {
+        let columns = |writers: Vec<ColumnWriter>| {
+            let columns = writers.into_iter().map(ColumnWriter::finish);
+            columns.collect()
+        };
+        Graphs {
+            spans: self.spans,
+            lifecycles: self.lifecycles,
+            nodes: columns(self.nodes),
+            topics: columns(self.topics),
+            publishes: columns(self.publishes),
+            subscribes: columns(self.subscribes),
+        }
+    }
+}
+
+fn column(columns: &mut Vec<ColumnWriter>, id: u32) -> &mut ColumnWriter {
+    let at = id as usize;
+    if columns.len() <= at {
+        columns.resize_with(at + 1, ColumnWriter::default);
+    }
+    &mut columns[at]
+}
+
+/// The place of a word in a short list, counted from 1.
+fn place(words: &mut Vec<Arc<str>>, word: &Arc<str>) -> u32 {
+    let found = words.iter().position(|w| w == word).unwrap_or_else(|| {
+        words.push(Arc::clone(word));
+        words.len() - 1
+    });
+    u32::try_from(found + 1).unwrap_or(0)
+}
+
+impl FromIterator<(Span, Graph)> for Graphs {
+    fn from_iter<I: IntoIterator<Item = (Span, Graph)>>(graphs: I) -> Self {
+        let mut all = GraphsWriter::default();
+        for (at, (span, graph)) in graphs.into_iter().enumerate() {
+            all.spans.push(span);
+            all.graph(at, &graph);
+        }
+        all.finish()
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,298 @@
+//! What becomes of one element, window by window, as bytes: how long it is away, how long it stays the same, and what
+//! differs from the window before.
+
+use super::row::{Number, Row};
+use crate::evidence::Degree;
+use crate::graph::State;
+
+/// All windows of one element.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Column {
+    bytes: Vec<u8>,
+}
+
+// What the next byte begins; any other is a row, its bits the parts that differ.
+const AWAY: u8 = 0x80;
+const SAME: u8 = 0x40;
+// The parts of a row.
+const LOOK: u8 = 1;
+const COUNT: u8 = 2;
+const BYTES: u8 = 4;
+const MEDIAN: u8 = 8;
+const GAP: u8 = 16;
+const RATE: u8 = 32;
+
+/// What both sides know of the rows so far.
+#[derive(Clone, Copy, Debug)]
+struct Memory {
+    row: Row,
+    /// The last whole numbers of the median and the gap.
+    halves: [i64; 3],
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self {
+            row: Row::new(State::Active, Degree::Measured),
+            halves: [0; 3],
+        }
+    }
+}
+
+/// Takes in the rows of an element in order of their windows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ColumnWriter {
+    column: Column,
+    memory: Memory,
+    /// The window that comes next.
+    next: usize,
+    /// How many windows up to that one repeat the last row.
+    same: u64,
+    is_there: bool,
+}
+
+impl ColumnWriter {
+    /// Takes in the row of the window at a place; one that came before is not taken.
+    pub(crate) fn push(&mut self, window: usize, row: Row) {
+        let Some(away) = window.checked_sub(self.next) else {
+            return;
+        };
+        self.next = window + 1;
+        if away == 0 && self.is_there && row == self.memory.row {
+            self.same += 1;
+            return;
+        }
+        self.end_run();
+        if away > 0 {
+            self.column.bytes.push(AWAY);
+            put(&mut self.column.bytes, away as u64);
+        }
+        self.row(&row);
+        self.is_there = true;
+    }
+
+    fn end_run(&mut self) {
+        if self.same > 0 {
+            self.column.bytes.push(SAME);
+            put(&mut self.column.bytes, self.same);
+            self.same = 0;
+        }
+    }
+
+    fn row(&mut self, row: &Row) {
+        let old = self.memory.row;
+        let look = |row: &Row| (row.state, row.degree, row.lifecycle);
+        let parts = [
+            (LOOK, look(row) != look(&old)),
+            (COUNT, row.count != old.count),
+            (BYTES, row.bytes != old.bytes),
+            (MEDIAN, row.median != old.median),
+            (GAP, row.gap != old.gap),
+            (RATE, row.rate != old.rate),
+        ];
+        let tag = parts.iter().filter(|(_, differs)| *differs);
+        let tag = tag.fold(0, |tag, (bit, _)| tag | bit);
+        let bytes = &mut self.column.bytes;
+        bytes.push(tag);
+        if tag & LOOK != 0 {
+            bytes.push(row.state as u8 | (row.degree as u8) << 4);
+            put(bytes, u64::from(row.lifecycle));
+        }
+        if tag & COUNT != 0 {
+            put_count(bytes, old.count, row.count);
+        }
+        if tag & BYTES != 0 {
+            put_count(bytes, old.bytes, row.bytes);
+        }
+        let halves = &mut self.memory.halves;
+        if tag & MEDIAN != 0 {
+            put_number(bytes, &mut halves[0], row.median);
+        }
+        if tag & GAP != 0 {
+            put_number(bytes, &mut halves[1], row.gap);
+        }
+        if tag & RATE != 0 {
+            bytes.push(u8::from(row.rate.is_some()));
+            if let Some(rate) = row.rate {
+                put_number(bytes, &mut halves[2], rate);
+            }
+        }
+        self.memory.row = *row;
+    }
+
+    /// The column.
+    pub(crate) fn finish(mut self) -> Column {
+        self.end_run();
+        self.column.bytes.shrink_to_fit();
+        self.column
+    }
+}
+
+impl Column {
+    /// The bytes it takes.
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// Goes through it from the first window.
+    pub(crate) fn cursor(&self) -> Cursor<'_> {
+        Cursor {
+            bytes: &self.bytes,
+            memory: Memory::default(),
+            away: 0,
+            same: 0,
+        }
+    }
+}
+
+/// Goes through a column.
+#[derive(Clone, Debug)]
+pub(crate) struct Cursor<'a> {
+    bytes: &'a [u8],
+    memory: Memory,
+    away: u64,
+    same: u64,
+}
+
+impl Cursor<'_> {
+    /// The row of the next window; `None` where the element is not there, and after the last.
+    pub(crate) fn next(&mut self) -> Option<Row> {
+        if self.same > 0 {
+            self.same -= 1;
+            return Some(self.memory.row);
+        }
+        if self.away == 0 && self.bytes.first() == Some(&AWAY) {
+            self.bytes = &self.bytes[1..];
+            self.away = count(&mut self.bytes);
+        }
+        if self.away > 0 {
+            self.away -= 1;
+            return None;
+        }
+        let (tag, rest) = self.bytes.split_first()?;
+        self.bytes = rest;
+        self.row(*tag);
+        if self.bytes.first() == Some(&SAME) {
+            self.bytes = &self.bytes[1..];
+            self.same = count(&mut self.bytes);
+        }
+        Some(self.memory.row)
+    }
+
+    fn row(&mut self, tag: u8) {
+        let (bytes, Memory { row, halves }) = (&mut self.bytes, &mut self.memory);
+        if tag & LOOK != 0 {
+            let look = take_byte(bytes);
+            let (state, degree) = (usize::from(look & 15), usize::from(look >> 4));
+            row.state = State::ALL.get(state).copied().unwrap_or(row.state);
+            row.degree = Degree::ALL.get(degree).copied().unwrap_or(row.degree);
+            row.lifecycle = u32::try_from(take(bytes)).unwrap_or(0);
+        }
+        if tag & COUNT != 0 {
+            row.count = take_count(bytes, row.count);
+        }
+        if tag & BYTES != 0 {
+            row.bytes = take_count(bytes, row.bytes);
+        }
+        if tag & MEDIAN != 0 {
+            row.median = take_number(bytes, &mut halves[0]);
+        }
+        if tag & GAP != 0 {
+            row.gap = take_number(bytes, &mut halves[1]);
+        }
+        if tag & RATE != 0 {
+            let is_given = take_byte(bytes) == 1;
+            row.rate = is_given.then(|| take_number(bytes, &mut halves[2]));
+        }
+    }
+}
+
+/// Seven bits a byte, the lowest first.
+fn put(bytes: &mut Vec<u8>, value: impl Into<u128>) {
+    let mut value = value.into();
+    while value >= 0x80 {
+        bytes.push(value.to_le_bytes()[0] | 0x80);
+        value >>= 7;
+    }
+    bytes.push(value.to_le_bytes()[0]);
+}
+
+fn take(bytes: &mut &[u8]) -> u128 {
+    let mut value = 0;
+    for shift in (0..128).step_by(7) {
+        let byte = take_byte(bytes);
+        value |= u128::from(byte & 0x7F) << shift;
+        if byte < 0x80 {
+            break;
+        }
+    }
+    value
+}
+
+fn count(bytes: &mut &[u8]) -> u64 {
+    u64::try_from(take(bytes)).unwrap_or(0)
+}
+
+fn take_byte(bytes: &mut &[u8]) -> u8 {
+    let Some((byte, rest)) = bytes.split_first() else {
+        return 0;
+    };
+    *bytes = rest;
+    *byte
+}
+
+/// Small numbers of either sign as small numbers.
+fn folded(value: i64) -> u128 {
+    u128::from((value.wrapping_shl(1) ^ (value >> 63)).cast_unsigned())
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "what was folded has 64 bits"
+)]
+fn unfolded(value: u128) -> i64 {
+    let value = value as u64;
+    (value >> 1).cast_signed() ^ -(value & 1).cast_signed()
+}
+
+/// 0 for none, else the difference.
+fn put_count(bytes: &mut Vec<u8>, old: Option<u64>, new: Option<u64>) {
+    let step = |new: u64| new.wrapping_sub(old.unwrap_or(0)).cast_signed();
+    put(bytes, new.map_or(0, |new| folded(step(new)) + 1));
+}
+
+fn take_count(bytes: &mut &[u8], old: Option<u64>) -> Option<u64> {
+    let step = unfolded(take(bytes).checked_sub(1)?);
+    Some(old.unwrap_or(0).wrapping_add(step.cast_unsigned()))
+}
+
+/// 0 for none, 1 for bits, else the difference to the last whole one.
+fn put_number(bytes: &mut Vec<u8>, last: &mut i64, number: Number) {
+    match number {
+        Number::Unknown => put(bytes, 0_u8),
+        Number::Bits(bits) => {
+            put(bytes, 1_u8);
+            bytes.extend(bits.to_le_bytes());
+        }
+        Number::Halves(halves) => {
+            put(bytes, folded(halves.wrapping_sub(*last)) + 2);
+            *last = halves;
+        }
+    }
+}
+
+fn take_number(bytes: &mut &[u8], last: &mut i64) -> Number {
+    match take(bytes) {
+        0 => Number::Unknown,
+        1 => {
+            let bits = bytes.get(..8).and_then(|b| b.try_into().ok());
+            *bytes = bytes.get(8..).unwrap_or_default();
+            Number::Bits(bits.map_or(0, u64::from_le_bytes))
+        }
+        step => {
+            *last = last.wrapping_add(unfolded(step - 2));
+            Number::Halves(*last)
+        }
+    }
+}

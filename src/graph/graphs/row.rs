@@ -1,0 +1,167 @@
+//! What nodes, topics and edges say in one window, in one form: exact integers where numbers come of such.
+
+use std::sync::Arc;
+
+use crate::base::time::Span;
+use crate::evidence::Degree;
+use crate::graph::{EdgeState, NodeState, State, TopicState, per_second};
+
+/// A number, as an integer where it is one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Number {
+    #[default]
+    Unknown,
+    /// Seconds that are so many half nanoseconds.
+    Halves(i64),
+    /// Any other, by its bits.
+    Bits(u64),
+}
+
+impl Number {
+    pub(crate) fn of(value: Option<f64>) -> Self {
+        let Some(value) = value else {
+            return Self::Unknown;
+        };
+        let halves = libm::round(value * 2e9);
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "small enough, and compared"
+        )]
+        let exact = Self::Halves(halves as i64);
+        let is_exact =
+            halves.abs() < EXACT && exact.value().map(f64::to_bits) == Some(value.to_bits());
+        if is_exact {
+            exact
+        } else {
+            Self::Bits(value.to_bits())
+        }
+    }
+
+    pub(crate) fn value(self) -> Option<f64> {
+        match self {
+            Self::Unknown => None,
+            Self::Halves(halves) => Some(halves as f64 / 2.0 / 1e9),
+            Self::Bits(bits) => Some(f64::from_bits(bits)),
+        }
+    }
+}
+
+/// Integers below this are exact in a float.
+const EXACT: f64 = 9e15;
+
+/// What one element says in one window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Row {
+    pub(crate) state: State,
+    pub(crate) degree: Degree,
+    /// The place of its lifecycle state, counted from 1; 0 for none.
+    pub(crate) lifecycle: u32,
+    /// Messages; of a node those that its rate comes of.
+    pub(crate) count: Option<u64>,
+    pub(crate) bytes: Option<u64>,
+    pub(crate) median: Number,
+    pub(crate) gap: Number,
+    /// Its rate, where that does not follow from the count and the window's length.
+    pub(crate) rate: Option<Number>,
+}
+
+impl Row {
+    pub(crate) fn new(state: State, degree: Degree) -> Self {
+        Self {
+            state,
+            degree,
+            lifecycle: 0,
+            count: None,
+            bytes: None,
+            median: Number::Unknown,
+            gap: Number::Unknown,
+            rate: None,
+        }
+    }
+
+    fn with_rate(self, hz: Option<f64>, span: Span) -> Self {
+        let follows = self.hz(span).map(f64::to_bits) == hz.map(f64::to_bits);
+        Self {
+            rate: (!follows).then(|| Number::of(hz)),
+            ..self
+        }
+    }
+
+    fn hz(&self, span: Span) -> Option<f64> {
+        match self.rate {
+            Some(rate) => rate.value(),
+            None => self.count.and_then(|count| per_second(count, span)),
+        }
+    }
+
+    pub(super) fn of_node(state: &NodeState, span: Span, lifecycle: u32) -> Self {
+        let count = state
+            .hz
+            .map(|hz| libm::round(hz * span.nanos() as f64 / 1e9));
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked, and its rate is compared"
+        )]
+        let count = count.filter(|n| (0.0..EXACT).contains(n)).map(|n| n as u64);
+        let row = Self {
+            lifecycle,
+            count,
+            ..Self::new(state.state, state.degree)
+        };
+        row.with_rate(state.hz, span)
+    }
+
+    pub(super) fn of_topic(state: &TopicState, span: Span) -> Self {
+        let row = Self {
+            count: Some(state.count),
+            bytes: state.bytes,
+            median: Number::of(state.median_period_s),
+            gap: Number::of(state.max_gap_s),
+            ..Self::new(state.state, state.degree)
+        };
+        row.with_rate(state.hz, span)
+    }
+
+    pub(super) fn of_edge(state: &EdgeState, span: Span) -> Self {
+        let row = Self {
+            count: state.count,
+            ..Self::new(state.state, state.degree)
+        };
+        row.with_rate(state.hz, span)
+    }
+
+    pub(super) fn node(&self, id: u32, span: Span, lifecycles: &[Arc<str>]) -> NodeState {
+        let lifecycle = (self.lifecycle as usize).checked_sub(1);
+        NodeState {
+            id,
+            state: self.state,
+            degree: self.degree,
+            hz: self.hz(span),
+            lifecycle: lifecycle.and_then(|at| lifecycles.get(at)).map(Arc::clone),
+        }
+    }
+
+    pub(super) fn topic(&self, id: u32, span: Span) -> TopicState {
+        TopicState {
+            id,
+            state: self.state,
+            degree: self.degree,
+            count: self.count.unwrap_or(0),
+            bytes: self.bytes,
+            hz: self.hz(span),
+            median_period_s: self.median.value(),
+            max_gap_s: self.gap.value(),
+        }
+    }
+
+    pub(super) fn edge(&self, id: u32, span: Span) -> EdgeState {
+        EdgeState {
+            id,
+            state: self.state,
+            degree: self.degree,
+            count: self.count,
+            hz: self.hz(span),
+        }
+    }
+}

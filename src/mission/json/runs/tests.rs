@@ -1,0 +1,126 @@
+//! Both forms of a mission hold the same.
+
+use proptest::prelude::*;
+
+use crate::base::notice::Notices;
+use crate::base::time::{Period, Span, Stamp};
+use crate::evidence::Evidence;
+use crate::graph::graphs_for_tests::graph;
+use crate::graph::{Edge, Elements, Graph, Node, Topic};
+use crate::mission::{Activity, Form, Json, Ledger, Mission, Window, read_json};
+
+fn elements() -> Elements {
+    let node = |name: &str| Node {
+        name: name.into(),
+        role: name.into(),
+        evidence: Evidence::of("connection"),
+        first: Some(Stamp(3)),
+        last: None,
+        runs: vec![Span {
+            start: Stamp(3),
+            end: Stamp(9),
+        }],
+    };
+    let topic = |name: &str| Topic {
+        name: name.into(),
+        types: vec!["a/B".into()],
+        evidence: Evidence::of("rosout"),
+        first: None,
+        last: None,
+        qos: Some("reliable".into()),
+        runs: Vec::new(),
+        unknown_publishers: Some(1),
+    };
+    let edge = |id| Edge {
+        node: id,
+        topic: id,
+        evidence: Evidence::NONE,
+        first: None,
+        last: None,
+        runs: Vec::new(),
+    };
+    Elements {
+        nodes: ["/a", "/b", "/c"].map(node).to_vec(),
+        topics: ["/t", "/u", "/v"].map(topic).to_vec(),
+        publishes: (0..3).map(edge).collect(),
+        subscribes: (0..3).map(edge).collect(),
+    }
+}
+
+fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
+    let mut at = Stamp(0);
+    let windows = graphs.into_iter().map(|(graph, length)| {
+        let start = at;
+        at = at.plus(length);
+        (Span { start, end: at }, graph)
+    });
+    let windows: Vec<(Span, Graph)> = windows.collect();
+    let one = Period::from_nanos(1).unwrap();
+    let window = |(index, (span, _)): (usize, &(Span, Graph))| Window {
+        index,
+        span: *span,
+        partial: false,
+        messages: 7,
+        changes: Vec::new(),
+        entries: Vec::new(),
+    };
+    let list = windows.iter().enumerate().map(window).collect();
+    Mission {
+        bags: Vec::new(),
+        span: Span {
+            start: Stamp(0),
+            end: at,
+        },
+        messages: 7,
+        period: one,
+        step: one,
+        elements: elements(),
+        windows: list,
+        graphs: windows.into_iter().collect(),
+        ledger: Ledger::default(),
+        activity: Activity::default(),
+        undrawn: Vec::new(),
+        layout: None,
+        notices: Notices::new(),
+    }
+}
+
+fn written(mission: &Mission, form: Form) -> String {
+    let mut text = Vec::new();
+    let json = Json {
+        mission,
+        places: None,
+        form,
+    };
+    json.write(&mut text).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+fn read(text: &str) -> Mission {
+    read_json(text, std::path::Path::new("x.json")).unwrap()
+}
+
+proptest! {
+    #[test]
+    fn runs_hold_what_windows_hold(list in proptest::collection::vec((graph(), 1..5_000_000_000_i64), 1..12)) {
+        // What only one form can say (an element that is in no window) is gone after the first reading.
+        let first = read(&written(&mission(list), Form::Windows));
+        let second = read(&written(&first, Form::Runs));
+        prop_assert_eq!(&first, &second);
+        prop_assert_eq!(written(&first, Form::Windows), written(&second, Form::Windows));
+    }
+}
+
+#[test]
+fn nonsense_in_columns_is_left_out() {
+    let text = r#"{"schema": "bagreel.evolution/2", "form": "runs", "windows": [{"start_ns": 0, "end_ns": 5},
+        {"start_ns": 5, "end_ns": 9}], "topics": [{"name": "/t", "in": {"windows": [[1, 99999999999], [0, 0]],
+        "state": [["silent", 4000000000]], "count": [[3, 4000000000]], "hz": [4000000000]}}]}"#;
+    let mission = read(text);
+    let counts: Vec<Vec<u64>> = mission
+        .graphs
+        .iter()
+        .map(|g| g.topics.iter().map(|t| t.count).collect())
+        .collect();
+    assert_eq!(counts, [vec![], vec![3]]);
+}

@@ -1,0 +1,226 @@
+//! The phases of a mission: found, named or cut by a file of the user's, or told by captions.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Reading;
+use crate::base::error::{Error, Result};
+use crate::base::time::{Span, Stamp, parse_nanos};
+use crate::base::{budget, file};
+use crate::graph::Elements;
+use crate::mission::activity::Activity;
+use crate::mission::ledger::Phase;
+use crate::mission::phases::{of_spans, phases};
+
+/// Where phases and their names come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Phases {
+    /// They are found, and told by what they change.
+    #[default]
+    Found,
+    /// There are none.
+    None,
+    /// From a file: lines `0:38 navigation` say when they begin; lines without a time name those that are found.
+    File(PathBuf),
+    /// From a file of `seconds|text` lines, or from a string topic of the bags.
+    Captions(String),
+}
+
+impl Phases {
+    /// The topic whose texts they are; `None` where they come from elsewhere.
+    pub(super) fn topic(&self) -> Option<&str> {
+        match self {
+            Self::Captions(from) if !Path::new(from).is_file() => Some(from),
+            _ => None,
+        }
+    }
+
+    /// Whether their names are the user's.
+    pub(super) fn is_named(&self) -> bool {
+        matches!(self, Self::File(_) | Self::Captions(_))
+    }
+}
+
+/// What phases are made of: what lives when, the texts of the topic that tells them, and those of an earlier run.
+pub(super) struct Basis<'a> {
+    pub(super) elements: &'a Elements,
+    pub(super) activity: &'a Activity,
+    pub(super) texts: &'a [(Stamp, String)],
+    pub(super) earlier: Vec<Phase>,
+}
+
+/// The phases that `reading` asks for.
+///
+/// # Errors
+/// [`Error::BadFile`] for a line that says no phase, more names than phases, or times out of order; [`Error::Usage`]
+/// for captions of which there are none.
+pub(super) fn wanted(reading: &Reading, basis: Basis<'_>) -> Result<Vec<Phase>> {
+    match &reading.phases {
+        Phases::None => Ok(Vec::new()),
+        Phases::Found => Ok(basis.found()),
+        Phases::File(path) => {
+            let text = file::read_text(path, budget::USER_TEXT)?;
+            from_file(basis, &text, path)
+        }
+        Phases::Captions(from) => captions(&basis, from),
+    }
+}
+
+impl Basis<'_> {
+    fn found(self) -> Vec<Phase> {
+        if self.earlier.is_empty() {
+            phases(self.elements, self.activity)
+        } else {
+            self.earlier
+        }
+    }
+
+    /// Phases that begin at these times, sorted, under these names. What comes before the first of them is a phase
+    /// under a name of our own.
+    fn at(&self, begins: &[(Stamp, String)]) -> Vec<Phase> {
+        let whole = self.activity.span();
+        let begins = begins.iter().filter(|(at, _)| *at < whole.end);
+        let begins: Vec<_> = begins.collect();
+        let mut starts: Vec<Stamp> = begins
+            .iter()
+            .map(|(at, _)| (*at).max(whole.start))
+            .collect();
+        let is_led = starts.first().is_none_or(|first| *first > whole.start);
+        if is_led {
+            starts.insert(0, whole.start);
+        }
+        let ends = starts.iter().skip(1).copied().chain([whole.end]);
+        let spans: Vec<Span> = starts
+            .iter()
+            .copied()
+            .zip(ends)
+            .map(|(start, end)| Span { start, end })
+            .collect();
+        let mut all = of_spans(self.elements, self.activity, &spans);
+        let named = all.iter_mut().skip(usize::from(is_led));
+        for (phase, (_, name)) in named.zip(begins) {
+            phase.name = Arc::from(name.as_str());
+        }
+        all
+    }
+}
+
+/// One line: when it begins, if it says so, and its name.
+type Line = (Option<i64>, String);
+
+fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
+    let bad = |line: usize, reason: String| Error::BadFile {
+        path: path.to_owned(),
+        line,
+        reason,
+        hint: "write a phase per line: `0:38 navigation`, or names alone for those that are found"
+            .to_owned(),
+    };
+    let all = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim()));
+    let all = all.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
+    let lines: Vec<(usize, Line)> = all.map(|(n, l)| (n, line(l))).collect();
+    let timed = lines.iter().filter(|(_, (at, _))| at.is_some()).count();
+    if let Some((n, _)) = lines.iter().find(|(_, (at, _))| timed > 0 && at.is_none()) {
+        return Err(bad(
+            *n,
+            "some lines say when their phase begins, this one does not".to_owned(),
+        ));
+    }
+    if timed > 0 {
+        let disordered = lines.windows(2).find(|pair| pair[0].1.0 >= pair[1].1.0);
+        if let Some(pair) = disordered {
+            return Err(bad(
+                pair[1].0,
+                "it does not begin after the one before".to_owned(),
+            ));
+        }
+        // What comes before the first phase belongs to it.
+        let start = basis.activity.span().start;
+        let begins = lines.into_iter().enumerate().map(|(k, (_, (at, name)))| {
+            let at = at.filter(|_| k > 0).unwrap_or(0);
+            (start.plus(at), name)
+        });
+        return Ok(basis.at(&begins.collect::<Vec<_>>()));
+    }
+    let mut found = basis.found();
+    let many = found.len();
+    if let Some((n, _)) = lines.get(many) {
+        return Err(bad(*n, format!("there are {many} phases and more names")));
+    }
+    for (phase, (_, (_, name))) in found.iter_mut().zip(lines) {
+        phase.name = Arc::from(name);
+    }
+    Ok(found)
+}
+
+fn line(text: &str) -> Line {
+    let timed = text.split_once([' ', '|', '\t']);
+    let timed = timed.and_then(|(at, name)| Some((parse_nanos(at)?, name)));
+    match timed {
+        Some((at, name)) => (Some(at), name.trim().to_owned()),
+        None => (None, text.to_owned()),
+    }
+}
+
+/// Phases by captions: `from` is a file if there is one of that name, else a topic of type `std_msgs/String`.
+fn captions(basis: &Basis<'_>, from: &str) -> Result<Vec<Phase>> {
+    let path = Path::new(from);
+    let start = basis.activity.span().start;
+    let mut begins = if path.is_file() {
+        let lines = captions_of_file(&file::read_text(path, budget::USER_TEXT)?, path)?;
+        let lines = lines.into_iter().map(|(at, text)| (start.plus(at), text));
+        lines.collect()
+    } else {
+        basis.texts.to_vec()
+    };
+    if begins.is_empty() {
+        return Err(Error::usage(
+            format!("`{from}` is neither a file nor a topic of `std_msgs/String`"),
+            "`--captions` takes a file of `seconds|text` lines or such a topic",
+        ));
+    }
+    begins.dedup_by(|later, before| later.1 == before.1);
+    Ok(basis.at(&begins))
+}
+
+/// Captions by nanoseconds after the mission's start, sorted. Empty lines and lines that begin with `#` are skipped.
+fn captions_of_file(text: &str, path: &Path) -> Result<Vec<(i64, String)>> {
+    let mut captions = Vec::new();
+    for (number, line) in text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'))
+    {
+        let caption = line
+            .split_once('|')
+            .and_then(|(at, text)| Some((parse_nanos(at)?, text.trim().to_owned())));
+        captions.push(caption.ok_or_else(|| Error::BadFile {
+            path: path.to_owned(),
+            line: number + 1,
+            reason: format!("`{line}` is no caption"),
+            hint: "write `seconds|text`, such as `90|picking`".to_owned(),
+        })?);
+    }
+    captions.sort_by_key(|(at, _)| *at);
+    Ok(captions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_gives_captions_in_order_of_time() {
+        let read = |text| captions_of_file(text, Path::new("c.txt"));
+        let captions = read("# phases\n90|picking\n\n0|start\n").unwrap();
+        assert_eq!(
+            captions,
+            [
+                (0, "start".to_owned()),
+                (90_000_000_000, "picking".to_owned())
+            ]
+        );
+        let error = read("0|a\nsoon|b\n").unwrap_err();
+        assert_eq!(error.to_string(), "`c.txt` line 2: `soon|b` is no caption");
+    }
+}

@@ -1,0 +1,107 @@
+//! `--verify`: everything a second time by an independent reader, and what both count.
+
+use std::collections::BTreeSet;
+
+use super::collect::{Collected, collect};
+use super::{Reading, Stage, Watch};
+use crate::bag::{Report, Tier};
+use crate::base::error::{Error, Result};
+use crate::base::notice::{Notice, NoticeKind};
+use crate::base::time::Span;
+use crate::graph::window::divide;
+use crate::graph::{TopicCount, counts};
+
+/// What a second reading says of the bags.
+pub(super) struct Verified {
+    pub(super) reports: Vec<Report>,
+    pub(super) notices: Vec<Notice>,
+}
+
+/// Reads the bags again and compares what both readings count.
+///
+/// # Errors
+/// Where somebody stops it; a bag that cannot be read again is a notice.
+pub(super) fn verify(
+    first: &Collected,
+    reading: &Reading,
+    watch: &mut dyn Watch,
+) -> Result<Verified> {
+    watch.stage(Stage::Verify);
+    let second = collect(reading, true, watch);
+    match second.and_then(|second| compare(first, &second, reading)) {
+        Err(Error::Interrupted) => Err(Error::Interrupted),
+        Err(why) => Ok(Verified {
+            reports: first.reports.clone(),
+            notices: vec![Notice::new(
+                NoticeKind::Damaged,
+                format!("the bag could not be verified: {why}"),
+            )],
+        }),
+        Ok(verified) => Ok(verified),
+    }
+}
+
+/// Notices where the second reader counts otherwise than the first, and what it could not verify.
+fn compare(first: &Collected, second: &Collected, reading: &Reading) -> Result<Verified> {
+    let windows = divide(&reading.division, first.range)?;
+    let (ours, theirs) = (
+        counted(first, &windows.spans)?,
+        counted(second, &windows.spans)?,
+    );
+    let differing = ours.symmetric_difference(&theirs).count();
+    let messages = |all: &BTreeSet<TopicCount>| all.iter().map(|c| c.count).sum::<u64>();
+    let (messages, theirs) = (messages(&ours), messages(&theirs));
+    let same = messages == theirs && differing == 0;
+    let mut notices = unverified(first, second);
+    let reader = if notices.is_empty() {
+        "reader"
+    } else {
+        "reading"
+    };
+    notices.push(if same {
+        Notice::new(
+            NoticeKind::Note,
+            format!("a second {reader} counts the same {messages} messages"),
+        )
+    } else {
+        Notice::new(
+            NoticeKind::Damaged,
+            format!(
+                "a second reader counts {theirs} messages instead of {messages}; {differing} counts of topics in windows differ"
+            ),
+        )
+    });
+    let lost = second.recorded.notices.iter().filter(|n| n.kind.is_loss());
+    notices.extend(lost);
+    let report = |(report, again): (&Report, &Report)| Report {
+        complete: report.complete && again.complete,
+        tier: Tier::Verify,
+        ..report.clone()
+    };
+    let both = first.reports.iter().zip(&second.reports);
+    Ok(Verified {
+        reports: both.map(report).collect(),
+        notices,
+    })
+}
+
+fn counted(collected: &Collected, windows: &[Span]) -> Result<BTreeSet<TopicCount>> {
+    Ok(counts(&collected.recorded, windows)?.into_iter().collect())
+}
+
+/// Says of which bags not everything could be verified.
+fn unverified(first: &Collected, second: &Collected) -> Vec<Notice> {
+    let both = first.reports.iter().zip(&second.reports);
+    let notice = |(bag, again): (&Report, &Report)| {
+        let why = again.tier_reason.as_ref()?;
+        // A reader that refuses from the start says nothing of the bag; one that stops has met damage.
+        let kind = if again.complete {
+            NoticeKind::Note
+        } else {
+            NoticeKind::Damaged
+        };
+        let text = format!("`{}` could not be verified: {why}", bag.name);
+        Some(Notice::new(kind, text))
+    };
+    both.filter_map(notice).collect()
+}
