@@ -175,7 +175,7 @@ impl Watch for Terminal {
 
     fn note(&mut self, text: &str) {
         self.end_stage();
-        Terminal::note(self, text);
+        Self::note(self, text);
     }
 
     fn shares(&mut self, shares: &[(&'static str, f64)]) {
