@@ -189,16 +189,13 @@ fn mixed(a: Point, b: Point, t: f64) -> Point {
     Point::new(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t)
 }
 
-/// The curve up to `t`, and from there on.
-fn split(curve: &[Point; 4], t: f64) -> [[Point; 4]; 2] {
-    let [start, _, _, end] = *curve;
-    let pieces = [0, 1, 2].map(|k| mixed(curve[k], curve[k + 1], t));
-    let halves = [0, 1].map(|k| mixed(pieces[k], pieces[k + 1], t));
-    let middle = mixed(halves[0], halves[1], t);
-    [
-        [start, pieces[0], halves[0], middle],
-        [middle, halves[1], pieces[2], end],
-    ]
+/// The curve up to `at`, and from there on.
+fn split(curve: &[Point; 4], at: f64) -> [[Point; 4]; 2] {
+    let [a, b, c, d] = *curve;
+    let (ab, bc, cd) = (mixed(a, b, at), mixed(b, c, at), mixed(c, d, at));
+    let (abc, bcd) = (mixed(ab, bc, at), mixed(bc, cd, at));
+    let middle = mixed(abc, bcd, at);
+    [[a, ab, abc, middle], [middle, bcd, cd, d]]
 }
 
 fn on(curve: &[Point; 4], t: f64) -> Point {
