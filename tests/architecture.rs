@@ -39,7 +39,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["lives"], &["build", "diff", "sending", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
-        &["cluster", "collapse", "counts", "filter", "lives", "names", "roles", "runs", "settle", "union"],
+        &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "settle", "union"],
         &["options"],
         &["group", "select"],
         &["items"],

@@ -404,6 +404,7 @@ mod tests {
             name: Arc::from(name),
             label: Arc::from(name),
             members: vec![Element::Node(id)],
+            is_replica: false,
             cluster: None,
         };
         let shown = |id, mark| Shown {
@@ -411,6 +412,7 @@ mod tests {
             ..Shown::plain(id, State::Active, Degree::Measured)
         };
         let frame = |(index, mark): (usize, Option<Mark>)| Frame {
+            rolls: Vec::new(),
             index,
             span: Span {
                 start: minute(index),
