@@ -70,6 +70,7 @@ fn mission(windows: usize) -> (Mission, View) {
         notices: notice::Notices::new(),
     };
     let frame = |index: usize| Frame {
+        rolls: Vec::new(),
         index,
         span: Span {
             start: second(index),
