@@ -146,7 +146,7 @@ pub const ENGINES: &[(&str, &(dyn Engine + Sync))] = &[
 ];
 
 /// The most boxes that the engine `ring` takes.
-pub const RING: usize = ring::MOST;
+pub(crate) const RING: usize = ring::MOST;
 
 /// The engine of this word.
 ///

@@ -5,18 +5,24 @@ mod draw;
 mod export;
 mod extract;
 mod figure;
+pub(crate) mod gate;
 mod read;
 mod survey;
 
 pub use draw::Drawing;
-pub use export::{Render, Rendered, check, render, show};
+pub(crate) use export::render;
+pub use export::{Render, Rendered};
+#[cfg(feature = "cli")]
+pub(crate) use export::{check, show};
 pub use extract::{Extract, Extracted, extract};
 pub use figure::Phases;
+pub(crate) use read::mission_file;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};
 
 /// A part of the work, as progress and timings tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Stage {
     /// Bags are read; progress counts bytes.
     Read,

@@ -17,11 +17,11 @@ mod nothing;
 mod options;
 mod replicas;
 mod roles;
-pub mod runs;
+pub(crate) mod runs;
 mod select;
 mod settle;
 mod state;
-pub mod union;
+pub(crate) mod union;
 
 use std::sync::Arc;
 
@@ -33,10 +33,9 @@ use crate::graph::{Element, State};
 use crate::mission::Mission;
 use crate::mission::ledger::{EntryId, Kind};
 
-pub use collapse::Candidate;
-pub use filter::NameFilter;
-pub use filtered::filtered;
-pub use nothing::nothing;
+pub(crate) use filter::NameFilter;
+pub(crate) use filtered::filtered;
+pub(crate) use nothing::nothing;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 
 /// What the picture shows of a mission, and a notice for everything that it leaves out.
@@ -48,7 +47,7 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
 }
 
 /// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
-pub fn outline(mission: &Mission, options: &ViewOptions) -> View {
+pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     let viewed = items::Viewed::new(&mission.elements, options);
     stage(viewed, options, Vec::new())
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use bagreel::bag::{OpenOptions, Report, Tier, Want};
-use bagreel::base::notice::NoticeKind;
-use bagreel::base::time::Stamp;
+use bagreel::internals::base::notice::NoticeKind;
+use bagreel::internals::base::time::Stamp;
 use tempfile::TempDir;
 
 use crate::support::rosbag1::Pack;
@@ -449,6 +449,37 @@ fn a_record_longer_than_its_chunk_stops_the_second_reader() {
     let options = OpenOptions { verify: true };
     let (report, kept) = read_as(&path, Want::Payload, None, &options).unwrap();
     assert!(!report.complete && kept.stamps.len() < truth, "{report:?}");
+}
+
+#[test]
+fn the_head_of_a_record_beyond_its_chunk_stops_the_second_reader() {
+    let options = mcap::Options {
+        compression: None,
+        chunk: 4000,
+        ..mcap::Options::default()
+    };
+    let bytes = mcap::write(&short(), &options);
+    // A chunk: its kind, its length, two times, the unpacked length, a checksum, no compression, the packed length.
+    let is_chunk = |at: &usize| {
+        let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        bytes[*at] == 6 && bytes.len() > at + 49 && number(at + 1) == number(at + 41) + 40
+    };
+    let chunk = (0..bytes.len()).find(is_chunk).unwrap();
+    let packed = u64::from_le_bytes(bytes[chunk + 41..chunk + 49].try_into().unwrap());
+    // Five bytes behind its last record: the beginning of a head, and one of no length goes on behind them.
+    let mut bytes = bytes.clone();
+    let end = chunk + 49 + usize::try_from(packed).unwrap();
+    for (at, less) in [(1, 40), (41, 0), (25, 0)] {
+        let longer = packed + 5 + less;
+        bytes[chunk + at..chunk + at + 8].copy_from_slice(&longer.to_le_bytes());
+    }
+    bytes[chunk + 33..chunk + 37].fill(0);
+    bytes.splice(end..end, [0x80, 0, 0, 0, 0]);
+    bytes.splice(end + 5..end + 5, [0; 20]);
+    let (_dir, path) = placed("x.mcap", &bytes);
+    let options = OpenOptions { verify: true };
+    let (report, _) = read_as(&path, Want::Payload, None, &options).unwrap();
+    assert!(!report.complete, "{report:?}");
 }
 
 #[test]

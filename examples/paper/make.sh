@@ -13,3 +13,7 @@ done
 # Twice, for the references.
 pdflatex -interaction=nonstopmode -halt-on-error paper.tex
 pdflatex -interaction=nonstopmode -halt-on-error paper.tex
+# What the README shows.
+if command -v pdftoppm > /dev/null; then
+    pdftoppm -r 80 -png paper.pdf page
+fi

@@ -28,7 +28,7 @@ pub enum Needs {
 #[derive(Clone, Copy)]
 pub struct Frame<'a> {
     /// What it shows and for how long.
-    pub frame_time: FrameTime,
+    pub time: FrameTime,
     /// The drawing.
     pub scene: &'a Scene,
     /// The drawing as pixels; empty unless somebody needs them.
@@ -55,7 +55,7 @@ pub enum Packet {
 }
 
 /// Makes a packet of a frame. It runs on any core, for several frames at a time and in any order.
-pub type Pack = fn(&Frame<'_>) -> Result<Packet>;
+pub(crate) type Pack = fn(&Frame<'_>) -> Result<Packet>;
 
 /// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -201,7 +201,7 @@ impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
 }
 
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
-pub type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
+pub(crate) type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
 
 /// Whether a format holds one drawing of the whole mission: a film strip or a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -299,7 +299,7 @@ pub(crate) mod testing {
             ms: 100,
         };
         pack(&Frame {
-            frame_time,
+            time: frame_time,
             scene: &scene,
             pixels: &pixels,
             palette,

@@ -9,7 +9,7 @@ use crate::draw::style::Style;
 use crate::view::{Frame, ItemKind, Mark, Shown, View};
 
 /// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
-pub fn chart(view: &View, style: &Style, frame: &Frame) -> String {
+pub(crate) fn chart(view: &View, style: &Style, frame: &Frame) -> String {
     let mut out = String::from("flowchart LR\n");
     members(view, frame, &mut out, None, 1);
     let mut marked = String::new();
@@ -119,7 +119,7 @@ fn mark(shown: &Shown) -> Option<&'static str> {
 }
 
 /// A name inside quotes: Mermaid's own entities for all that could end the text or begin markup.
-fn escaped(name: &str) -> String {
+pub(crate) fn escaped(name: &str) -> String {
     let mut out = String::new();
     for c in name.chars() {
         if c.is_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | ' ' | ':') {

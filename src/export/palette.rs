@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// A colour: red, green, blue.
-pub type Rgb = [u8; 3];
+pub(crate) type Rgb = [u8; 3];
 
 /// How many of the most frequent colours are always in: more than a style has.
 const THEME: usize = 40;
@@ -15,11 +15,11 @@ const BITS: u32 = 4;
 
 /// Counts the colours of the frames that a palette is made from. Frames may come in any order.
 #[derive(Clone, Debug, Default)]
-pub struct Census(HashMap<Rgb, u64>);
+pub(crate) struct Census(HashMap<Rgb, u64>);
 
 impl Census {
     /// Counts the pixels of one frame as RGBA bytes; transparency is not looked at.
-    pub fn count(&mut self, rgba: &[u8]) {
+    pub(crate) fn count(&mut self, rgba: &[u8]) {
         for (colour, length) in runs(rgba) {
             *self.0.entry(colour).or_default() += u64::from(length);
         }
@@ -27,7 +27,7 @@ impl Census {
 
     /// Both counts together.
     #[must_use]
-    pub fn and(mut self, other: Self) -> Self {
+    pub(crate) fn and(mut self, other: Self) -> Self {
         // Sums do not depend on the order of what is added.
         #[expect(clippy::iter_over_hash_type, reason = "the order does not matter")]
         for (colour, count) in other.0 {
@@ -38,7 +38,7 @@ impl Census {
 
     /// At most `most` (2..=256) colours: exactly those counted if they are so few, otherwise the most frequent ones
     /// and then, again and again, the frequent one that is farthest from all chosen.
-    pub fn palette(self, most: usize) -> Palette {
+    pub(crate) fn palette(self, most: usize) -> Palette {
         let mut counted: Vec<(Rgb, u64)> = self.0.into_iter().collect();
         counted.sort_unstable_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
         let certain = if counted.len() <= most {
@@ -142,20 +142,20 @@ const MET: u32 = 4096;
 
 /// Finds the places of colours, and remembers those that it met.
 #[derive(Clone, Debug)]
-pub struct Matcher<'a> {
+pub(crate) struct Matcher<'a> {
     palette: &'a Palette,
     met: Vec<Option<(Rgb, u8)>>,
 }
 
 impl<'a> Matcher<'a> {
     /// One that has met none.
-    pub fn new(palette: &'a Palette) -> Self {
+    pub(crate) fn new(palette: &'a Palette) -> Self {
         let met = vec![None; MET as usize];
         Self { palette, met }
     }
 
     /// Writes the place of the nearest colour of every pixel of RGBA bytes, the first of equals, into `places`.
-    pub fn map(&mut self, rgba: &[u8], places: &mut [u8]) {
+    pub(crate) fn map(&mut self, rgba: &[u8], places: &mut [u8]) {
         let mut left = places;
         for (colour, length) in runs(rgba) {
             let (run, rest) = left.split_at_mut((length as usize).min(left.len()));
@@ -222,7 +222,7 @@ pub struct Area {
 }
 
 /// The smallest area that holds every difference between two frames of `width` columns; `None` if they are equal.
-pub fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
+pub(crate) fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
     let rows = || before.chunks_exact(width).zip(after.chunks_exact(width));
     let top = rows().position(|(a, b)| a != b)?;
     let bottom = rows().rposition(|(a, b)| a != b)?;
@@ -246,7 +246,7 @@ pub fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
 }
 
 /// The pixels of `area` in `after`, with `clear` where they equal `before`.
-pub fn patch(before: &[u8], after: &[u8], width: usize, area: Area, clear: u8) -> Vec<u8> {
+pub(crate) fn patch(before: &[u8], after: &[u8], width: usize, area: Area, clear: u8) -> Vec<u8> {
     let mut pixels = Vec::with_capacity(area.width * area.height);
     for row in area.y..area.y + area.height {
         let from = row * width + area.x;

@@ -117,7 +117,7 @@ impl Encoder for Images<'_> {
 
     fn pack(&self) -> Pack {
         match (self.kind, self.is_poster) {
-            (_, true) => |frame| match frame.frame_time.window {
+            (_, true) => |frame| match frame.time.window {
                 0 => packed(Kind::Png, frame),
                 _ => Ok(Packet::Nothing),
             },

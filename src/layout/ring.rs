@@ -58,7 +58,7 @@ fn around(plan: &Plan, page: Size) -> Vec<Rect> {
     let highest = plan.vertices.iter().map(|v| v.size.h).fold(0.0, f64::max);
     let aspect = (page.w / page.h).clamp(0.5, 3.0);
     // The rim is about five times its half height long on a square page.
-    let each = (widest + highest) / 2.0 + GAP;
+    let each = f64::midpoint(widest, highest) + GAP;
     let half = (n as f64 * each / (2.8 * (1.0 + aspect))).max(highest + GAP);
     let order = order(plan);
     let mut boxes = vec![Rect::default(); n];
@@ -189,12 +189,12 @@ fn mixed(a: Point, b: Point, t: f64) -> Point {
     Point::new(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t)
 }
 
-/// The curve up to `t`, and from there on.
-fn split(curve: &[Point; 4], t: f64) -> [[Point; 4]; 2] {
+/// The curve up to `at`, and from there on.
+fn split(curve: &[Point; 4], at: f64) -> [[Point; 4]; 2] {
     let [a, b, c, d] = *curve;
-    let (ab, bc, cd) = (mixed(a, b, t), mixed(b, c, t), mixed(c, d, t));
-    let (abc, bcd) = (mixed(ab, bc, t), mixed(bc, cd, t));
-    let middle = mixed(abc, bcd, t);
+    let (ab, bc, cd) = (mixed(a, b, at), mixed(b, c, at), mixed(c, d, at));
+    let (abc, bcd) = (mixed(ab, bc, at), mixed(bc, cd, at));
+    let middle = mixed(abc, bcd, at);
     [[a, ab, abc, middle], [middle, bcd, cd, d]]
 }
 

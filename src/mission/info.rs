@@ -1,6 +1,7 @@
 //! What a bag holds, what is known of its graph and by which evidence, and what cannot be known.
 
 mod advice;
+mod figure;
 mod survey;
 mod text;
 mod why;
@@ -8,6 +9,8 @@ mod why;
 use serde::Serialize;
 
 use advice::advice;
+pub use figure::FigureInfo;
+use figure::figures;
 pub(crate) use survey::survey_table;
 pub use survey::{SurveyRow, survey_text};
 pub use text::text;
@@ -52,6 +55,8 @@ pub struct Info {
     pub nodes: Vec<NodeInfo>,
     /// What would have told more, and how to record it; empty if nothing is missing.
     pub advice: Vec<String>,
+    /// The figures for a paper that fit, the best first.
+    pub figures: Vec<FigureInfo>,
     /// What source code offers and was not drawn, and what else it tells; a line each.
     pub undrawn: Vec<String>,
     /// What went wrong without stopping us.
@@ -210,6 +215,7 @@ pub fn info(mission: &Mission) -> Info {
         nodes: nodes.collect(),
         topics,
         advice: Vec::new(),
+        figures: figures(mission),
         undrawn: mission.undrawn.clone(),
         notices: mission.notices.iter().map(|n| n.text).collect(),
     };

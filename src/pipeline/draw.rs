@@ -16,6 +16,7 @@ use crate::view::{Mode, View, ViewOptions, outline, view};
 
 /// What to draw and how.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Drawing {
     /// What is shown.
     pub view: ViewOptions,

@@ -10,7 +10,7 @@ use crate::evidence::topology::nearest::nearest;
 use crate::graph::Elements;
 
 /// The error of a view in which nothing of these elements is left.
-pub fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
+pub(crate) fn nothing(elements: &Elements, options: &ViewOptions) -> Error {
     let nodes: Vec<&str> = elements.nodes.iter().map(|n| n.name.as_str()).collect();
     let topics: Vec<&str> = elements.topics.iter().map(|t| t.name.as_str()).collect();
     let filters = [

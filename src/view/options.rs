@@ -192,6 +192,7 @@ impl Default for Grouping {
 
 /// What the picture shows of the graph.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct ViewOptions {
     /// Boxes and arrows.
     pub mode: Mode,

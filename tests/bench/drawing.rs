@@ -13,13 +13,13 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use bagreel::draw::paint::raster::{Canvas, Painter, Pixels};
-use bagreel::draw::picture::{Measured, PageOptions, Picture};
-use bagreel::draw::scene::Scene;
-use bagreel::draw::style::Style;
-use bagreel::draw::text::Fonts;
-use bagreel::view::{View, ViewOptions, view};
-use bagreel::{layout, mission};
+use bagreel::internals::draw::paint::raster::{Canvas, Painter, Pixels};
+use bagreel::internals::draw::picture::{Measured, PageOptions, Picture};
+use bagreel::internals::draw::scene::Scene;
+use bagreel::internals::draw::style::Style;
+use bagreel::internals::draw::text::Fonts;
+use bagreel::internals::view::{View, ViewOptions, view};
+use bagreel::internals::{layout, mission};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;

@@ -47,8 +47,23 @@ fn stalled(folder: &Path, args: &[&str]) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+    await_handlers(&child);
     std::thread::sleep(Duration::from_millis(300));
     child
+}
+
+/// Waits until the process listens to signals, where the system tells: a loaded machine takes its time.
+fn await_handlers(child: &Child) {
+    let is_caught = || {
+        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
+        let mask = status.lines().find_map(|l| l.strip_prefix("SigCgt:"))?;
+        // A bit for each signal, the first for signal 1; a termination is 15.
+        Some(u64::from_str_radix(mask.trim(), 16).ok()? >> 14 & 1 == 1)
+    };
+    let since = Instant::now();
+    while is_caught() == Some(false) && since.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
 }
 
 #[test]
@@ -125,7 +140,7 @@ fn what_is_to_be_ignored_stays_so() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_millis(400));
+    await_handlers(&child);
     signal(&child, "HUP");
     let mut stdin = child.stdin.take().unwrap();
     stdin.write_all(&fs::read(COURIER).unwrap()).unwrap();

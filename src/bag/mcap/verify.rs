@@ -52,7 +52,7 @@ pub(super) fn read(source: &Source, sink: &mut dyn Sink) -> Result<(), String> {
 }
 
 /// Walks the plain chunks as the crate will, and refuses what it could not bear: it subtracts the length of a record from
-/// what is left of the chunk before it compares them.
+/// what is left of the chunk, its head included, before it compares them.
 fn bound(source: &Source) -> Result<(), String> {
     let mut stream = Stream::of_file(source, 0, source.len(), FAR);
     Mcap::begin(&mut stream);
@@ -65,7 +65,7 @@ fn bound(source: &Source) -> Result<(), String> {
             let end = stream.position() + head.packed;
             while stream.position() < end {
                 let (_, len) = records::head(&mut stream).map_err(|stop| stop.to_string())?;
-                if len > end.saturating_sub(stream.position()) {
+                if stream.position().saturating_add(len) > end {
                     return Err("a record is longer than its chunk".to_owned());
                 }
                 pass(&mut stream, len).map_err(|stop| stop.to_string())?;

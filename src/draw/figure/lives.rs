@@ -130,6 +130,8 @@ impl<'a> Lives<'a> {
         canvas.begin("incidents");
         for (k, incident) in self.incidents.iter().enumerate() {
             if let Some(y) = y_of(incident.track) {
+                let ends = self.tracks[incident.track].lives.iter().filter(|l| l.ends);
+                taken.extend(ends.map(|l| (place.axis.x(l.span.end), y, y)));
                 letter(canvas, place, (incident.at, y), k, &mut taken);
             }
         }

@@ -7,7 +7,7 @@ use super::band::{self, Axis};
 use super::canvas::{Canvas, HAIRLINE, Type, ink};
 use super::groups::{groups, phases_of};
 use super::notes::{flow, sentence};
-use super::page::{Sheet, filter_that_fits, nothing};
+use super::page::{FITTING, Sheet, filter_that_fits, nothing};
 use super::place::{Placed, place, rooms};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
@@ -27,9 +27,6 @@ const PILL: f64 = 3.3;
 const NAMED: usize = 4;
 /// The most nodes that are laid out one by one; more never fit.
 const MOST_NODES: usize = 120;
-
-/// About so many nodes fit on a page.
-const FITTING: usize = 40;
 
 /// One box: what is written in it.
 enum Look {
@@ -56,7 +53,7 @@ struct Drawn {
 pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
     let tracks = of_nodes(sheet.source);
     if tracks.is_empty() {
-        return Err(nothing());
+        return Err(nothing(sheet.source));
     }
     let asked = sheet.options.rows;
     let few = tracks.len() <= MOST_NODES;

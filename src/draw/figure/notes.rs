@@ -1,6 +1,7 @@
 //! Running text below a figure: runs of words and signs that wrap at the width.
 
 use super::canvas::{Canvas, Type};
+use crate::base::geometry::Point;
 use crate::draw::style::Color;
 
 /// A small drawing inside a text: its width in millimetres, and what draws it with its left end and its middle line.
@@ -21,10 +22,16 @@ const GAP: f64 = 2.6;
 /// Writes items one after another from `y`, the top, on; wraps before an item that does not fit, and inside one that
 /// is wider than a line. Answers where the next line would begin.
 pub(crate) fn flow(canvas: &mut Canvas<'_>, width: f64, y: f64, items: &[Item]) -> f64 {
+    flow_at(canvas, Point::new(0.0, y), width, items)
+}
+
+/// The same from a top left corner on.
+pub(crate) fn flow_at(canvas: &mut Canvas<'_>, corner: Point, width: f64, items: &[Item]) -> f64 {
     let line = canvas.sizes.line();
     let mut pen = Place {
+        left: corner.x,
         x: 0.0,
-        y: y + line / 2.0,
+        y: corner.y + line / 2.0,
         width,
         line,
     };
@@ -40,7 +47,7 @@ pub(crate) fn flow(canvas: &mut Canvas<'_>, width: f64, y: f64, items: &[Item]) 
         }
     }
     if items.is_empty() {
-        y
+        corner.y
     } else {
         pen.y + line / 2.0
     }
@@ -52,6 +59,8 @@ pub(crate) fn sentence(color: Color, text: impl Into<String>) -> Item {
 }
 
 struct Place {
+    left: f64,
+    /// From the left.
     x: f64,
     y: f64,
     width: f64,
@@ -67,14 +76,15 @@ impl Place {
     fn put(&mut self, canvas: &mut Canvas<'_>, run: &Run) {
         match run {
             Run::Sign((width, draw)) => {
-                draw(canvas, self.x, self.y);
+                draw(canvas, self.left + self.x, self.y);
                 self.x += width + 0.8;
             }
             Run::Words(of, color, text) => {
                 let mut rest = text.as_str();
                 while !rest.is_empty() {
                     let (now, after) = self.split(canvas, *of, rest);
-                    canvas.text(self.x, self.y, *of, *color, now.trim_end());
+                    let x = self.left + self.x;
+                    canvas.text(x, self.y, *of, *color, now.trim_end());
                     self.x += canvas.width(now, *of);
                     rest = after;
                     if !rest.is_empty() {

@@ -18,6 +18,9 @@ use crate::draw::text::Fonts;
 /// The shortest time axis in millimetres on which anything can be seen.
 const SHORTEST_AXIS: f64 = 15.0;
 
+/// About so many boxes fit on a page.
+pub(crate) const FITTING: usize = 40;
+
 /// What a page is made of.
 pub(crate) struct Sheet<'a> {
     pub(crate) source: &'a Source<'a>,
@@ -56,7 +59,7 @@ impl<'a> Sheet<'a> {
         };
         let first = Lives::new(self.source, by_topics);
         if first.rows.is_empty() {
-            return Err(nothing());
+            return Err(nothing(self.source));
         }
         let is_grouped = self.options.rows == Some(Rows::Groups);
         let (mut scene, mut remarks) = (None, Vec::new());
@@ -168,7 +171,14 @@ fn top_space(name: &str) -> Option<&str> {
     name.get(..=end)
 }
 
-pub(crate) fn nothing() -> Error {
+/// Why there is nothing to draw: filters leave nothing, or the bag tells of no node.
+pub(crate) fn nothing(source: &Source<'_>) -> Error {
+    if source.shown_topics().next().is_some() && source.knows_no_node() {
+        return Error::usage(
+            "no node of this mission is known, so there is nobody to draw",
+            "`--figure lives` draws its topics; `bagreel info` says what would tell more",
+        );
+    }
     Error::usage(
         "nothing is left to draw",
         "`--ns-filter` and `--topic-filter` leave nothing; `bagreel info` lists what there is",

@@ -1,9 +1,10 @@
 //! One step as a panel: its boxes by what became of them, its arrows, its words.
 
 use super::canvas::{Canvas, HAIRLINE, Type, ink};
+use super::notes::{Item, flow_at, sentence};
 use super::place::Placed;
 use super::talks::Talk;
-use crate::base::geometry::{Point, Rect};
+use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
 
@@ -22,19 +23,60 @@ pub(crate) enum Fate {
 /// One box of a panel.
 pub(crate) struct Look {
     pub(crate) fate: Fate,
+    /// The namespace of its names, `/robot2`; empty for that of the whole panel.
     pub(crate) space: String,
     pub(crate) lines: Vec<String>,
 }
 
+impl Look {
+    /// Whether the namespace has a line of its own: where it is long, or stands for several names.
+    fn has_head(&self) -> bool {
+        match self.space.as_str() {
+            "" => false,
+            "/" => self.lines.len() > 1,
+            _ => true,
+        }
+    }
+
+    /// The room it takes.
+    pub(crate) fn size(&self, canvas: &Canvas<'_>) -> Size {
+        let names = self
+            .lines
+            .iter()
+            .map(|l| canvas.width(l, type_of(self.fate)));
+        let widest = names.fold(0.0, f64::max);
+        let space = canvas.width(&self.space, Type::Small);
+        let (wide, rows) = if self.has_head() {
+            (widest.max(space), self.lines.len() + 1)
+        } else {
+            (widest + space, self.lines.len())
+        };
+        Size::new(wide + 2.0, canvas.sizes.line() * rows as f64 + 0.9)
+    }
+}
+
 /// A panel laid out, from its own corner.
 pub(crate) struct Panel {
+    /// Its number and its words.
     pub(crate) heading: (String, String),
+    /// The namespace of the names that have none before them; empty if there is none.
+    pub(crate) home: String,
     pub(crate) looks: Vec<Look>,
     pub(crate) talks: Vec<(Talk, Fate)>,
     pub(crate) labels: Vec<Vec<Vec<String>>>,
     pub(crate) placed: Option<Placed>,
     pub(crate) notes: Vec<(Color, String)>,
     pub(crate) height: f64,
+    /// How much of it the notes take.
+    pub(crate) foot: f64,
+    /// How many nodes live before or after the step and are not drawn.
+    pub(crate) undrawn: usize,
+}
+
+/// Notes as running text.
+pub(crate) fn items(notes: &[(Color, String)]) -> Vec<Item> {
+    let item = |(color, text): &(Color, String)| sentence(*color, text.as_str());
+    notes.iter().map(item).collect()
 }
 
 pub(crate) fn type_of(fate: Fate) -> Type {
@@ -49,22 +91,20 @@ pub(crate) fn type_of(fate: Fate) -> Type {
 pub(crate) fn paint(canvas: &mut Canvas<'_>, panel: &Panel, rect: Rect) {
     canvas.frame(rect, 0.4, ink::PAPER, &Stroke::solid(ink::FOLDED, HAIRLINE));
     let (x, width) = (rect.x + INSIDE, rect.w - 2.0 * INSIDE);
-    let y = rect.y + INSIDE + canvas.cap(Type::Head) / 2.0 + 0.2;
+    let y = rect.y + INSIDE * 0.8 + canvas.cap(Type::Head) / 2.0 + 0.2;
     canvas.text(x, y, Type::Head, ink::TEXT, &panel.heading.0);
     let at = canvas.width(&panel.heading.0, Type::Head) + 1.4;
-    let words = canvas.cut(&panel.heading.1, Type::Name, width - at);
+    canvas.text_end(x + width, y, Type::Small, ink::QUIET, &panel.home);
+    let room = width - at - canvas.width(&panel.home, Type::Small) - 1.4;
+    let words = canvas.cut(&panel.heading.1, Type::Name, room);
     canvas.text(x + at, y, Type::Name, ink::TEXT, &words);
-    let line = canvas.sizes.line();
-    for (k, (color, text)) in panel.notes.iter().rev().enumerate() {
-        let y = rect.bottom() - INSIDE - line * (k as f64 + 0.5) + 0.5;
-        let text = canvas.cut(text, Type::Small, width);
-        canvas.text(x, y, Type::Small, *color, &text);
-    }
+    let top = rect.bottom() - INSIDE * 0.8 - panel.foot + 0.3;
+    flow_at(canvas, Point::new(x, top), width, &items(&panel.notes));
     let Some(placed) = &panel.placed else { return };
     let aside = x + 0.4 + ((width - 1.2 - placed.size.w) / 2.0).max(0.0);
     let placed = placed
         .clone()
-        .moved(aside, rect.y + INSIDE + canvas.sizes.pitch() + 0.6);
+        .moved(aside, rect.y + INSIDE * 0.8 + canvas.sizes.pitch() + 0.6);
     for (at, (talk, fate)) in panel.talks.iter().enumerate() {
         let color = if *fate == Fate::Ended {
             ink::REMOVED
@@ -102,10 +142,16 @@ fn boxed(canvas: &mut Canvas<'_>, look: &Look, rect: Rect) {
         canvas.frame(rect.grown(-0.45), 0.3, Color::NONE, &inner);
     }
     let line = canvas.sizes.line();
-    let y = |k: usize| rect.y + 0.4 + line * (k as f64 + 0.5);
+    let y = |k: usize| rect.y + 0.45 + line * (k as f64 + 0.5);
     canvas.text(rect.x + 1.0, y(0), Type::Small, ink::QUIET, &look.space);
+    let (below, aside) = if look.has_head() {
+        (1, 0.0)
+    } else {
+        (0, canvas.width(&look.space, Type::Small))
+    };
     for (k, text) in look.lines.iter().enumerate() {
-        canvas.text(rect.x + 1.0, y(k + 1), type_of(look.fate), ink::TEXT, text);
+        let x = rect.x + 1.0 + aside;
+        canvas.text(x, y(k + below), type_of(look.fate), ink::TEXT, text);
     }
     if matches!(look.fate, Fate::Began | Fate::Ended) {
         badge(canvas, Point::new(rect.right(), rect.y), look.fate, color);

@@ -1,20 +1,22 @@
 //! Boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed afterwards.
 
 use super::canvas::{Canvas, Type, ink};
+use super::labels::{self, Room, Spot};
 use super::parts::{PARTED, Part, parts, shelves};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Step, Stroke};
 use crate::draw::style::Color;
 use crate::layout::{Engine, Layout, Options, Orientation, Plan, Route, lay_out};
 
-/// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings.
-const TIGHTNESS: [f64; 5] = [3.6, 4.8, 6.5, 9.0, 12.0];
-/// Heights of the page that the engine is to fill, in widths.
-const ASPECTS: [f64; 2] = [0.45, 1.2];
-/// Where along an arrow its label is tried, best first.
-const STATIONS: [f64; 13] = [
-    0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82, 0.46, 0.54, 0.3, 0.7,
-];
+/// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings. The
+/// tightest comes first: where it is too wide, all are.
+const TIGHTNESS: [f64; 5] = [12.0, 9.0, 6.5, 4.8, 3.6];
+/// So many times too wide is too wide at every tightness; a little may be luck, for the engine has several ways.
+const HOPELESS: f64 = 1.25;
+/// The shortest arrow in millimetres, less what the engine leaves around a label: it shows where it goes.
+const SHORTEST: f64 = 3.4;
+/// The height of the page that the engine is to fill, in widths: low.
+const ASPECT: f64 = 0.45;
 /// Pieces that a curve is measured in.
 const PIECES: usize = 8;
 /// A drawing in millimetres, its top left corner at (0, 0).
@@ -26,8 +28,10 @@ pub(crate) struct Placed {
     pub(crate) routes: Vec<Vec<Point>>,
     curves: Vec<Route>,
     /// The middle of each label that found room, and which of its alternatives did.
-    pub(crate) labels: Vec<Option<(Point, usize)>>,
+    pub(crate) labels: Vec<Option<Spot>>,
     pub(crate) left_out: usize,
+    /// How many labels stand on or near an arrow that is not theirs.
+    pub(crate) unclear: usize,
 }
 
 /// The lowest drawing of a plan, in millimetres, that is at most `width` wide and keeps its labels; `None` where all are
@@ -37,7 +41,7 @@ pub(crate) fn place(
     plan: &Plan,
     labels: &[Vec<Size>],
     width: f64,
-    engine: &dyn Engine,
+    engine: &Searcher,
 ) -> Option<Placed> {
     let wanted = labels.iter().filter(|l| !l.is_empty()).count();
     let parts = parts(plan);
@@ -53,17 +57,11 @@ pub(crate) fn place(
             .map(|(at, all)| all[*at].size)
             .collect();
         let (corners, size) = shelves(&sizes, width);
-        let lost: usize = chosen
-            .iter()
-            .zip(&tried)
-            .map(|(at, all)| all[*at].left_out)
-            .sum();
-        let excess = if wanted < MANY {
-            0
-        } else {
-            lost.saturating_sub(wanted / TENTH)
-        };
-        let cost = size.h + lost as f64 * LOST + excess as f64 * EXCESS;
+        let parts = || chosen.iter().zip(&tried).map(|(at, all)| &all[*at]);
+        let lost: usize = parts().map(|p| p.left_out).sum();
+        let excess = lost.saturating_sub(wanted / TENTH);
+        let faults: f64 = parts().map(Placed::faults).sum();
+        let cost = size.h + faults + excess as f64 * EXCESS;
         if best.as_ref().is_none_or(|b| cost < b.cost) {
             let parts = chosen.into_iter().zip(corners).collect();
             best = Some(Choice { cost, parts, size });
@@ -114,41 +112,76 @@ fn choices(tried: &[Vec<Placed>], width: f64) -> Option<Vec<Vec<usize>>> {
     Some(ways)
 }
 
-/// What a label that is left out costs, in millimetres of height.
-const LOST: f64 = 4.0;
-/// The share of many labels, one in so many, that may be left out before each more costs as much as `EXCESS`.
+/// What a label costs that is left out, or near a foreign arrow, in millimetres of height.
+const LOST: f64 = 3.0;
+const UNCLEAR: f64 = 2.0;
+/// The share of labels, one in so many, that may be left out before each more costs as much as `EXCESS`.
 const TENTH: usize = 10;
-const EXCESS: f64 = 15.0;
-const MANY: usize = 15;
+const EXCESS: f64 = 3.0;
 
 /// The cheapest drawing of a part that is at most this wide, else the narrowest.
 fn choice(all: &[Placed], most: f64) -> Option<usize> {
-    let cost = |p: &Placed| p.size.h + p.left_out as f64 * LOST;
+    let cost = |p: &Placed| p.size.h + p.faults();
     let fitting = (0..all.len()).filter(|at| all[*at].size.w <= most);
     let best = fitting.min_by(|a, b| cost(&all[*a]).total_cmp(&cost(&all[*b])));
     best.or_else(|| (0..all.len()).min_by(|a, b| all[*a].size.w.total_cmp(&all[*b].size.w)))
 }
 
-/// Every drawing of a part that fits.
-fn candidates(plan: &Plan, labels: &[Vec<Size>], width: f64, engine: &dyn Engine) -> Vec<Placed> {
+/// Every drawing of a part that fits. The ways are searched side by side, for searching is most of a figure's time.
+fn candidates(plan: &Plan, labels: &[Vec<Size>], width: f64, engine: &Searcher) -> Vec<Placed> {
+    if plan.links.is_empty() {
+        let way = (Orientation::LeftRight, false);
+        return tightened(plan, labels, width, engine, way);
+    }
+    let both = [Orientation::LeftRight, Orientation::TopBottom];
+    let ways = both.map(|orientation| [(orientation, false), (orientation, true)]);
+    std::thread::scope(|scope| {
+        let searches: Vec<_> = ways
+            .concat()
+            .into_iter()
+            .map(|way| scope.spawn(move || tightened(plan, labels, width, engine, way)))
+            .collect();
+        let found = searches.into_iter().map(|s| s.join().unwrap_or_default());
+        found.flatten().collect()
+    })
+}
+
+/// A layout engine that several threads may use.
+type Searcher = dyn Engine + Sync;
+
+/// The drawings of one orientation, from the tightest to the loosest that fits; with room kept for labels
+/// between neighbours, or without.
+fn tightened(
+    plan: &Plan,
+    labels: &[Vec<Size>],
+    width: f64,
+    engine: &Searcher,
+    (orientation, is_labelled): (Orientation, bool),
+) -> Vec<Placed> {
     let mut all = Vec::new();
     for tightness in TIGHTNESS {
-        for orientation in [Orientation::LeftRight, Orientation::TopBottom] {
-            for aspect in ASPECTS {
-                let page = Size::new(width * tightness, width * aspect * tightness);
-                let options = Options {
-                    page,
-                    orientation: Some(orientation),
-                };
-                let layout = lay_out(&scaled(plan, tightness), &options, engine);
-                if layout.size.w <= width * tightness + 0.01 {
-                    all.push(Placed::new(plan, &layout, labels, tightness, width));
-                }
-                if plan.links.is_empty() {
-                    // Nothing else would come of other ways.
-                    return all;
-                }
-            }
+        let options = Options {
+            page: Size::new(width * tightness, width * ASPECT * tightness),
+            orientation: Some(orientation),
+        };
+        let mut sized = scaled(plan, tightness);
+        for (link, label) in sized.links.iter_mut().zip(labels) {
+            let label = label.last().filter(|_| is_labelled);
+            let (w, h) = label.map_or((SHORTEST, 0.0), |l| (l.w.max(SHORTEST), l.h));
+            link.label = Some(Size::new(w * tightness, h.max(SHORTEST) * tightness));
+        }
+        let layout = lay_out(&sized, &options, engine);
+        let wide = layout.size.w / tightness;
+        if wide > width * HOPELESS {
+            break;
+        }
+        if wide > width + 0.001 {
+            continue;
+        }
+        all.push(Placed::new(plan, &layout, labels, tightness, width));
+        if plan.links.is_empty() {
+            // Nothing else would come of more room.
+            break;
         }
     }
     all
@@ -177,6 +210,7 @@ impl Placed {
             curves: vec![Route::default(); plan.links.len()],
             labels: vec![None; labels],
             left_out: 0,
+            unclear: 0,
         }
     }
 
@@ -199,6 +233,12 @@ impl Placed {
             self.labels[*at] = label;
         }
         self.left_out += placed.left_out;
+        self.unclear += placed.unclear;
+    }
+
+    /// What its labels cost.
+    fn faults(&self) -> f64 {
+        self.left_out as f64 * LOST + self.unclear as f64 * UNCLEAR
     }
 
     fn new(plan: &Plan, layout: &Layout, labels: &[Vec<Size>], tightness: f64, width: f64) -> Self {
@@ -228,6 +268,7 @@ impl Placed {
             curves,
             labels: vec![None; labels.len()],
             left_out: 0,
+            unclear: 0,
         };
         let titles: Vec<Rect> = placed
             .clusters
@@ -246,57 +287,28 @@ impl Placed {
         placed
     }
 
-    /// Places the labels, those of short arrows first.
     fn set_labels(&mut self, labels: &[Vec<Size>], titles: Vec<Rect>, width: f64) {
-        let mut taken: Vec<Rect> = self.boxes.iter().map(|b| b.grown(0.25)).collect();
-        taken.extend(titles);
+        let mut fixed: Vec<Rect> = self.boxes.iter().map(|b| b.grown(0.25)).collect();
+        fixed.extend(titles);
         let tips = self.routes.iter().filter_map(|r| r.last());
-        taken.extend(tips.map(|p| Rect::around(*p, Size::new(1.0, 1.0))));
-        let mut order: Vec<usize> = (0..labels.len()).collect();
-        order.sort_by(|a, b| {
-            length(&self.routes[*a])
-                .total_cmp(&length(&self.routes[*b]))
-                .then(a.cmp(b))
-        });
-        for at in order {
-            let mut tries = labels[at].iter().enumerate();
-            let found = tries.find_map(|(k, size)| Some((self.spot(at, *size, &taken, width)?, k)));
-            self.labels[at] = found;
-            match found {
-                Some((spot, k)) => {
-                    let rect = Rect::around(spot, labels[at][k]);
-                    self.size.h = self.size.h.max(rect.bottom());
-                    self.size.w = self.size.w.max(rect.right());
-                    taken.push(rect.grown(0.1));
-                }
-                None if labels[at].is_empty() => {}
-                None => self.left_out += 1,
-            }
+        fixed.extend(tips.map(|p| Rect::around(*p, Size::new(1.0, 1.0))));
+        let room = Room {
+            routes: &self.routes,
+            labels,
+            width,
+            fixed,
+        };
+        self.labels = labels::set(&room);
+        for (at, spot) in self.labels.iter().enumerate() {
+            let Some(spot) = spot else {
+                self.left_out += usize::from(!labels[at].is_empty());
+                continue;
+            };
+            let rect = room.rect(at, *spot);
+            self.size.w = self.size.w.max(rect.right());
+            self.size.h = self.size.h.max(rect.bottom());
+            self.unclear += usize::from(room.is_unclear(at, *spot));
         }
-    }
-
-    fn spot(&self, at: usize, size: Size, taken: &[Rect], width: f64) -> Option<Point> {
-        let route = &self.routes[at];
-        let mut best: Option<(f64, Point)> = None;
-        for (k, part) in STATIONS.into_iter().enumerate() {
-            let (on, normal) = along(route, part)?;
-            let reach = f64::midpoint(normal.x.abs() * size.w, normal.y.abs() * size.h) + 0.35;
-            for (aside, penalty) in [(0.0, 0.0), (reach, 0.8), (-reach, 0.8)] {
-                let centre = Point::new(on.x + normal.x * aside, on.y + normal.y * aside);
-                let rect = Rect::around(centre, size);
-                let outside = rect.x < 0.0 || rect.y < 0.0 || rect.right() > width;
-                if outside || taken.iter().any(|t| t.overlaps(&rect)) {
-                    continue;
-                }
-                let crossed =
-                    (0..self.routes.len()).filter(|o| *o != at && crosses(&self.routes[*o], &rect));
-                let cost = crossed.count() as f64 * 2.0 + penalty + k as f64 * 0.1;
-                if best.is_none_or(|(least, _)| cost < least) {
-                    best = Some((cost, centre));
-                }
-            }
-        }
-        best.map(|(_, centre)| centre)
     }
 
     /// The drawing moved by `dx`, `dy`.
@@ -396,39 +408,4 @@ fn sampled(route: &Route) -> Vec<Point> {
 
 fn distance(a: Point, b: Point) -> f64 {
     libm::hypot(a.x - b.x, a.y - b.y)
-}
-
-fn length(points: &[Point]) -> f64 {
-    points.windows(2).map(|w| distance(w[0], w[1])).sum()
-}
-
-/// The point at this part of a line, and the direction across it.
-fn along(points: &[Point], part: f64) -> Option<(Point, Point)> {
-    let mut left = length(points) * part;
-    for pair in points.windows(2) {
-        let long = distance(pair[0], pair[1]);
-        if long >= left && long > 0.0 {
-            let (dx, dy) = (
-                (pair[1].x - pair[0].x) / long,
-                (pair[1].y - pair[0].y) / long,
-            );
-            let at = Point::new(pair[0].x + dx * left, pair[0].y + dy * left);
-            return Some((at, Point::new(-dy, dx)));
-        }
-        left -= long;
-    }
-    None
-}
-
-/// Whether a line runs through a rectangle.
-fn crosses(points: &[Point], rect: &Rect) -> bool {
-    points.windows(2).any(|pair| {
-        let touched = Rect::new(
-            pair[0].x.min(pair[1].x),
-            pair[0].y.min(pair[1].y),
-            (pair[0].x - pair[1].x).abs().max(1e-6),
-            (pair[0].y - pair[1].y).abs().max(1e-6),
-        );
-        touched.overlaps(rect)
-    })
 }

@@ -68,6 +68,11 @@ impl<'a> Source<'a> {
         knows_publishers(&self.mission.elements, &self.mission.activity)
     }
 
+    /// Whether the mission has no node but recorders and players, whatever filters say.
+    pub(crate) fn knows_no_node(&self) -> bool {
+        self.mission.elements.nodes.iter().all(is_hidden_node)
+    }
+
     pub(crate) fn shows(&self, topic: TopicId) -> bool {
         self.topics.get(topic as usize) == Some(&true)
     }

@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::band::{clock, title};
-use super::canvas::{Canvas, PX_PER_MM, Type, ink};
+use super::canvas::{Canvas, PX_PER_MM, ink};
 use super::groups::groups;
 use super::incidents::configurations;
 use super::notes::{Item, flow, sentence};
-use super::page::{Sheet, nothing};
-use super::panel::{Fate, INSIDE, Look, Panel, paint, type_of};
+use super::page::{FITTING, Sheet, filter_that_fits, nothing};
+use super::panel::{Fate, INSIDE, Look, Panel, items, paint};
 use super::place::{Placed, place, rooms};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
@@ -28,6 +28,8 @@ const SHOWN: usize = 6;
 const ONE_BY_ONE: usize = 8;
 /// The most names in a box.
 const NAMED: usize = 4;
+/// So many ways to put panels into columns are followed; all of those of nine panels in three columns.
+const MOST_WAYS: usize = 729;
 /// Room between two panels.
 const BETWEEN: f64 = 2.0;
 
@@ -37,13 +39,15 @@ struct Studio<'s> {
     tracks: Vec<Track>,
     talks: Talks<'s>,
     found: Vec<Configuration>,
+    /// How many panels stand side by side.
+    columns: usize,
 }
 
 /// The figure.
 pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
     let tracks = of_nodes(sheet.source);
     if tracks.is_empty() {
-        return Err(nothing());
+        return Err(nothing(sheet.source));
     }
     if sheet.source.phases.is_empty() {
         return Err(Error::usage(
@@ -51,7 +55,12 @@ pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
             "`--figure lives` shows what there is; `--phases FILE` cuts by your own times",
         ));
     }
-    let studio = Studio {
+    let mut studio = Studio {
+        columns: match sheet.options.width_mm {
+            w if w >= 150.0 => 3,
+            w if w >= 110.0 => 2,
+            _ => 1,
+        },
         talks: Talks::new(sheet.source, &tracks),
         found: configurations(sheet.source),
         tracks,
@@ -61,10 +70,12 @@ pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
     loop {
         let panels: Option<Vec<Panel>> = chosen.iter().map(|k| studio.panel(*k)).collect();
         let Some(panels) = panels else {
-            return Err(Error::usage(
-                format!("a step is wider than {} mm", sheet.options.width_mm),
-                "`--rows groups` or a larger `--width`, such as `181mm`, would do",
-            ));
+            if studio.columns == 1 {
+                return Err(studio.too_wide());
+            }
+            // Fewer panels side by side are wider.
+            studio.columns -= 1;
+            continue;
         };
         let left = sheet.source.phases.len() - 1 - chosen.len();
         let scene = studio.page(&panels, left);
@@ -127,16 +138,18 @@ impl Studio<'_> {
         changed.collect()
     }
 
-    fn columns(&self) -> usize {
-        match self.sheet.options.width_mm {
-            w if w >= 150.0 => 3,
-            w if w >= 110.0 => 2,
-            _ => 1,
-        }
+    fn too_wide(&self) -> Error {
+        let width = self.sheet.options.width_mm;
+        let hint = match self.sheet.options.rows {
+            _ if width < 181.0 => "`--width 181mm` has more room".to_owned(),
+            Some(Rows::Nodes) => "`--rows groups` makes it smaller".to_owned(),
+            _ => filter_that_fits(&self.tracks, FITTING, "--ns-filter", "node"),
+        };
+        Error::usage(format!("a step is wider than {width} mm"), hint)
     }
 
     fn panel_width(&self) -> f64 {
-        let columns = self.columns() as f64;
+        let columns = self.columns as f64;
         (self.sheet.options.width_mm - BETWEEN * (columns - 1.0)) / columns
     }
 
@@ -173,15 +186,13 @@ impl Studio<'_> {
         let linked = self.neighbours(k, &mut boxes, &mut vertex, (before, after));
         let fates: Vec<Fate> = boxes.iter().map(|(fate, _)| *fate).collect();
         let talks = self.talks(k, &vertex, &fates, &handed);
+        let home = self.home(&boxes);
         let looks: Vec<Look> = boxes
             .iter()
             .enumerate()
             .map(|(at, (fate, members))| {
-                self.look(
-                    *fate,
-                    members,
-                    (at >= changed).then(|| linked.get(&at).copied()).flatten(),
-                )
+                let named = (at >= changed).then(|| linked.get(&at).copied()).flatten();
+                self.look(*fate, members, named, home)
             })
             .collect();
         let phase = &source.phases[k];
@@ -197,37 +208,26 @@ impl Studio<'_> {
             notes.push((ink::CHANGED, text));
         }
         let drawn: BTreeSet<usize> = boxes.iter().flat_map(|(_, m)| m.iter().copied()).collect();
-        let there = before
-            .union(after)
-            .filter_map(place_of)
-            .filter(|at| !drawn.contains(at))
-            .count();
-        if there > 0 {
-            notes.push((
-                ink::QUIET,
-                format!("{} not drawn", words::count(there, "node")),
-            ));
-        }
+        let there = before.union(after).filter_map(place_of);
+        let undrawn = there.filter(|at| !drawn.contains(at)).count();
         let labels: Vec<Vec<Vec<String>>> =
             talks.iter().map(|(t, _)| t.labels(source, 1)).collect();
         let placed = self.placed(&canvas, &looks, &talks, &labels)?;
-        let high = placed.size.h;
-        let line = canvas.sizes.line();
+        let inside = self.panel_width() - 2.0 * INSIDE;
+        let foot = flow(&mut self.sheet.canvas(), inside, 0.0, &items(&notes));
         let heading = (
             format!("{k} → {}", k + 1),
             format!("{at} {}", title(source, k)),
         );
         Some(Panel {
             heading,
+            home: home.map_or_else(String::new, |space| format!("in {space}")),
             looks,
             talks,
             labels,
-            height: INSIDE * 2.0
-                + canvas.sizes.pitch()
-                + 0.6
-                + high
-                + 0.8
-                + line * notes.len() as f64,
+            height: INSIDE * 1.6 + canvas.sizes.pitch() + 0.6 + placed.size.h + 0.8 + foot,
+            foot,
+            undrawn,
             placed: Some(placed),
             notes,
         })
@@ -347,7 +347,30 @@ impl Studio<'_> {
         all
     }
 
-    fn look(&self, fate: Fate, members: &[usize], named: Option<usize>) -> Look {
+    /// The namespace that most boxes are in, which is then said once: none if it is the root, or that of one box.
+    fn home(&self, boxes: &[(Fate, Vec<usize>)]) -> Option<&str> {
+        let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
+        for first in boxes.iter().filter_map(|(_, members)| members.first()) {
+            *spaces.entry(self.space(*first)).or_default() += 1;
+        }
+        let often = spaces
+            .into_iter()
+            .filter(|(space, many)| *space != "/" && *many > 1);
+        let most = often.max_by_key(|(space, many)| (*many, std::cmp::Reverse(*space)));
+        most.map(|(space, _)| space)
+    }
+
+    fn space(&self, at: usize) -> &str {
+        namespace(&self.tracks[at].name)
+    }
+
+    fn look(
+        &self,
+        fate: Fate,
+        members: &[usize],
+        named: Option<usize>,
+        home: Option<&str>,
+    ) -> Look {
         let name = |at: usize| last_part(&self.tracks[at].name).to_owned();
         let lines = match (named, members) {
             (Some(first), members) if members.len() > 1 => {
@@ -362,9 +385,8 @@ impl Studio<'_> {
                 lines
             }
         };
-        let space = members
-            .first()
-            .map_or("", |at| namespace(&self.tracks[*at].name));
+        let space = members.first().map_or("/", |at| self.space(*at));
+        let space = if Some(space) == home { "" } else { space };
         Look {
             fate,
             space: space.to_owned(),
@@ -379,16 +401,10 @@ impl Studio<'_> {
         talks: &[(Talk, Fate)],
         labels: &[Vec<Vec<String>>],
     ) -> Option<Placed> {
-        let vertex = |look: &Look| {
-            let of = type_of(look.fate);
-            let names = look.lines.iter().map(|l| canvas.width(l, of));
-            let widest = names.fold(canvas.width(&look.space, Type::Small), f64::max);
-            let rows = look.lines.len() as f64;
-            Vertex {
-                size: Size::new(widest + 2.0, canvas.sizes.line() * (rows + 1.0) + 0.8),
-                outline: Outline::Box,
-                cluster: None,
-            }
+        let vertex = |look: &Look| Vertex {
+            size: look.size(canvas),
+            outline: Outline::Box,
+            cluster: None,
         };
         let link = |(talk, _): &(Talk, Fate)| Link {
             from: talk.from,
@@ -410,12 +426,10 @@ impl Studio<'_> {
     fn page(&self, panels: &[Panel], left: usize) -> Scene {
         let sheet = self.sheet;
         let mut canvas = sheet.canvas();
-        let (columns, wide) = (self.columns(), self.panel_width());
-        // Each panel into the column that is shortest so far, so that high ones leave no holes.
+        let (columns, wide) = (self.columns, self.panel_width());
+        let heights: Vec<f64> = panels.iter().map(|p| p.height).collect();
         let mut ends = vec![0.1_f64; columns];
-        for (at, panel) in panels.iter().enumerate() {
-            let shortest = (0..columns).min_by(|a, b| ends[*a].total_cmp(&ends[*b]));
-            let column = shortest.unwrap_or(0);
+        for (at, (panel, column)) in panels.iter().zip(in_columns(&heights, columns)).enumerate() {
             canvas.begin(&format!("step-{}", at + 1));
             let x = (wide + BETWEEN) * column as f64;
             let rect = Rect::new(x + 0.1, ends[column], wide - 0.2, panel.height);
@@ -438,6 +452,11 @@ impl Studio<'_> {
             let text = format!("{} left out.", words::count(lost, "topic name"));
             items.push(sentence(ink::QUIET, text));
         }
+        let undrawn: Vec<String> = panels.iter().map(|p| p.undrawn.to_string()).collect();
+        if panels.iter().any(|p| p.undrawn > 0) {
+            let text = format!("Nodes not drawn, panel by panel: {}.", undrawn.join(", "));
+            items.push(sentence(ink::QUIET, text));
+        }
         if left > 0 {
             let text = format!("{} left out.", words::count(left, "smaller step"));
             items.push(sentence(ink::QUIET, text));
@@ -448,4 +467,28 @@ impl Studio<'_> {
             sheet.title("Steps"),
         )
     }
+}
+
+/// The column of each panel: the first ones side by side, the others such that the highest column is as low as can be.
+fn in_columns(heights: &[f64], columns: usize) -> Vec<usize> {
+    let first: Vec<usize> = (0..heights.len().min(columns)).collect();
+    let highest = |way: &[usize]| {
+        let mut ends = vec![0.0_f64; columns];
+        for (height, column) in heights.iter().zip(way) {
+            ends[*column] += height;
+        }
+        ends.into_iter().fold(0.0, f64::max)
+    };
+    let mut ways = vec![first];
+    for _ in columns..heights.len() {
+        let more = |way: &Vec<usize>| {
+            let next = |column| [&way[..], &[column]].concat();
+            (0..columns).map(next).collect::<Vec<_>>()
+        };
+        ways = ways.iter().flat_map(more).collect();
+        // Stable, so that of equals the one that reads best stays first.
+        ways.sort_by(|a, b| highest(a).total_cmp(&highest(b)));
+        ways.truncate(MOST_WAYS);
+    }
+    ways.into_iter().next().unwrap_or_default()
 }

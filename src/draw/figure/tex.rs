@@ -93,7 +93,7 @@ fn escaped(text: &str) -> String {
 pub(crate) fn file(figure: &Figure, picture: &str, options: &Options) -> String {
     let star = if options.width_mm > 120.0 { "*" } else { "" };
     format!(
-        "% Written by bagreel. Needs \\usepackage{{graphicx}}.\n\\begin{{figure{star}}}\n  \\centering\n  \
+        "% Written by bagreel. Needs \\usepackage{{graphicx}}.\n\\begin{{figure{star}}}[t]\n  \\centering\n  \
          \\includegraphics{{{picture}}}\n  \\caption{{{}}}\n  \\label{{fig:{}}}\n\\end{{figure{star}}}\n",
         figure.caption,
         options.kind.word()

@@ -235,7 +235,7 @@ impl<'a> Artist<'a> {
         }
         self.at = Some(at);
         let frame = Frame {
-            frame_time,
+            time: frame_time,
             scene: &scene,
             pixels,
             palette: &self.pool.palette,

@@ -108,6 +108,10 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
     info.advice
         .iter()
         .try_for_each(|line| writeln!(out, "to know more: {line}"))?;
+    for figure in &info.figures {
+        let (word, shows) = (figure.figure, &figure.shows);
+        writeln!(out, "for a paper: `--figure {word}` shows {shows}")?;
+    }
     writeln!(out)
 }
 

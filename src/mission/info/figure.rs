@@ -1,0 +1,86 @@
+//! Which figure for a paper fits a mission: the first says most, the others say something too.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use crate::base::name::is_quiet;
+use crate::base::words;
+use crate::mission::Mission;
+use crate::mission::activity::is_hidden_node;
+use crate::mission::phases::knows_publishers;
+
+/// A figure that fits a mission.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FigureInfo {
+    /// The word of `--figure`.
+    pub figure: &'static str,
+    /// What it would show, and how much of it.
+    pub shows: String,
+}
+
+/// The figures that fit, the best first: life lines where something comes and goes, else the map where it is known who
+/// talks to whom.
+pub(super) fn figures(mission: &Mission) -> Vec<FigureInfo> {
+    let many = mission.ledger.phases.len();
+    let fitting = [lives(mission), map(mission), steps(many)];
+    let mut all: Vec<FigureInfo> = fitting.into_iter().flatten().collect();
+    if many <= 1 {
+        all.sort_by_key(|f| f.figure != "map");
+    }
+    all
+}
+
+fn lives(mission: &Mission) -> Option<FigureInfo> {
+    let elements = &mission.elements;
+    let shown = elements.nodes.iter().filter(|n| !is_hidden_node(n));
+    let roles: BTreeSet<&str> = shown.map(|n| &*n.role).collect();
+    let topics = elements.topics.iter();
+    let topics = topics.filter(|t| !is_quiet(t.name.as_str())).count();
+    let lives = if knows_publishers(elements, &mission.activity) && !roles.is_empty() {
+        format!("what was alive when: {}", words::count(roles.len(), "node"))
+    } else {
+        let topics = words::count(topics, "topic");
+        format!(
+            "when which topic carried messages: {topics}, of most of which no publisher is known"
+        )
+    };
+    (topics > 0).then_some(FigureInfo {
+        figure: "lives",
+        shows: lives,
+    })
+}
+
+fn map(mission: &Mission) -> Option<FigureInfo> {
+    let elements = &mission.elements;
+    let is_shown = |node: u32| {
+        let node = elements.nodes.get(node as usize);
+        node.is_some_and(|n| !is_hidden_node(n))
+    };
+    let sent: BTreeSet<u32> = ends(&elements.publishes, &is_shown);
+    let heard: BTreeSet<u32> = ends(&elements.subscribes, &is_shown);
+    let both = sent.intersection(&heard).filter(|topic| {
+        let topic = elements.topics.get(**topic as usize);
+        topic.is_some_and(|t| !is_quiet(t.name.as_str()))
+    });
+    let both = both.count();
+    (both > 0).then(|| FigureInfo {
+        figure: "map",
+        shows: format!("who talks to whom: over {}", words::count(both, "topic")),
+    })
+}
+
+/// The topics of edges whose nodes are shown.
+fn ends(edges: &[crate::graph::Edge], is_shown: &dyn Fn(u32) -> bool) -> BTreeSet<u32> {
+    let shown = edges.iter().filter(|e| is_shown(e.node));
+    shown.map(|e| e.topic).collect()
+}
+
+fn steps(phases: usize) -> Option<FigureInfo> {
+    let many = phases.checked_sub(1).filter(|n| *n > 0)?;
+    let many = words::count(many, "step");
+    Some(FigureInfo {
+        figure: "steps",
+        shows: format!("the reconfigurations one by one: {many}"),
+    })
+}
