@@ -175,8 +175,9 @@ fn ends<'a>(elements: &'a Elements, edge: &Edge) -> Option<(&'a str, &'a str)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::Attendance::{self, Away, Here, Joined, Left};
     use crate::view::testing::mission;
-    use crate::view::{Attendance, Mark, outline, view};
+    use crate::view::{Mark, outline, view};
 
     fn robot(n: usize, more: &str) -> String {
         format!("/r{n}/drive>/r{n}/odom@2 /r{n}/plan</r{n}/odom /r{n}/drive>/tf@1 {more}")
@@ -229,7 +230,6 @@ mod tests {
         let windows = [all(&[1, 2, 3]), all(&[1, 2, 3, 4]), all(&[2, 3, 4])];
         let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
         let (seen, _) = view(&mission(&windows), &ViewOptions::default());
-        use Attendance::{Away, Here, Joined, Left};
         let rolls: Vec<&[Attendance]> = seen.frames.iter().map(|f| &f.rolls[0][..]).collect();
         assert_eq!(rolls[0], [Here, Here, Here, Away]);
         assert_eq!(rolls[1], [Here, Here, Here, Joined]);
