@@ -31,7 +31,8 @@ impl Gather {
             ..Shown::plain(id, state, degree)
         });
         let (hz, count) = (one.hz, one.count);
-        shown.each += 1;
+        // Those that are there and send nothing would water down the rate of each.
+        shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
         shown.is_paused &= one.is_paused;
         shown.state = shown.state.min(state);
         shown.degree = shown.degree.min(degree);
