@@ -15,6 +15,7 @@ mod marks;
 mod names;
 mod nothing;
 mod options;
+mod replicas;
 mod roles;
 pub(crate) mod runs;
 mod select;
@@ -51,9 +52,21 @@ pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     stage(viewed, options, Vec::new())
 }
 
-fn stage(viewed: items::Viewed, options: &ViewOptions, frames: Vec<Frame>) -> View {
+fn stage(viewed: items::Viewed, options: &ViewOptions, mut frames: Vec<Frame>) -> View {
     let mut items = viewed.items;
-    let namespaces = cluster::clusters(&mut items, options.group.namespaces);
+    let mut namespaces = cluster::clusters(&mut items, options.group.namespaces);
+    let mut drawn = Vec::new();
+    for namespace in &mut namespaces {
+        let fleets = viewed.fleets.all.iter().zip(0_usize..);
+        if let Some((fleet, at)) = fleets.into_iter().find(|(f, _)| f.name == namespace.name) {
+            namespace.replicas = fleet.indices();
+            drawn.push(at);
+        }
+    }
+    for frame in &mut frames {
+        let roll = |at: &usize| frame.rolls.get(*at).cloned().unwrap_or_default();
+        frame.rolls = drawn.iter().map(roll).collect();
+    }
     View {
         items,
         arrows: viewed.arrows,
@@ -96,6 +109,8 @@ pub struct Item {
     pub label: Arc<str>,
     /// The nodes and topics it stands for, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
+    /// Whether its members are the same thing in several equal namespaces.
+    pub is_replica: bool,
     /// The innermost namespace whose box it stands in: a place in [`View::namespaces`].
     pub cluster: Option<usize>,
 }
@@ -107,6 +122,21 @@ pub struct Namespace {
     pub name: Arc<str>,
     /// The namespace around it: a place in [`View::namespaces`], smaller than its own.
     pub parent: Option<usize>,
+    /// Where several equal namespaces are drawn as this one, what tells each from the others: `01`, `02`.
+    pub replicas: Vec<Arc<str>>,
+}
+
+/// Whether one of several equal namespaces is there in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Attendance {
+    /// It is not.
+    Away,
+    /// It is, from the beginning to the end.
+    Here,
+    /// It came.
+    Joined,
+    /// It went.
+    Left,
 }
 
 /// What an arrow of the picture stands for.
@@ -215,6 +245,8 @@ pub struct Shown {
     pub entries: Vec<EntryId>,
     /// How many topics a bundle carries; 0 for all else.
     pub topics: usize,
+    /// For how many of several equal namespaces it stands in the window; 0 for all else.
+    pub each: usize,
     /// What happened inside a folded namespace or a bundle.
     pub inside: Option<Box<Counts>>,
     /// Messages in the window, if known.
@@ -237,6 +269,7 @@ impl Shown {
             is_paused: false,
             entries: Vec::new(),
             topics: 0,
+            each: 0,
             inside: None,
             count: None,
             lifecycle: None,
@@ -322,6 +355,8 @@ pub struct Frame {
     pub items: Vec<Shown>,
     /// Arrows in the window, ghosts included, sorted by id.
     pub arrows: Vec<Shown>,
+    /// For each namespace that stands for several, in the order of [`View::namespaces`], which of them are there.
+    pub rolls: Vec<Vec<Attendance>>,
     /// What happened in it, in the order of the ledger. Chips, caption, marks and timeline all tell this.
     pub headlines: Vec<Headline>,
     /// The headlines counted.
@@ -340,6 +375,7 @@ impl Frame {
             messages: 0,
             items: Vec::new(),
             arrows: Vec::new(),
+            rolls: Vec::new(),
             headlines: Vec::new(),
             counts: Counts::default(),
             caption: Vec::new(),

@@ -41,7 +41,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["graphs", "lives", "sending"], &["build", "diff", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
-        &["cluster", "collapse", "counts", "filter", "lives", "names", "roles", "runs", "settle", "union"],
+        &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "settle", "union"],
         &["options"],
         &["group", "select"],
         &["items"],

@@ -61,6 +61,7 @@ fn mission(windows: usize) -> (Mission, View) {
     );
     let mission = read_json(&text, "mission.json".as_ref()).unwrap();
     let frame = |index: usize| Frame {
+        rolls: Vec::new(),
         index,
         span: Span {
             start: second(index),

@@ -294,9 +294,14 @@ impl<'a> Picture<'a> {
         let full = self.inhabited(frame);
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
         let mut titles = Vec::new();
+        let mut rolls = frame.rolls.iter();
         for (at, (space, place)) in spaces.enumerate() {
-            let mut space = boxes.space(space, *place, &encoded(&space.name), !full[at]);
+            let id = encoded(&space.name);
+            let roll = (!space.replicas.is_empty()).then(|| rolls.next()).flatten();
+            let roll = roll.map(|who| boxes.roll(space, *place, &id, who));
+            let mut space = boxes.space(space, *place, &id, !full[at]);
             titles.push(boxes.title_of(&mut space));
+            titles.extend(roll.filter(|roll| !roll.pieces.is_empty()));
             groups.push(space);
         }
         let arrows = Arrows {

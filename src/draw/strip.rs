@@ -405,6 +405,7 @@ mod tests {
             name: Arc::from(name),
             label: Arc::from(name),
             members: vec![Element::Node(id)],
+            is_replica: false,
             cluster: None,
         };
         let shown = |id, mark| Shown {
@@ -412,6 +413,7 @@ mod tests {
             ..Shown::plain(id, State::Active, Degree::Measured)
         };
         let frame = |(index, mark): (usize, Option<Mark>)| Frame {
+            rolls: Vec::new(),
             index,
             span: Span {
                 start: minute(index),

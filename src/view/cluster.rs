@@ -40,6 +40,7 @@ pub(crate) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespac
         .map(|space| Namespace {
             name: Arc::from(*space),
             parent: innermost(parent(space)),
+            replicas: Vec::new(),
         })
         .collect()
 }
@@ -94,6 +95,7 @@ mod tests {
             name: Arc::from(*name),
             label: Arc::from(*name),
             members: Vec::new(),
+            is_replica: false,
             cluster: None,
         };
         let mut items: Vec<Item> = names.iter().map(item).collect();

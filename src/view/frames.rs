@@ -2,11 +2,12 @@
 
 use super::caption::Speaker;
 use super::items::Viewed;
-use super::lives::Lives;
+use super::lives::{Alive, Lives};
 use super::marks::{News, Told};
 use super::settle::settle;
 use super::state::{Presence, States, present};
-use super::{ArrowKind, Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
+use super::{ArrowKind, Attendance, Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
+use crate::graph::Element;
 use crate::mission::Mission;
 
 /// The windows one after the other.
@@ -20,9 +21,10 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
         let alive = lives.during(span);
         let paused = lives.paused(span, &alive);
         let now = present(&graph, options, viewed, (&alive, &paused));
+        let (before, after) = (lives.before(span.start), lives.before(span.end));
         let turn = Turn {
-            before: Presence::of(viewed, &lives.before(span.start)),
-            after: Presence::of(viewed, &lives.before(span.end)),
+            before: Presence::of(viewed, &before),
+            after: Presence::of(viewed, &after),
             news: News::new(&mission.ledger, &parts, span, viewed),
         };
         let items = turn.items(viewed, now.0);
@@ -35,6 +37,7 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
             counts: Counts::of(&turn.news.headlines),
             caption: speaker.caption(&turn.news.headlines),
             headlines: turn.news.headlines,
+            rolls: rolls(viewed, &before, &after, window.index == 0),
             items,
             arrows,
         });
@@ -42,6 +45,32 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
     settle(&mut frames, viewed.items.len(), |frame| &mut frame.items);
     settle(&mut frames, viewed.arrows.len(), |frame| &mut frame.arrows);
     frames
+}
+
+/// Who of each fleet is there, given who lives before and after the window.
+fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<Vec<Attendance>> {
+    let lives = |alive: &Alive, element: &Element| {
+        let (list, id) = match element {
+            Element::Node(id) => (&alive.nodes, *id),
+            Element::Topic(id) => (&alive.topics, *id),
+            Element::Publish(_) | Element::Subscribe(_) => return false,
+        };
+        list.get(id as usize) == Some(&true)
+    };
+    let attendance = |elements: &Vec<Element>| {
+        let is = |alive: &Alive| elements.iter().any(|e| lives(alive, e));
+        match (is(before), is(after)) {
+            (false, true) if is_first => Attendance::Here,
+            (false, true) => Attendance::Joined,
+            (true, true) => Attendance::Here,
+            (true, false) => Attendance::Left,
+            (false, false) => Attendance::Away,
+        }
+    };
+    let fleets = viewed.fleets.all.iter();
+    fleets
+        .map(|fleet| fleet.elements.iter().map(attendance).collect())
+        .collect()
 }
 
 /// What is there before and after a window, and what is told in between.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::collapse::{Collapse, swallows};
 use super::group::{Groups, groups};
 use super::names::is_debug_label;
+use super::replicas::Fleets;
 use super::roles;
 use super::select::{Selection, finish, select};
 use super::{Arrow, ArrowKind, Item, ItemKind, Mode, ViewOptions};
@@ -28,6 +29,8 @@ pub(crate) enum Place {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Viewed {
     pub(crate) selection: Selection,
+    /// Equal namespaces that are drawn as one.
+    pub(crate) fleets: Fleets,
     pub(crate) items: Vec<Item>,
     pub(crate) arrows: Vec<Arrow>,
     /// Per node of the mission, its item.
@@ -54,6 +57,14 @@ pub(crate) struct Viewed {
 /// millions, which nobody could read.
 const MOST_PAIRS: usize = 200_000;
 
+/// The fleets to draw as one: none where names are wanted exactly, or everything on its own.
+fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
+    if options.exact_names || options.group == super::Grouping::NONE {
+        return Fleets::default();
+    }
+    Fleets::new(elements, options)
+}
+
 type Key = (ItemKind, Arc<str>);
 type Ends = (u32, u32, ArrowKind);
 
@@ -76,6 +87,7 @@ impl Viewed {
         let pair = |edge: &Edge| (edge.node, edge.topic);
         let mut viewed = Self {
             selection,
+            fleets: fleets(elements, options),
             published: elements.publishes.iter().map(pair).collect(),
             subscribed: elements.subscribes.iter().map(pair).collect(),
             ..Self::default()
@@ -93,16 +105,21 @@ impl Viewed {
     fn set_items(&mut self, elements: &Elements, options: &ViewOptions, groups: &Groups) {
         let collapse = Collapse::new(options);
         let seen = |reasons: &[Option<_>], at: usize| reasons.get(at) == Some(&None);
-        let names = if options.exact_names {
+        let mut names: Vec<Arc<str>> = if options.exact_names {
             elements.nodes.iter().map(|n| n.name.shared()).collect()
         } else {
             roles::boxes(elements)
         };
+        for name in &mut names {
+            if let Some(stand_in) = self.fleets.stand_in(name) {
+                *name = stand_in;
+            }
+        }
         let nodes: Vec<Option<Key>> = (elements.nodes.iter().zip(&names).enumerate())
-            .map(|(at, (node, name))| {
+            .map(|(at, (_, name))| {
                 let plain = || (ItemKind::Node, Arc::clone(name));
                 seen(&self.selection.nodes, at).then(|| {
-                    let space = collapse.of(node.name.as_str());
+                    let space = collapse.of(name);
                     space.map_or_else(plain, |s| (ItemKind::Namespace, s.into()))
                 })
             })
@@ -117,8 +134,13 @@ impl Viewed {
                 }
             }
             set_groups(&mut topics, groups);
+            for key in topics.iter_mut().flatten() {
+                if let Some(stand_in) = self.fleets.stand_in(&key.1) {
+                    key.1 = stand_in;
+                }
+            }
             if !collapse.is_empty() {
-                swallow(elements, &collapse, &nodes, &mut topics);
+                swallow(elements, (&collapse, &names), &nodes, &mut topics);
             }
         }
         let mut members: BTreeMap<&Key, Vec<Element>> = BTreeMap::new();
@@ -143,6 +165,7 @@ impl Viewed {
                 name: Arc::clone(name),
                 label: Arc::clone(name),
                 members,
+                is_replica: *kind != ItemKind::Namespace && self.fleets.of(name).is_some(),
                 cluster: None,
             })
             .collect();
@@ -367,7 +390,7 @@ fn set_groups(topics: &mut [Option<Key>], groups: &Groups) {
 /// Moves topics and groups that belong inside a collapsed namespace into it.
 fn swallow(
     elements: &Elements,
-    collapse: &Collapse<'_>,
+    (collapse, names): (&Collapse<'_>, &[Arc<str>]),
     nodes: &[Option<Key>],
     topics: &mut [Option<Key>],
 ) {
@@ -379,12 +402,7 @@ fn swallow(
     let space = |edge: &Edge| {
         let node = edge.node as usize;
         nodes.get(node)?.as_ref()?;
-        Some(
-            elements
-                .nodes
-                .get(node)
-                .and_then(|n| collapse.of(n.name.as_str())),
-        )
+        Some(names.get(node).and_then(|name| collapse.of(name)))
     };
     let publishes = elements.publishes.iter().map(|e| (e, true));
     let subscribes = elements.subscribes.iter().map(|e| (e, false));

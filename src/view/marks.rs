@@ -134,6 +134,7 @@ impl Reach {
     fn of_item(viewed: &Viewed, id: u32) -> Self {
         match viewed.items.get(id as usize) {
             Some(item) if item.kind == ItemKind::Namespace => Self::Inside,
+            Some(item) if item.is_replica => Self::Part,
             // Runs of one node, of which one lives at a time.
             Some(item) if item.kind == ItemKind::Node => Self::Whole,
             Some(item) if item.members.len() > 1 => Self::Part,
@@ -148,7 +149,7 @@ impl Reach {
             .map_or(0, |a| a.members.len());
         let is_role = |id: u32| {
             let item = viewed.items.get(id as usize);
-            item.is_some_and(|i| i.kind == ItemKind::Node && i.members.len() > 1)
+            item.is_some_and(|i| i.kind == ItemKind::Node && i.members.len() > 1 && !i.is_replica)
         };
         let ends = viewed.arrows.get(id as usize).map(|a| [a.from, a.to]);
         let topics = ends.is_some_and(|ends| ends.into_iter().any(is_role));

@@ -324,6 +324,7 @@ mod tests {
 
     fn runs(story: Story<'_>) -> Runs {
         let frame = |(index, there): (usize, &Option<(Option<Mark>, f64)>)| Frame {
+            rolls: Vec::new(),
             index,
             span: Span {
                 start: Stamp(0),

@@ -31,6 +31,8 @@ impl Gather {
             ..Shown::plain(id, state, degree)
         });
         let (hz, count) = (one.hz, one.count);
+        // Those that are there and send nothing would water down the rate of each.
+        shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
         shown.is_paused &= one.is_paused;
         shown.state = shown.state.min(state);
         shown.degree = shown.degree.min(degree);
@@ -146,6 +148,9 @@ pub(crate) fn present(
         _ => present_arrows(graph, options, viewed, lives),
     };
     for (slot, arrow) in arrows.iter_mut().zip(&viewed.arrows) {
+        if let Some(shown) = slot {
+            shown.each = 0;
+        }
         let there = |id: u32| items.get(id as usize).is_some_and(Option::is_some);
         if !(there(arrow.from) && there(arrow.to)) {
             *slot = None;
@@ -204,6 +209,11 @@ fn present_items(
         let item = viewed.items.get(*id as usize);
         let hz = one.hz.filter(|_| !item.is_some_and(has_nodes));
         items.add(*id, &One { hz, ..one });
+    }
+    for (slot, item) in items.0.iter_mut().zip(&viewed.items) {
+        if let Some(shown) = slot.as_mut().filter(|_| !item.is_replica) {
+            shown.each = 0;
+        }
     }
     items.0
 }

@@ -31,6 +31,7 @@ pub(crate) fn union(view: &View) -> Option<Frame> {
         all
     };
     Some(Frame {
+        rolls: Vec::new(),
         index: 0,
         span: Span {
             start: first.span.start,

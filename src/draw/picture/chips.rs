@@ -79,10 +79,11 @@ pub(crate) fn came_and_went(counts: &Counts) -> String {
 /// The rate in a window with no more digits than its messages allow; `None` for none.
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
     let hz = shown.hz.filter(|hz| *hz > 0.0)?;
-    Some(match shown.count {
-        Some(count) if count > 0 => rate_of(count, count as f64 / hz),
-        _ => rate(hz),
-    })
+    let text = match shown.count {
+        Some(count) if count > 0 && shown.each < 2 => rate_of(count, count as f64 / hz),
+        _ => rate(hz / shown.each.max(1) as f64),
+    };
+    Some(if shown.each > 1 { text + " each" } else { text })
 }
 
 /// What is known of an element in this window: `active, measured, 50 Hz`.

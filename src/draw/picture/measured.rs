@@ -54,7 +54,29 @@ pub(crate) struct Space {
     pub(crate) name: String,
     /// Its title: the part inside the namespace around it.
     pub(crate) title: String,
+    /// What tells equal namespaces apart that are drawn as this one; empty for a single one.
+    pub(crate) replicas: Vec<String>,
 }
+
+/// The chips of the roll call of a namespace that stands for several: left edges and widths, from where the title begins.
+pub(crate) fn roll(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
+    if space.replicas.len() > MOST_CHIPS {
+        return Vec::new();
+    }
+    let mut x = fonts.width(&space.title, size, Weight::SemiBold) + size;
+    let chip = |index: &String| {
+        let width = fonts.width(index, size * CHIP_TEXT, Weight::SemiBold) + size * 0.6;
+        let at = x;
+        x += width + size * 0.2;
+        (at, width)
+    };
+    space.replicas.iter().map(chip).collect()
+}
+
+/// More equal namespaces than this are only counted.
+const MOST_CHIPS: usize = 32;
+/// The text of a chip over that of the title.
+pub(crate) const CHIP_TEXT: f64 = 0.8;
 
 /// The labels of a view, and the plan that follows from them.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,10 +156,10 @@ impl Measurer<'_> {
 
     fn title(&self, space: &Space) -> Size {
         let size = self.style.cluster.size;
-        Size::new(
-            self.fonts.width(&space.title, size, Weight::SemiBold),
-            size * LINE,
-        )
+        let title = self.fonts.width(&space.title, size, Weight::SemiBold);
+        let roll = roll(space, self.fonts, size);
+        let end = roll.last().map_or(title, |(x, width)| x + width);
+        Size::new(end, size * LINE)
     }
 
     fn label(&self, item: &Item, inside: &str, second: bool) -> Label {
@@ -386,7 +408,15 @@ fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
     (0..view.namespaces.len())
         .map(|at| Space {
             name: view.namespaces[at].name.to_string(),
-            title: fonts.shown(title(at)).into_owned(),
+            title: match view.namespaces[at].replicas.len() {
+                0 => fonts.shown(title(at)).into_owned(),
+                n => format!("{} × {n}", fonts.shown(title(at))),
+            },
+            replicas: view.namespaces[at]
+                .replicas
+                .iter()
+                .map(ToString::to_string)
+                .collect(),
         })
         .collect()
 }

@@ -60,6 +60,7 @@ pub(super) fn changed(view: &View) -> Option<(Frame, usize)> {
         items: pick(&items, &mut boxes.into_iter()),
         arrows: pick(&arrows, &mut drawn.into_iter()),
         headlines: Vec::new(),
+        rolls: Vec::new(),
         counts: Counts::default(),
         caption: Vec::new(),
         ..*frame

@@ -1,0 +1,246 @@
+//! Namespaces that are the same but for their index, such as the robots of a fleet: they are drawn once for all.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::ViewOptions;
+use crate::base::name::namespace;
+use crate::graph::{Edge, Element, Elements};
+
+/// Fewer than this are drawn side by side.
+const FEWEST: usize = 3;
+
+/// Namespaces with the same graph, drawn as one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Fleet {
+    /// The name it is drawn under: `/robotNN`.
+    pub(crate) name: Arc<str>,
+    /// Its namespaces, sorted: `/robot01`.
+    pub(crate) members: Vec<Arc<str>>,
+    /// The nodes of each, or its topics if it has none.
+    pub(crate) elements: Vec<Vec<Element>>,
+}
+
+impl Fleet {
+    /// What tells each member from the others: `01`.
+    pub(crate) fn indices(&self) -> Vec<Arc<str>> {
+        let index = |member: &Arc<str>| member.get(stem(member).len()..).unwrap_or_default().into();
+        self.members.iter().map(index).collect()
+    }
+}
+
+/// All of them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Fleets {
+    pub(crate) all: Vec<Fleet>,
+    /// Namespaces to the place of their fleet.
+    place: BTreeMap<Arc<str>, usize>,
+}
+
+/// What a namespace holds and is linked to, its own name taken out.
+type Inside = BTreeSet<String>;
+
+impl Fleets {
+    /// The fleets among these elements, but for namespaces that are kept open.
+    pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
+        let mut by_stem: BTreeMap<&str, BTreeMap<&str, Inside>> = BTreeMap::new();
+        for (space, what) in described(elements) {
+            let kept = options.expand.iter().chain(&options.collapse);
+            if !kept.into_iter().any(|k| k.trim_end_matches('/') == space) {
+                let inside = by_stem.entry(stem(space)).or_default();
+                inside.entry(space).or_default().insert(what);
+            }
+        }
+        let mut fleets = Self::default();
+        for (stem, spaces) in by_stem {
+            let mut alike: BTreeMap<Inside, Vec<&str>> = BTreeMap::new();
+            for (space, inside) in spaces {
+                alike.entry(inside).or_default().push(space);
+            }
+            // The first of the largest; those that differ stay beside it.
+            let largest = alike.into_values().rev().max_by_key(Vec::len);
+            if let Some(members) = largest.filter(|m| m.len() >= FEWEST) {
+                fleets.add(stem, &members, elements);
+            }
+        }
+        fleets
+    }
+
+    fn add(&mut self, stem: &str, members: &[&str], elements: &Elements) {
+        let digits = members.iter().map(|m| m.len() - stem.len()).max();
+        let name = format!("{stem}{}", "N".repeat(digits.unwrap_or(1)));
+        if names(elements).any(|(known, _)| within(known, &name)) {
+            return;
+        }
+        let members: Vec<Arc<str>> = members.iter().map(|m| Arc::from(*m)).collect();
+        let own = |member: &Arc<str>| {
+            let all = names(elements).filter(|(name, _)| space_of(name) == Some(member));
+            let (nodes, topics): (Vec<Element>, Vec<Element>) = all
+                .map(|(_, element)| element)
+                .partition(|element| matches!(element, Element::Node(_)));
+            if nodes.is_empty() { topics } else { nodes }
+        };
+        for member in &members {
+            self.place.insert(Arc::clone(member), self.all.len());
+        }
+        self.all.push(Fleet {
+            name: name.into(),
+            elements: members.iter().map(own).collect(),
+            members,
+        });
+    }
+
+    /// The name under which something of a fleet is drawn; `None` for all else.
+    pub(crate) fn stand_in(&self, name: &str) -> Option<Arc<str>> {
+        let space = space_of(name)?;
+        let fleet = self.all.get(*self.place.get(space)?)?;
+        let rest = name.get(space.len()..)?;
+        Some(format!("{}{rest}", fleet.name).into())
+    }
+
+    /// The fleet that something drawn under this name is part of.
+    pub(crate) fn of(&self, drawn: &str) -> Option<&Fleet> {
+        self.all.iter().find(|fleet| within(drawn, &fleet.name))
+    }
+}
+
+/// Whether a name is a namespace's own or lies inside it.
+fn within(name: &str, space: &str) -> bool {
+    let rest = name.strip_prefix(space);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+}
+
+fn names(elements: &Elements) -> impl Iterator<Item = (&str, Element)> {
+    let nodes = elements.nodes.iter().zip(0..);
+    let topics = elements.topics.iter().zip(0..);
+    nodes
+        .map(|(n, id)| (n.name.as_str(), Element::Node(id)))
+        .chain(topics.map(|(t, id)| (t.name.as_str(), Element::Topic(id))))
+}
+
+/// The outermost namespace around a name that ends in a number.
+fn space_of(name: &str) -> Option<&str> {
+    let mut found = None;
+    let mut space = namespace(name);
+    while space.len() > 1 {
+        if stem(space).len() < space.len() && !stem(space).ends_with('/') {
+            found = Some(space);
+        }
+        space = namespace(space);
+    }
+    found
+}
+
+/// A namespace without the number at its end.
+fn stem(space: &str) -> &str {
+    space.trim_end_matches(|c: char| c.is_ascii_digit())
+}
+
+/// Every namespace with a number, and a line for each thing in it and each edge of such a thing.
+fn described(elements: &Elements) -> Vec<(&str, String)> {
+    let own = |name: &str, space: &str| match name.strip_prefix(space) {
+        Some(rest) if within(name, space) => format!("~{rest}"),
+        _ => name.to_owned(),
+    };
+    let mut lines = Vec::new();
+    for (name, element) in names(elements) {
+        let kind = matches!(element, Element::Node(_));
+        if let Some(space) = space_of(name) {
+            lines.push((space, format!("{kind} {}", own(name, space))));
+        }
+    }
+    let publishes = elements.publishes.iter().map(|e| (e, ">"));
+    let subscribes = elements.subscribes.iter().map(|e| (e, "<"));
+    for (edge, sign) in publishes.chain(subscribes) {
+        let Some((node, topic)) = ends(elements, edge) else {
+            continue;
+        };
+        let spaces: BTreeSet<&str> = [node, topic].into_iter().filter_map(space_of).collect();
+        for space in spaces {
+            lines.push((
+                space,
+                format!("{}{sign}{}", own(node, space), own(topic, space)),
+            ));
+        }
+    }
+    lines
+}
+
+fn ends<'a>(elements: &'a Elements, edge: &Edge) -> Option<(&'a str, &'a str)> {
+    let node = elements.nodes.get(edge.node as usize)?;
+    let topic = elements.topics.get(edge.topic as usize)?;
+    Some((node.name.as_str(), topic.name.as_str()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::Attendance::{self, Away, Here, Joined, Left};
+    use crate::view::testing::mission;
+    use crate::view::{Mark, outline, view};
+
+    fn robot(n: usize, more: &str) -> String {
+        format!("/r{n}/drive>/r{n}/odom@2 /r{n}/plan</r{n}/odom /r{n}/drive>/tf@1 {more}")
+    }
+
+    #[test]
+    fn equal_robots_are_one_and_the_odd_one_stays() {
+        let text: Vec<String> = (1..=4).map(|n| robot(n, "")).collect();
+        let text = text.join(" ") + " " + &robot(5, "/r5/cam>/r5/image");
+        let mission = mission(&[&text]);
+        let seen = outline(&mission, &ViewOptions::default());
+        let names: Vec<&str> = seen.items.iter().map(|i| &*i.name).collect();
+        assert_eq!(
+            names,
+            [
+                "/r5/cam",
+                "/r5/drive",
+                "/r5/plan",
+                "/rN/drive",
+                "/rN/plan",
+                "/r5/image",
+                "/r5/odom",
+                "/rN/odom",
+                "/tf"
+            ]
+        );
+        let open = ViewOptions {
+            expand: vec!["/r2".into()],
+            ..ViewOptions::default()
+        };
+        let names = outline(&mission, &open).items;
+        assert!(names.iter().any(|i| &*i.name == "/r2/odom"));
+        let space = seen.namespaces.iter().find(|n| &*n.name == "/rN").unwrap();
+        assert_eq!(space.replicas, ["1", "2", "3", "4"].map(Arc::from));
+    }
+
+    #[test]
+    fn two_robots_stand_side_by_side() {
+        let text = [robot(1, ""), robot(2, "")].join(" ");
+        let seen = outline(&mission(&[&text]), &ViewOptions::default());
+        assert!(seen.items.iter().any(|i| &*i.name == "/r1/odom"));
+    }
+
+    #[test]
+    fn the_roll_tells_who_joins_and_who_leaves_and_rates_are_those_of_each() {
+        let all = |robots: &[usize]| -> String {
+            let texts: Vec<String> = robots.iter().map(|n| robot(*n, "")).collect();
+            texts.join(" ")
+        };
+        let windows = [all(&[1, 2, 3]), all(&[1, 2, 3, 4]), all(&[2, 3, 4])];
+        let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
+        let (seen, _) = view(&mission(&windows), &ViewOptions::default());
+        let rolls: Vec<&[Attendance]> = seen.frames.iter().map(|f| &f.rolls[0][..]).collect();
+        assert_eq!(rolls[0], [Here, Here, Here, Away]);
+        assert_eq!(rolls[1], [Here, Here, Here, Joined]);
+        assert_eq!(rolls[2], [Left, Here, Here, Here]);
+        let odom = seen
+            .items
+            .iter()
+            .position(|i| &*i.name == "/rN/odom")
+            .unwrap();
+        let shown = &seen.frames[1].items[odom];
+        assert_eq!((shown.each, shown.hz), (4, Some(8.0)));
+        assert_eq!(shown.mark, Some(Mark::Inside));
+    }
+}
