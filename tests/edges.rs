@@ -395,7 +395,15 @@ fn publishers_that_nobody_names_are_counted() {
         .collect();
     assert_eq!(unknown, [None, Some(2)]);
     assert_eq!(edges(&bag, "unknown"), ["/scan ? ×2 > /scan declared"]);
-    assert!(built.lives.nodes.len() == built.elements.nodes.len());
+    // The box says nothing of its topic's life.
+    let mut bag = logging(&[("/boss", "a.cpp")], &[]);
+    let scan = bag.topic2("/scan", "sensor_msgs/msg/LaserScan");
+    bag.publishers[scan].qos = offer.to_owned();
+    bag.at(scan, 30_000, vec![0, 1, 0, 0, 9]);
+    assert_eq!(edges(&bag, "unknown"), ["/scan ? > /scan declared"]);
+    let (built, _) = concluded(&bag, Options::default());
+    let begins = |id: usize| built.lives.topics[id].lives[0].span.start;
+    assert_eq!(begins(1), Stamp(ORIGIN + 30 * SECOND));
 }
 
 #[test]

@@ -202,14 +202,12 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
             Validity::Messages(at) | Validity::First(at) => {
                 let times = known.streams[*at].times;
                 let first = messages.bounds(times).map(|(first, _)| first);
-                (
-                    first,
-                    format!(
-                        "{}: {} messages from here on",
-                        told(proof.what),
-                        messages.count(times)
-                    ),
-                )
+                let many = match messages.count(times) {
+                    0 => "no message".to_owned(),
+                    1 => "1 message, here".to_owned(),
+                    n => format!("{n} messages from here on"),
+                };
+                (first, format!("{}: {many}", told(proof.what)))
             }
             Validity::Like(other) => {
                 let text = format!(

@@ -64,8 +64,15 @@ fn add(
 ) {
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
     let node = known.facts.name(name);
-    let edge = (Key::Publish(node, topic), Validity::Like(Key::Node(node)));
-    for (what, when) in [(Key::Node(node), Validity::Whole), edge] {
+    // It comes and goes with its topic, of whose life it says nothing.
+    let topics = || Validity::Like(Key::Topic(topic));
+    let life = if word == "unknown" {
+        topics()
+    } else {
+        Validity::Whole
+    };
+    let edge = (Key::Publish(node, topic), topics());
+    for (what, when) in [(Key::Node(node), life), edge] {
         let proof = Proof {
             what,
             source,

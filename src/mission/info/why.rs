@@ -132,13 +132,15 @@ fn describe(
     };
     let (first, last) = all.life(element);
     let words: Vec<&str> = evidence.words().collect();
+    let signs = match (first, last) {
+        (None, None) => "no sign at a time of its own".to_owned(),
+        _ => format!("first sign {}, last sign {}", at(first), at(last)),
+    };
     writeln!(
         out,
-        "{}\n  proved by {}; first sign {}, last sign {}",
+        "{}\n  proved by {}; {signs}",
         visible(title),
-        words.join(", "),
-        at(first),
-        at(last)
+        words.join(", ")
     )?;
     let graphs = mission.graphs.iter();
     let windows = graphs.filter(|graph| shows(graph, element)).count();
