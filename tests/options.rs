@@ -65,6 +65,10 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag --width 180mm --phases p.txt --figure steps -o out/x.svg", "--steps 2"),
     ("render", "r.bag --width 180mm --figure lives -o out/x.svg", "--text 9pt"),
     ("render", "r.bag -o out/x.json", "--phases p.txt"),
+    ("render", "r.bag -o out/x.json", "--captions c.txt"),
+    ("render", "r.bag -o out/x.json", "--cut changes"),
+    ("render", "r.bag -o out/x.json", "--json runs"),
+    ("render", "r.bag -o out/x.csv", "--runs"),
     ("info", "r.bag", "--format json"),
     ("info", "r.bag", "--why /chat"),
     ("info", "r.bag", "--roles"),
@@ -154,6 +158,7 @@ const SAYS: &[(&str, &str, &str, &str)] = &[
     ("events", "r.bag", "--align clock", "the same for all"),
     ("events", "r.bag", "--skip-unchanged", "the same for all"),
     ("events", "r.bag", "--grace 2", "the same for all"),
+    ("events", "r.bag", "--cut changes", "the same for all"),
     ("render", "r.bag --figure lives -o out/x.svg", "--period 7s", "the same for all"),
 ];
 
@@ -197,7 +202,7 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.html", "--captions c.txt", "hint: animations, pages"),
     ("render", "r.bag -o out/x.svg", "--captions c.txt", "hint: animations, pages"),
     ("render", "r.bag -o out/x.md", "--captions c.txt", "hint: animations, pages"),
-    ("render", "r.bag -o out/x.json", "--captions c.txt", "hint: animations, pages"),
+    ("render", "r.bag -o out/x.dot", "--captions c.txt", "hint: animations, pages"),
     ("render", "r.bag -o out/x.json", "--mode nodes", "hint: data holds the whole graph"),
     ("render", "r.bag -o out/x.gexf", "--hide none", "hint: data holds the whole graph"),
     ("render", "r.bag -o out/x.csv", "--ns-filter /ns/.*", "hint: data holds the whole graph"),
