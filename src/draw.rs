@@ -1,5 +1,6 @@
 //! Drawings as values: style, measured text and the scene of each window; painters stand in `paint`.
 
+pub mod board;
 pub mod figure;
 pub mod paint;
 pub mod picture;

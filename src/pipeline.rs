@@ -5,13 +5,15 @@ mod draw;
 mod export;
 mod extract;
 mod figure;
+mod purpose;
 mod read;
 mod survey;
 
-pub use draw::Drawing;
+pub use draw::{Body, Drawing};
 pub use export::{Render, Rendered, check, render, show};
 pub use extract::{Extract, Extracted, extract};
 pub use figure::Phases;
+pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};
 

@@ -40,6 +40,7 @@ function seek(w, quiet) {
 	say('where', `${place} · ${time} – ${clock(starts[w + 1] ?? end)} of ${clock(end)}`);
 	say('clock', iso(epoch / 1e3 + starts[w], 11, 19));
 	$.chips.innerHTML = each((k, n, m) => n[w] ? `<span class=${k}>${'+−◆'[m]}${n[w]} ${k}</span> ` : '');
+	if ($.head) for (const k of ['x', 'width']) $.head.setAttribute(k, $.head.dataset[k].split(' ')[w]);
 	$.seek.value = w;
 	$.seek.ariaValueText = [time, place, $.chips.textContent].join(', ');
 	list('news', news);

@@ -47,7 +47,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs"]]),
-    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip"]]),
+    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["board", "paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
@@ -56,7 +56,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["animated_svg", "apng", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
         &["report", "run", "tables"],
     ]),
-    ("pipeline", &[&["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
+    ("pipeline", &[&["purpose"], &["captions", "draw", "read"], &["figure"], &["export", "extract", "survey"]]),
     ("cli", &[&["args", "stop"], &["look", "terminal"], &["extract"]]),
 ];
 

@@ -3,13 +3,14 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::draw::{Composed, compose, places, unplaced};
+use super::draw::{Body, Composed, compose, places, unplaced};
 use super::figure::name_phases;
 use super::{Drawing, Phases, Reading, Stage, Watch, captions, read};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
-use crate::draw::figure::Figure;
+use crate::draw::board::Board;
+use crate::draw::figure::{self, Figure};
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Source, Strip, strip};
@@ -18,7 +19,7 @@ use crate::export::run;
 use crate::export::sequence::Sequence;
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::mission::Mission;
-use crate::view::{View, filtered};
+use crate::view::{View, ViewOptions, filtered};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -119,6 +120,7 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
     }
     let is_named = name_phases(&mut mission, &job.phases)?;
+    drawing.page.course = Some(course(&mission, &drawing));
     let figure = drawn_figure(job, &mission, is_named)?;
     for remark in figure.iter().flat_map(|(figure, _)| &figure.remarks) {
         let notice = Notice::new(NoticeKind::Note, remark.clone());
@@ -129,19 +131,23 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
     };
     let is_drawn = job.outputs.iter().any(is_graph);
+    let is_board = is_drawn && drawing.body.is_board(&mission);
     let Composed {
         view,
         options,
         page,
         layout,
         notices,
-    } = if is_drawn {
+    } = if is_drawn && !is_board {
         compose(&mission, &drawing, watch)
     } else {
         unplaced(&mission, &drawing)
     };
     mission.notices.extend(notices.iter());
-    mission.layout = is_drawn.then(|| places(&view, &layout));
+    mission.layout = (is_drawn && !is_board).then(|| places(&view, &layout));
+    if is_board {
+        return show_board(job, mission, &drawing, (&view, &options), watch);
+    }
     let nothing = View::default();
     let drawn = if is_drawn { &view } else { &nothing };
     let picture = Measured::new(drawn, &drawing.style, &drawing.fonts, page).with(layout);
@@ -168,6 +174,15 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
         latex: figure.as_ref().map(|(_, latex)| latex.as_str()),
         options: job.sequence.clone(),
     };
+    let written = write(&sequence, &job.outputs, watch)?;
+    Ok(Rendered { mission, written })
+}
+
+fn write(
+    sequence: &Sequence<'_>,
+    outputs: &[Output],
+    watch: &mut dyn Watch,
+) -> Result<Vec<Written>> {
     watch.stage(Stage::Draw);
     let mut progress = |done: usize, total: usize| {
         watch.progress(done as u64, total as u64);
@@ -177,7 +192,61 @@ pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result
             ControlFlow::Continue(())
         }
     };
-    let written = run::run(&sequence, &job.outputs, &mut progress)?;
+    run::run(sequence, outputs, &mut progress)
+}
+
+/// So many life lines fit below a frame.
+const MOST_LIVES: usize = 14;
+
+/// Who lived when, for the strip below frames.
+fn course(mission: &Mission, drawing: &Drawing) -> figure::Course {
+    let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
+    let source = figure::source::Source::new(mission, nodes, topics, false);
+    figure::Course::new(&source, MOST_LIVES)
+}
+
+/// Writes a mission whose picture is the topic board.
+fn show_board(
+    job: &Render,
+    mut mission: Mission,
+    drawing: &Drawing,
+    (view, options): (&View, &ViewOptions),
+    watch: &mut dyn Watch,
+) -> Result<Rendered> {
+    if drawing.body == Body::Auto {
+        let text = "of most messages nobody knows the publisher, so the picture is a board of topics; `--view graph` draws what is known";
+        mission.notices.add(Notice::new(NoticeKind::Chosen, text));
+    }
+    let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
+    let source = figure::source::Source::new(&mission, nodes, topics, false);
+    let page = drawing.page.clone();
+    let is_sized = drawing.is_sized || !drawing.is_fitted;
+    let board = Board::new(
+        &source,
+        view,
+        &drawing.style,
+        &drawing.fonts,
+        page,
+        is_sized,
+    );
+    let remarks = board.remarks();
+    let overview = board.overview();
+    let viewed = job.is_filtered.then(|| filtered(&mission, options));
+    let sequence = Sequence {
+        mission: &mission,
+        data: viewed.as_ref().unwrap_or(&mission),
+        view,
+        picture: &board,
+        painter: &Painter::new(&drawing.fonts),
+        fonts: &drawing.fonts,
+        strip: Some(&overview.scene),
+        latex: None,
+        options: job.sequence.clone(),
+    };
+    let written = write(&sequence, &job.outputs, watch)?;
+    for text in remarks {
+        mission.notices.add(Notice::new(NoticeKind::Note, text));
+    }
     Ok(Rendered { mission, written })
 }
 
