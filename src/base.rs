@@ -9,6 +9,7 @@ pub mod geometry;
 pub(crate) mod leftovers;
 pub mod name;
 pub mod notice;
+pub(crate) mod role;
 pub(crate) mod table;
 pub mod time;
 pub mod words;

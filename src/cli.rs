@@ -15,6 +15,7 @@ use clap::{CommandFactory as _, Parser as _};
 
 use crate::bag::Input;
 use crate::base::error::Error;
+use crate::base::words::visible;
 use crate::base::{budget, file};
 use crate::cli::terminal::Terminal;
 use crate::evidence::code::{SourceCode, Version};
@@ -62,9 +63,10 @@ fn hush() {
 }
 
 fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
-    let typed = match Typed::try_parse_from(args) {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let typed = match Typed::try_parse_from(&args) {
         Ok(typed) => typed,
-        Err(error) => return untyped(&error),
+        Err(error) => return untyped(&args, error),
     };
     let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
     let mut terminal = Terminal::new(typed.quiet, no_colour);
@@ -105,8 +107,13 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     })
 }
 
-/// Prints the help, the version, or what is wrong with the command line.
-fn untyped(error: &clap::Error) -> u8 {
+/// Prints the help, the version, or what is wrong with the command line: as it looks with everything in it visible, so
+/// that no argument steers the terminal.
+fn untyped(args: &[OsString], error: clap::Error) -> u8 {
+    let shown = args
+        .iter()
+        .map(|arg| visible(&arg.to_string_lossy()).into_owned());
+    let error = Typed::try_parse_from(shown).err().unwrap_or(error);
     match error.print().and_then(|()| std::io::stdout().flush()) {
         _ if error.use_stderr() => USAGE,
         // A closed pipe has read enough of the help.

@@ -11,7 +11,6 @@ mod kinds;
 pub mod message;
 pub(crate) mod proof;
 pub(crate) mod publishers;
-pub(crate) mod rhythm;
 pub(crate) mod source;
 pub(crate) mod spread;
 pub(crate) mod syntax;
@@ -59,21 +58,18 @@ pub const SOURCES: &[Source] = &[
             (rosgraph::SHAPE, rosgraph::read),
             (rosgraph::OLD_SHAPE, rosgraph::read),
         ],
-        lasting: true,
         ..NOTHING
     },
     Source {
         word: "discovery",
         about: "`ros_discovery_info` (`rmw_dds_common/msg/ParticipantEntitiesInfo`)",
         reads: &[(discovery::SHAPE, discovery::read)],
-        lasting: true,
         ..NOTHING
     },
     Source {
         word: "lifecycle",
         about: "`<node>/transition_event` (`lifecycle_msgs/msg/TransitionEvent`)",
         reads: &[(lifecycle::SHAPE, lifecycle::read)],
-        lasting: true,
         own: true,
         ..NOTHING
     },
@@ -94,21 +90,18 @@ pub const SOURCES: &[Source] = &[
         word: "parameter_events",
         about: "`rcl_interfaces/msg/ParameterEvent`",
         reads: &[(parameters::SHAPE, parameter_events::read)],
-        lasting: true,
         ..NOTHING
     },
     Source {
         word: "qos_overrides",
         about: "`qos_overrides.<topic>` in parameter events, which rclcpp declares with each end",
         reads: &[(parameters::SHAPE, qos_overrides::read)],
-        lasting: true,
         ..NOTHING
     },
     Source {
         word: "sim_time",
         about: "`use_sim_time` in parameter events: such a node subscribes `/clock`",
         reads: &[(parameters::SHAPE, sim_time::read)],
-        lasting: true,
         own: true,
         ..NOTHING
     },
@@ -159,7 +152,6 @@ pub const SOURCES: &[Source] = &[
         about: "`/statistics` of ROS 2 (`statistics_msgs/msg/MetricsMessage`)",
         reads: &[(metrics::SHAPE, metrics::read)],
         conclude: &[metrics::conclude],
-        lasting: true,
         own: true,
         ..NOTHING
     },

@@ -19,7 +19,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
         &["budget", "leftovers", "words"],
         &["digest", "error", "geometry", "name", "notice", "time", "yaml"],
-        &["file", "table"],
+        &["file", "role", "table"],
         &["csv"],
     ]),
     ("bag", &[
@@ -30,7 +30,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],
     ]),
     ("evidence", &[
-        &["clock", "message", "rhythm", "spread", "syntax", "texts", "times"],
+        &["clock", "message", "spread", "syntax", "texts", "times"],
         &["claim", "topology"],
         &["kinds", "proof"],
         &["code", "publishers", "source"],

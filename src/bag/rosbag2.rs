@@ -12,6 +12,7 @@ use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
 };
 use crate::bag::unknown::explain;
+use crate::base::budget::FILES;
 use crate::base::error::{Error, Result};
 use crate::base::name::NodeName;
 use crate::base::notice::{Notice, NoticeKind};
@@ -38,9 +39,6 @@ struct Folder {
     metadata: Metadata,
     notices: Vec<Notice>,
 }
-
-/// More files than this are not opened.
-const MOST_FILES: usize = 10_000;
 
 fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let Place::Folder(path) = place else {
@@ -90,7 +88,7 @@ fn storage(folder: &Path) -> Vec<PathBuf> {
         let number = stem.rsplit('_').next().and_then(|n| n.parse::<u64>().ok());
         (number, name)
     });
-    files.truncate(MOST_FILES);
+    files.truncate(FILES);
     files
 }
 
@@ -120,7 +118,7 @@ impl Folder {
         let named = std::mem::take(&mut self.metadata.files);
         let mut found = Vec::new();
         let mut missing = Vec::new();
-        for name in named.iter().take(MOST_FILES) {
+        for name in named.iter().take(FILES) {
             match metadata::locate(path, name) {
                 Ok(file) if !found.contains(&file) => found.push(file),
                 Ok(_) => {}

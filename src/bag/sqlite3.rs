@@ -17,6 +17,7 @@ use crate::bag::model::{
     Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
 use crate::bag::source::Source;
+use crate::base::budget::CONNECTIONS;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
@@ -157,15 +158,12 @@ fn has(columns: &[String], names: &[&str]) -> bool {
     names.iter().all(|name| is(name))
 }
 
-/// More topics than this are not kept; real bags stay below 1,000.
-const MOST_TOPICS: usize = 100_000;
-
 impl Bag {
     fn read_topics(&mut self, db: &Db, columns: &[String]) -> Result<(), Refusal> {
         let or_null = |name| if has(columns, &[name]) { name } else { "NULL" };
         let definitions = definitions(db).unwrap_or_default();
         let sql = format!(
-            "SELECT id, name, type, {}, {}, {} FROM topics LIMIT {MOST_TOPICS}",
+            "SELECT id, name, type, {}, {}, {} FROM topics LIMIT {CONNECTIONS}",
             or_null("serialization_format"),
             or_null("offered_qos_profiles"),
             or_null("type_description_hash"),

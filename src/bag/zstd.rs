@@ -11,6 +11,7 @@ use crate::bag::input::{FormatRow, HEAD, Medium, Place, file_name};
 use crate::bag::model::{OpenOptions, Reader, Report, Sink};
 use crate::bag::source::{Source, Stream, Temporary};
 use crate::bag::unknown::explain;
+use crate::base::budget::{UNPACKED_COPY, UNPACKED_FOLD};
 use crate::base::error::{Error, Result};
 use crate::base::time::Span;
 
@@ -32,9 +33,6 @@ struct Unpacked {
     _copy: Option<Temporary>,
     file_bytes: u64,
 }
-
-/// Unpacked files are not longer than this many times the packed one, in bytes, and 1 GiB.
-const MOST_UNPACKED: u64 = 1000;
 
 fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let (name, file_bytes, packed): (String, u64, Box<dyn Read + Send>) = match place {
@@ -64,7 +62,7 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     };
     let (place, copy) = if row.medium == Medium::File {
         let copy = Temporary::new()?;
-        let limit = file_bytes.saturating_mul(MOST_UNPACKED).max(1 << 30);
+        let limit = file_bytes.saturating_mul(UNPACKED_FOLD).max(UNPACKED_COPY);
         let source = unpack(&mut stream, &copy, limit).map_err(fail())?;
         (Place::File(Source::open(&source)?), Some(copy))
     } else {

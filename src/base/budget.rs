@@ -55,3 +55,63 @@ pub(crate) const UNPACKED: u64 = 4 << 30;
 
 /// How many bytes more for each byte of packed data that was read for it; real bags fold their data ten times.
 pub(crate) const UNPACKED_FOLD: u64 = 1000;
+
+/// The largest copy of a packed bag in the temporary folder, in bytes, where [`UNPACKED_FOLD`] allows less.
+pub(crate) const UNPACKED_COPY: u64 = 1 << 30;
+
+/// The most connections, or topics, that a bag may describe: real bags stay below 1,000.
+pub(crate) const CONNECTIONS: usize = 100_000;
+
+/// The most bytes of message definitions that are kept of a bag.
+pub(crate) const DEFINITIONS: usize = 8 << 20;
+
+/// The most files of one recording: a split a minute for a week.
+pub(crate) const FILES: usize = 10_000;
+
+/// The longest document in YAML that is understood, in bytes: `metadata.yaml` of a thousand topics has 1 MB.
+pub(crate) const YAML: usize = 8 << 20;
+
+/// The most notices of different texts; more of them only add to the count of a last one. Nobody reads more.
+pub(crate) const NOTICES: usize = 200;
+
+/// What is left of the work that a launch file may ask for: files include each other, texts repeat each other, and
+/// neither may run away.
+#[derive(Debug)]
+pub(crate) struct LaunchWork {
+    left: usize,
+    /// Whether something was refused.
+    pub(crate) is_spent: bool,
+}
+
+impl LaunchWork {
+    /// All of it, for a file and what it includes.
+    pub(crate) fn all() -> Self {
+        Self {
+            left: LAUNCH_WORK,
+            is_spent: false,
+        }
+    }
+
+    /// The work for what one text of this many bytes says by itself, without other files: loops over long lists need
+    /// a tenth of it.
+    pub(crate) fn of_text(bytes: usize) -> Self {
+        Self {
+            left: LAUNCH_WORK.min((1 << 20) + bytes.saturating_mul(500)),
+            is_spent: false,
+        }
+    }
+
+    /// Takes `work` from it; `None` if not as much is left.
+    pub(crate) fn spend(&mut self, work: usize) -> Option<()> {
+        match self.left.checked_sub(work) {
+            Some(left) if !self.is_spent => {
+                self.left = left;
+                Some(())
+            }
+            _ => {
+                self.is_spent = true;
+                None
+            }
+        }
+    }
+}

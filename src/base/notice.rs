@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use super::budget::NOTICES;
+
 /// What a notice is about. The word in JSON is [`NoticeKind::word`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
@@ -95,9 +97,6 @@ impl Notice {
     }
 }
 
-/// How many different texts are kept; more of them only add to the count of a last one.
-const MOST: usize = 200;
-
 /// Notices in order of kind and text, equal ones counted. Bounded: a hostile bag cannot fill memory with them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Notices(BTreeMap<(NoticeKind, String), u64>);
@@ -110,7 +109,7 @@ impl Notices {
 
     /// Adds one; an equal one only counts up.
     pub fn add(&mut self, notice: Notice) {
-        let full = self.0.len() >= MOST;
+        let full = self.0.len() >= NOTICES;
         let key = (notice.kind, notice.text);
         let key = if full && !self.0.contains_key(&key) {
             (key.0, "more of the same kind".to_owned())

@@ -220,7 +220,10 @@ pub fn visible(text: &str) -> Cow<'_, str> {
 }
 
 /// JSON with the invisible characters of its texts as `\uXXXX`, for printing: all that JSON leaves raw stand in texts.
-pub(crate) fn visible_json(json: &str) -> String {
+pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
+    if !json.contains(|c: char| c != '\n' && is_invisible(c)) {
+        return Cow::Borrowed(json);
+    }
     let mut out = String::with_capacity(json.len());
     for c in json.chars() {
         if c != '\n' && is_invisible(c) {
@@ -231,11 +234,14 @@ pub(crate) fn visible_json(json: &str) -> String {
             out.push(c);
         }
     }
-    out
+    Cow::Owned(out)
 }
 
 /// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
 pub fn is_invisible(c: char) -> bool {
+    if (' '..='~').contains(&c) {
+        return false;
+    }
     c.is_control()
         || (c.is_whitespace() && c != ' ')
         || matches!(c, '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180e}' | '\u{200b}'..='\u{200f}'
@@ -250,7 +256,8 @@ mod tests {
     #[test]
     fn json_means_the_same_when_it_is_visible() {
         let name = "/a\u{9b}2J\u{202e}\u{e0001}ß\u{1b}";
-        let shown = visible_json(&serde_json::to_string_pretty(&[name]).unwrap());
+        let json = serde_json::to_string_pretty(&[name]).unwrap();
+        let shown = visible_json(&json);
         assert!(!shown.contains(|c| c != '\n' && is_invisible(c)), "{shown}");
         assert_eq!(serde_json::from_str::<Vec<String>>(&shown).unwrap(), [name]);
     }

@@ -1,5 +1,7 @@
 //! YAML text as plain data, bounded against documents that unfold to more than they are.
 
+use super::budget::YAML;
+
 pub(crate) use serde_json::Value;
 
 /// What is wrong with a YAML document.
@@ -11,16 +13,13 @@ pub(crate) struct BadYaml {
     pub(crate) reason: String,
 }
 
-/// The longest document that is read, in bytes.
-const LONGEST: usize = 8 << 20;
-
 /// The document as JSON data: mappings as objects with keys in order, scalars typed as YAML 1.2 has it.
 ///
 /// # Errors
 /// [`BadYaml`] with its line: broken syntax, several documents, nesting past 64, more than 8 MiB, or aliases that
 /// unfold past 100,000 values.
 pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
-    if text.len() > LONGEST {
+    if text.len() > YAML {
         return Err(BadYaml {
             line: 0,
             reason: "longer than 8 MiB".to_owned(),

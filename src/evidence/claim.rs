@@ -61,6 +61,8 @@ pub(crate) enum Claim {
     Subscribe(Name, Name),
     /// This node has just begun to subscribe this topic.
     Joins(Name, Name),
+    /// This node wanted to subscribe this topic, and was refused.
+    Refused(Name, Name),
     /// This node no longer subscribes this topic.
     Unsubscribe(Name, Name),
     /// This node names this topic as its own, as publisher or as subscriber.
@@ -103,6 +105,7 @@ impl Claim {
             Self::Publish(a, b)
             | Self::Subscribe(a, b)
             | Self::Joins(a, b)
+            | Self::Refused(a, b)
             | Self::Unsubscribe(a, b)
             | Self::Lists(a, b)
             | Self::Carries(a, b)
@@ -129,6 +132,7 @@ impl Claim {
             Self::Publish(a, b) => Self::Publish(to(a), to(b)),
             Self::Subscribe(a, b) => Self::Subscribe(to(a), to(b)),
             Self::Joins(a, b) => Self::Joins(to(a), to(b)),
+            Self::Refused(a, b) => Self::Refused(to(a), to(b)),
             Self::Unsubscribe(a, b) => Self::Unsubscribe(to(a), to(b)),
             Self::Lists(a, b) => Self::Lists(to(a), to(b)),
             Self::Carries(a, b) => Self::Carries(to(a), to(b)),

@@ -1,5 +1,6 @@
 //! What the claims of a mission amount to: every reason to believe in a node, a topic or an edge.
 
+mod at_word;
 mod closed;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,7 +12,6 @@ use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, ClaimRecord, Claims, Degree, EvidenceLine, Name, SourceId};
 use crate::evidence::proof::closed::Closed;
-use crate::evidence::rhythm::Rhythm;
 use crate::evidence::times::SeriesId;
 
 /// A connection of one of the bags.
@@ -93,13 +93,11 @@ pub(crate) enum Validity {
     /// At the first message of this stream.
     First(usize),
     /// From the first sign to the last; after an end only from the next sign on.
-    Signs {
-        signs: Vec<Stamp>,
-        ends: Vec<Stamp>,
-        held: bool,
-    },
+    Signs { signs: Vec<Stamp>, ends: Vec<Stamp> },
     /// From a beginning to the next end.
     Begins { signs: Vec<Stamp>, ends: Vec<Stamp> },
+    /// At these moments; what holds only then is not known to last.
+    Moments(Vec<Stamp>),
     /// As long as this other element lives.
     Like(Key),
     /// For the whole mission, unless signs tell when.
@@ -417,105 +415,6 @@ impl<'a> Findings<'a> {
             Vec::new()
         })
     }
-
-    /// All claims of one source with their signs and ends, sorted.
-    pub(crate) fn claims(
-        &mut self,
-        source: SourceId,
-    ) -> Vec<(ClaimRecord, Vec<Stamp>, Vec<Stamp>)> {
-        let endings = self.endings();
-        let facts = self.facts.list.iter().filter(|f| f.source == source);
-        let facts: Vec<ClaimRecord> = facts.copied().collect();
-        let times = |fact: ClaimRecord| {
-            let (signs, ends) = self.signs_and_ends(&fact, &endings);
-            (fact, signs, ends)
-        };
-        facts.into_iter().map(times).collect()
-    }
-
-    /// Whether something that is told now and then still holds after the last time: unless it was told in a rhythm
-    /// that broke off.
-    pub(crate) fn lasts(&self, signs: &[Stamp]) -> bool {
-        let mut rhythm = Rhythm::default();
-        for sign in signs {
-            rhythm.hear(*sign);
-        }
-        !rhythm.broke_off(self.mission.1)
-    }
-
-    /// What the claims say without any rule: nodes, topics, publications and subscriptions. `lasting` tells whether
-    /// what a source claims holds until it is taken back.
-    pub(crate) fn take_at_their_word(&mut self, lasting: impl Fn(SourceId) -> bool) {
-        let endings = self.endings();
-        for fact in self.facts.list.clone() {
-            let what = match fact.claim {
-                Claim::Node(node) => Key::Node(node),
-                Claim::Topic(topic) => Key::Topic(topic),
-                Claim::Publish(node, topic) => Key::Publish(node, topic),
-                Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
-                    Key::Subscribe(topic, node)
-                }
-                _ => continue,
-            };
-            let (signs, ends) = self.signs_and_ends(&fact, &endings);
-            let held = lasting(fact.source) && (fact.snapshot.is_some() || self.lasts(&signs));
-            self.prove(Proof {
-                what,
-                source: fact.source,
-                degree: fact.degree,
-                when: match fact.claim {
-                    Claim::Joins(..) => Validity::Begins { signs, ends },
-                    _ => Validity::Signs { signs, ends, held },
-                },
-            });
-        }
-    }
-
-    /// When something was taken back, and when snapshots were taken.
-    fn endings(&mut self) -> BTreeMap<Claim, Vec<Stamp>> {
-        let mut endings: BTreeMap<Claim, Vec<Stamp>> = BTreeMap::new();
-        for fact in self.facts.list.clone() {
-            if let Claim::NodeGone(_) | Claim::Unsubscribe(..) | Claim::Snapshot(_) = fact.claim {
-                let times = self.times(&fact);
-                endings.entry(fact.claim).or_default().extend(times);
-            }
-        }
-        for times in endings.values_mut() {
-            times.sort_unstable();
-        }
-        endings
-    }
-
-    /// When a claim was made, and when it was taken back, sorted.
-    fn signs_and_ends(
-        &mut self,
-        fact: &ClaimRecord,
-        endings: &BTreeMap<Claim, Vec<Stamp>>,
-    ) -> (Vec<Stamp>, Vec<Stamp>) {
-        let signs = self.times(fact);
-        let ending = match fact.claim {
-            Claim::Node(node) => Some(Claim::NodeGone(node)),
-            Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
-                Some(Claim::Unsubscribe(node, topic))
-            }
-            _ => None,
-        };
-        let mut ends = ending
-            .and_then(|e| endings.get(&e))
-            .cloned()
-            .unwrap_or_default();
-        let snapshots = fact
-            .snapshot
-            .and_then(|name| endings.get(&Claim::Snapshot(name)));
-        ends.extend(
-            snapshots
-                .map(|taken| absences(&signs, taken))
-                .unwrap_or_default(),
-        );
-        ends.sort_unstable();
-        ends.dedup();
-        (signs, ends)
-    }
 }
 
 /// How many publishers each topic was offered by, at most in one bag.
@@ -528,31 +427,4 @@ pub(crate) fn offers(of_streams: &BTreeMap<usize, u32>, streams: &[Stream]) -> B
         }
     }
     offers
-}
-
-/// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.
-fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
-    let mut absent = Vec::new();
-    let mut from = 0;
-    for sign in signs {
-        let run = &snapshots[from..snapshots.partition_point(|t| t < sign).max(from)];
-        absent.extend(run.first());
-        absent.extend(run.last());
-        from = snapshots.partition_point(|t| t <= sign);
-    }
-    absent.extend(snapshots.get(from));
-    absent
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_snapshot_without_a_claim_tells_of_its_absence() {
-        let stamps = |times: &[i64]| times.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
-        let absent = absences(&stamps(&[4, 8]), &stamps(&[1, 2, 3, 4, 5, 6, 7, 8, 9]));
-        assert_eq!(absent, stamps(&[1, 3, 5, 7, 9]));
-        assert_eq!(absences(&stamps(&[1, 2]), &stamps(&[1, 2])), []);
-    }
 }

@@ -47,8 +47,6 @@ pub struct Source {
     pub about: &'static str,
     /// The layouts of the messages that it reads.
     pub(crate) reads: &'static [(Shape, Read)],
-    /// Whether what it claims holds until it is taken back, though nobody repeats it.
-    pub(crate) lasting: bool,
     /// Whether a node says it of itself, so that it was there when it did.
     pub(crate) own: bool,
     /// What the announcement of a connection says.
@@ -65,7 +63,6 @@ pub(crate) const NOTHING: Source = Source {
     word: "",
     about: "",
     reads: &[],
-    lasting: false,
     own: false,
     announced: None,
     conclude: &[],

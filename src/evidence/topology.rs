@@ -3,7 +3,6 @@
 //! Read are the research prototype's CSV, a YAML form of ours, DOT saved by `rqt_graph`, and launch files: XML of ROS 1
 //! and ROS 2, YAML and Python of ROS 2. Nothing is run.
 
-mod budget;
 mod csv;
 mod dot;
 pub(crate) mod launch;

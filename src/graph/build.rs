@@ -2,10 +2,10 @@
 
 pub(crate) mod assemble;
 pub(crate) mod liveness;
+pub(crate) mod merged;
 pub(crate) mod proofs;
 pub(crate) mod rates;
 pub(crate) mod restarts;
-pub(crate) mod roles;
 pub(crate) mod settle;
 pub(crate) mod tempo;
 pub(crate) mod values;
@@ -110,6 +110,7 @@ impl<'a> Builder<'a> {
         self.count(collected)?;
         self.restarts = restarts(collected, &self.proofs)?;
         self.track(collected)?;
+        merged::fall_silent(&mut self.tracks, &self.rates, collected, self.mission.1);
         settle(&mut self.tracks, &self.proofs, &self.restarts, self.mission);
         let code = std::mem::take(&mut self.code);
         let mut built = self.assemble(collected, options.grace);
@@ -144,6 +145,7 @@ impl<'a> Builder<'a> {
             let restarts = restarts.map_or(&[][..], Vec::as_slice);
             let deaths: Vec<Stamp> = restarts.iter().map(|r| r.death).collect();
             let track = self.tracks.entry(proof.what).or_default();
+            track.lasts |= lasts(&proof.when);
             track.evidence = track.evidence.and(Evidence::row(proof.source));
             track.degree = track.degree.min(proof.degree);
             match &proof.when {
@@ -173,7 +175,7 @@ impl<'a> Builder<'a> {
                         track.bound_all(&[first], &[]);
                     }
                 }
-                Validity::Signs { signs, ends, .. } => {
+                Validity::Signs { signs, ends } => {
                     let ends = together(ends, &deaths);
                     track.sign_all(signs, &ends);
                     if SOURCES.get(proof.source).is_some_and(|s| s.own) {
@@ -185,6 +187,7 @@ impl<'a> Builder<'a> {
                     let ends = together(ends, &deaths);
                     track.bound_all(signs, &ends);
                 }
+                Validity::Moments(signs) => track.bound_all(signs, &deaths),
                 Validity::Unending => track.unending = true,
                 Validity::Like(_) => {}
                 Validity::Whole => track.extent = track.extent.max(Extent::Whole),
@@ -222,6 +225,11 @@ fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
         _ => None,
     });
     sent.collect()
+}
+
+/// Whether a reason holds on after its last sign.
+fn lasts(when: &Validity) -> bool {
+    !matches!(when, Validity::Moments(_) | Validity::Like(_))
 }
 
 /// Two lists of times as one, sorted.

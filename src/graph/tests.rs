@@ -255,3 +255,154 @@ fn windows_may_overlap() {
     let all = build(&mut collected, &windows, &Options::default()).unwrap();
     assert_eq!(all.messages, [20, 20, 20, 10]);
 }
+
+/// A log record of rospy: when it was made in seconds, by whom, and the topics that it lists.
+type Log<'a> = (i64, &'a str, &'a str, &'a [&'a str]);
+
+/// A record of `rosgraph_msgs/Log`.
+fn log_record((_, node, text, topics): &Log<'_>, file: &str) -> Vec<u8> {
+    let mut bytes = vec![0; 12];
+    let put = |bytes: &mut Vec<u8>, text: &str| {
+        bytes.extend(u32::try_from(text.len()).unwrap().to_le_bytes());
+        bytes.extend(text.as_bytes());
+    };
+    put(&mut bytes, "");
+    bytes.push(2);
+    for text in [node, text, file, "f"] {
+        put(&mut bytes, text);
+    }
+    bytes.extend([0; 4]);
+    bytes.extend(u32::try_from(topics.len()).unwrap().to_le_bytes());
+    for topic in *topics {
+        put(&mut bytes, topic);
+    }
+    bytes
+}
+
+/// Graphs of windows of 10 s, of a bag with one log connection, which names `/host` as its publisher.
+fn logged(talks: &[Talk<'_>], logs: &[Log<'_>], file: &str) -> Built {
+    let mut collector = Collector::new(crate::evidence::collector::Options::default());
+    let mut progress = |_, _| ();
+    let mut bag = collector.bag(&mut progress);
+    bag.connection(&Connection {
+        type_name: "rosgraph_msgs/Log".into(),
+        ..connection(0, "/rosout", Some("/host"), false)
+    });
+    for (id, (topic, publisher, latching, times)) in (1..).zip(talks) {
+        bag.connection(&connection(id, topic, *publisher, *latching));
+        let stamps: Vec<_> = times.iter().map(|t| Stamp(t * SECOND)).collect();
+        bag.stamps(ConnectionId(id), &stamps, None);
+    }
+    for log in logs {
+        let data = log_record(log, file);
+        bag.message(crate::bag::Message {
+            connection: ConnectionId(0),
+            time: Stamp(log.0 * SECOND),
+            data: &data,
+            size: 0,
+        });
+    }
+    let mut collected = collector.finish().unwrap();
+    let windows: Vec<_> = (0..10)
+        .map(|n| Span {
+            start: Stamp(n * 10 * SECOND),
+            end: Stamp((n + 1) * 10 * SECOND),
+        })
+        .collect();
+    build(&mut collected, &windows, &Options::default()).unwrap()
+}
+
+/// The windows in which a node is there.
+fn there(built: &Built, node: &str) -> Vec<usize> {
+    let states = states(built, node).into_iter().enumerate();
+    states
+        .filter(|(_, s)| *s != "-")
+        .map(|(at, _)| at)
+        .collect()
+}
+
+const EVERY_TWO: [i64; 10] = [2, 4, 6, 8, 10, 12, 14, 16, 18, 20];
+
+#[test]
+fn the_only_publisher_of_a_merged_topic_ends_with_its_rhythm() {
+    let all: Vec<i64> = (0..99).collect();
+    let talks: &[Talk<'_>] = &[
+        ("/base", Some("/host"), false, &all),
+        ("/plan", Some("/planner"), false, &EVERY_TWO),
+        ("/goal", Some("/boss"), false, &all),
+    ];
+    let logs: &[Log<'_>] = &[
+        (1, "/host", "hello", &["/base"]),
+        (1, "/planner", "hello", &["/plan", "/goal"]),
+        (2, "/boss", "hello", &["/plan", "/goal"]),
+    ];
+    let built = logged(talks, logs, "planner.py");
+    assert_eq!(there(&built, "/planner"), [0, 1, 2]);
+    assert_eq!(there(&built, "/boss").len(), 10);
+}
+
+#[test]
+fn a_merged_topic_of_two_publishers_ends_nobody() {
+    let all: Vec<i64> = (0..99).collect();
+    let talks: &[Talk<'_>] = &[
+        ("/base", Some("/host"), false, &all),
+        ("/plan", Some("/planner"), false, &EVERY_TWO),
+    ];
+    let logs: &[Log<'_>] = &[
+        (1, "/planner", "hello", &["/plan"]),
+        (1, "/other", "hello", &["/plan"]),
+    ];
+    let built = logged(talks, logs, "planner.cpp");
+    assert_eq!(there(&built, "/planner").len(), 10);
+    assert_eq!(there(&built, "/other").len(), 10);
+}
+
+#[test]
+fn twins_share_a_merged_topic_in_turns() {
+    let all: Vec<i64> = (0..99).collect();
+    let sent: Vec<i64> = (2..20).chain(42..60).collect();
+    let (first, second) = ("/see_1_0000000001000", "/see_2_0000000040000");
+    let talks: &[Talk<'_>] = &[
+        ("/base", Some("/host"), false, &all),
+        ("/seen", Some(first), false, &sent),
+    ];
+    let logs: &[Log<'_>] = &[
+        (3, first, "hello", &["/seen"]),
+        (43, second, "hello", &["/seen"]),
+    ];
+    let built = logged(talks, logs, "see.py");
+    assert_eq!(there(&built, first), [0, 1]);
+    assert_eq!(there(&built, second), [4, 5]);
+    assert!(built.elements.subscribes.iter().all(|e| {
+        let topic = &built.elements.topics[e.topic as usize];
+        topic.name.as_str() != "/seen"
+    }));
+}
+
+#[test]
+fn a_refused_client_is_there_for_a_moment() {
+    let all: Vec<i64> = (0..99).collect();
+    let talks: &[Talk<'_>] = &[("/scan", Some("/host"), false, &all)];
+    let link = "Connection: Creating TransportSubscriberLink for topic [/scan] connected to [callerid=[/bad] address=[x]]";
+    let refusal =
+        "Client [/bad] wants topic /scan to have datatype/md5sum [a/b], but our version has [c/d].";
+    let good = link.replace("/bad", "/good");
+    let logs: &[Log<'_>] = &[
+        (15, "/host", link, &["/scan"]),
+        (15, "/host", refusal, &["/scan"]),
+        (15, "/host", &good, &["/scan"]),
+    ];
+    let built = logged(talks, logs, "subscriber.cpp");
+    assert_eq!(there(&built, "/bad"), [1]);
+    assert_eq!(there(&built, "/good"), (1..10).collect::<Vec<_>>());
+    let bad = built
+        .elements
+        .nodes
+        .iter()
+        .position(|n| n.name.as_str() == "/bad");
+    let ended = built.lives.nodes[bad.unwrap()].lives[0].ended.unwrap();
+    assert_eq!(
+        (ended.earliest.0, ended.latest.0),
+        (15 * SECOND, 98 * SECOND)
+    );
+}

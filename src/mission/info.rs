@@ -176,24 +176,20 @@ pub struct NodeInfo {
 pub fn info(mission: &Mission) -> Info {
     let elements = &mission.elements;
     let best = BestDegrees::of(mission);
-    let sent = sent(mission);
     let topics = topics(mission);
+    let traffic = traffic(mission, &topics);
     let nodes = elements.nodes.iter().enumerate().map(|(id, node)| {
-        let own = |edge: &&crate::graph::Edge| edge.node as usize == id;
-        let subscribed = || listeners(mission).map(|(_, edge)| edge).filter(own);
-        let received = subscribed()
-            .map(|edge| topics[edge.topic as usize].count)
-            .sum();
+        let own = &traffic[id];
         NodeInfo {
             name: node.name.to_string(),
             degree: best.nodes[id].word(),
             evidence: node.evidence.words().collect(),
             first_ns: node.first.map(|t| t.0),
             last_ns: node.last.map(|t| t.0),
-            publishes: elements.publishes.iter().filter(own).count(),
-            subscribes: subscribed().count(),
-            sent: sent[id],
-            received: (subscribed().count() > 0).then_some(received),
+            publishes: own.publishes,
+            subscribes: own.subscribes,
+            sent: own.sent,
+            received: own.received,
         }
     });
     let mut info = Info {
@@ -238,7 +234,8 @@ fn is_ros1(mission: &Mission) -> Option<bool> {
 /// Any part of this module as JSON, ending in a new line.
 pub fn json(value: &impl Serialize) -> String {
     // Only maps with keys that are no strings fail, and there are none.
-    visible_json(&serde_json::to_string_pretty(value).unwrap_or_default()) + "\n"
+    let json = serde_json::to_string_pretty(value).unwrap_or_default();
+    visible_json(&json).into_owned() + "\n"
 }
 
 fn bags(mission: &Mission) -> Vec<BagInfo> {
@@ -320,16 +317,36 @@ fn lacking(topics: &[TopicInfo], lacks: impl Fn(&TopicInfo) -> bool) -> usize {
     topics.iter().filter(|t| t.count > 0 && lacks(t)).count()
 }
 
-/// Messages that each node sent; `None` where no count is known.
-fn sent(mission: &Mission) -> Vec<Option<u64>> {
-    let mut sent: Vec<Option<u64>> = vec![None; mission.elements.nodes.len()];
+/// The edges of one node and its messages.
+#[derive(Clone, Default)]
+struct Traffic {
+    publishes: usize,
+    subscribes: usize,
+    /// `None` where no count is known.
+    sent: Option<u64>,
+    /// `None` for a node that subscribes nothing.
+    received: Option<u64>,
+}
+
+/// The traffic of every node, in one pass over the edges.
+fn traffic(mission: &Mission, topics: &[TopicInfo]) -> Vec<Traffic> {
+    let elements = &mission.elements;
+    let mut traffic = vec![Traffic::default(); elements.nodes.len()];
+    for edge in &elements.publishes {
+        traffic[edge.node as usize].publishes += 1;
+    }
+    for (_, edge) in listeners(mission) {
+        let own = &mut traffic[edge.node as usize];
+        own.subscribes += 1;
+        *own.received.get_or_insert(0) += topics[edge.topic as usize].count;
+    }
     for state in mission.windows.iter().flat_map(|w| &w.graph.publishes) {
-        let node: NodeId = mission.elements.publishes[state.id as usize].node;
+        let node: NodeId = elements.publishes[state.id as usize].node;
         if let Some(count) = state.count {
-            *sent[node as usize].get_or_insert(0) += count;
+            *traffic[node as usize].sent.get_or_insert(0) += count;
         }
     }
-    sent
+    traffic
 }
 
 fn topics(mission: &Mission) -> Vec<TopicInfo> {

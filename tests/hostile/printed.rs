@@ -113,6 +113,52 @@ fn no_name_is_printed_raw() {
     }
 }
 
+/// Every format of text that `render` writes into one file.
+const TEXTS: &[&str] = &["json", "dot", "mmd", "md", "svg", "html", "gexf", "graphml"];
+
+#[test]
+fn no_name_is_raw_in_a_text_on_standard_output() {
+    let dir = tempfile::tempdir().unwrap();
+    let bag = steering(dir.path());
+    for format in TEXTS {
+        for profile in ["rqt", "plain"] {
+            let mut args = vec!["render", &bag, "-p", "all", "-o", "-", "--format", format];
+            if *format == "dot" {
+                args.extend(["--dot-profile", profile]);
+            }
+            let text = printed(dir.path(), &args);
+            assert!(!text.contains(is_obeyed), "{args:?}: {text:?}");
+            assert!(!text.lines().any(|l| l.starts_with("::")), "{args:?}");
+        }
+    }
+}
+
+#[test]
+fn nothing_that_is_typed_steers_the_terminal() {
+    let dir = tempfile::tempdir().unwrap();
+    let bad = "\u{1b}[2J\u{202e}\n::error::x\u{9b}";
+    let option = format!("--{bad}");
+    let period = format!("--period={bad}");
+    for args in [
+        &[bad][..],
+        &["render", COURIER, &option],
+        &["render", COURIER, &period],
+        &["info", COURIER, "--format", bad],
+        &["completions", bad],
+        &["styles", "light", bad],
+        &["styles", bad],
+        &["render", COURIER, "--hide", bad],
+        &["render", COURIER, "--strip", bad],
+        &["render", COURIER, "--link", bad],
+    ] {
+        let output = bagreel(dir.path(), args);
+        let said = errors(&output);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(!said.contains(is_obeyed), "{args:?}: {said:?}");
+        assert!(!said.lines().any(|l| l.starts_with("::")), "{args:?}");
+    }
+}
+
 #[test]
 fn json_that_is_printed_holds_the_names_as_they_are() {
     let dir = tempfile::tempdir().unwrap();

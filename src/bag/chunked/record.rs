@@ -6,6 +6,7 @@ use std::{fmt, io};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId};
 use crate::bag::source::Stream;
+use crate::base::budget::CONNECTIONS;
 use crate::base::time::Stamp;
 
 /// The head of a record; the stream stands behind it. `len` is what follows.
@@ -101,9 +102,6 @@ pub(crate) struct Connections {
     ids: HashMap<u32, ConnectionId>,
 }
 
-/// More connections than this are not kept; real bags stay below 1,000.
-const MOST_CONNECTIONS: usize = 100_000;
-
 impl Connections {
     /// The connection that the bag calls `raw`.
     pub(crate) fn get(&self, raw: u32) -> Option<ConnectionId> {
@@ -118,7 +116,7 @@ impl Connections {
     /// Adds one under the next free id; answers it if it is new. A second one of the same number is passed over, as
     /// every reader does.
     pub(crate) fn add(&mut self, raw: u32, connection: Connection) -> Option<&Connection> {
-        if self.ids.contains_key(&raw) || self.list.len() >= MOST_CONNECTIONS {
+        if self.ids.contains_key(&raw) || self.list.len() >= CONNECTIONS {
             return None;
         }
         let id = ConnectionId(u32::try_from(self.list.len()).ok()?);

@@ -12,6 +12,7 @@ use crate::bag::chunked::{ChunkHead, Connections, Record, Stop};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId, Encoding};
 use crate::bag::source::Stream;
+use crate::base::budget::DEFINITIONS;
 use crate::base::time::Stamp;
 
 /// The bytes of a record's head: kind and length.
@@ -225,9 +226,6 @@ pub(super) struct Schema {
     definition: Option<Arc<str>>,
 }
 
-/// More text of definitions than this is not kept, in bytes.
-const MOST_TEXT: usize = 8 << 20;
-
 /// Adds what a schema record says. A second one of the same id is passed over.
 pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
     let mut cursor = Cursor(record);
@@ -242,7 +240,7 @@ pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
         .ok()
         .filter(|t| is_text && !t.is_empty());
     grammar.held += data.len();
-    let definition = text.filter(|_| grammar.held < MOST_TEXT).map(Arc::from);
+    let definition = text.filter(|_| grammar.held < DEFINITIONS).map(Arc::from);
     let name = name.into();
     grammar.schemas.insert(id, Schema { name, definition });
     Some(())

@@ -7,6 +7,7 @@ use crate::bag::chunked::{ChunkHead, Record, Stop};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId, Encoding};
 use crate::bag::source::Stream;
+use crate::base::budget::DEFINITIONS;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::time::Stamp;
 
@@ -210,9 +211,6 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// More text of definitions than this is not kept, in bytes.
-const MOST_TEXT: usize = 8 << 20;
-
 /// The connection that a record describes.
 pub(super) fn connection(grammar: &mut Rosbag1, topic: &[u8], mut data: &[u8]) -> Connection {
     let mut connection = blank(text(topic).into());
@@ -239,7 +237,7 @@ fn definition(grammar: &mut Rosbag1, value: &[u8]) -> Option<Arc<str>> {
         return Some(Arc::clone(known));
     }
     grammar.held += text.len();
-    if grammar.held > MOST_TEXT {
+    if grammar.held > DEFINITIONS {
         return None;
     }
     let new: Arc<str> = text.into();

@@ -6,6 +6,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use crate::base::budget::YAML;
 use crate::base::yaml::{self, Value};
 
 /// What `metadata.yaml` says.
@@ -25,9 +26,6 @@ pub(super) struct Topic {
     pub(super) hash: Option<Arc<str>>,
 }
 
-/// The longest file that is read, in bytes.
-const LONGEST: u64 = 8 << 20;
-
 /// Reads `metadata.yaml` in `folder`: `Ok(None)` if there is none, the reason if it cannot be understood.
 pub(super) fn read(folder: &Path) -> Result<Option<Metadata>, String> {
     let path = folder.join("metadata.yaml");
@@ -36,7 +34,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<Metadata>, String> {
     }
     let mut bytes = Vec::new();
     let file = File::open(&path).map_err(|e| e.to_string())?;
-    let read = file.take(LONGEST).read_to_end(&mut bytes);
+    let read = file.take(YAML as u64).read_to_end(&mut bytes);
     read.map_err(|e| e.to_string())?;
     let data = yaml::parse(&String::from_utf8_lossy(&bytes))
         .map_err(|e| format!("line {}: {}", e.line, e.reason))?;

@@ -9,7 +9,6 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use crate::base::geometry::Point;
-use crate::base::words::is_invisible;
 use crate::draw::paint::xml::{escape, units};
 use crate::draw::picture::{Part, Union};
 use crate::draw::scene::{Form, Group, Piece, Step};
@@ -132,7 +131,7 @@ impl<'a> Classes<'a> {
         if self.detail.has_names {
             for (key, value) in data {
                 let _ = write!(out, " data-{key}=\"");
-                attribute(out, value);
+                escape(out, value);
                 out.push('"');
             }
         }
@@ -233,19 +232,6 @@ impl<'a> Classes<'a> {
             }
         };
     }
-}
-
-/// A name as the value of an attribute that reads back as itself; what would hide or turn round the page's own text is
-/// written as a number.
-fn attribute(out: &mut String, name: &str) {
-    let mut rest = name;
-    while let Some(at) = rest.find(|c: char| is_invisible(c) && !c.is_control()) {
-        escape(out, &rest[..at]);
-        let hidden = rest[at..].chars().next().unwrap_or_default();
-        let _ = write!(out, "&#{};", u32::from(hidden));
-        rest = &rest[at + hidden.len_utf8()..];
-    }
-    escape(out, rest);
 }
 
 fn fine(out: &mut String, form: &Form, class: &str) {

@@ -2,6 +2,8 @@
 
 use std::fmt::{self, Display, Write as _};
 
+use crate::base::words::is_invisible;
+
 /// XML under way. Values and texts are escaped as they are written; tags close themselves in order.
 #[derive(Debug, Default)]
 pub(crate) struct Xml {
@@ -112,7 +114,8 @@ impl fmt::Write for Escaped<'_> {
     }
 }
 
-/// `text` for use between tags and in attributes; what XML cannot hold is spelled out.
+/// `text` for use between tags and in attributes; what XML cannot hold is spelled out, and what would hide or turn round
+/// the page's own text is written as a number.
 pub(crate) fn escape(out: &mut String, text: &str) {
     for c in text.chars() {
         match c {
@@ -125,6 +128,9 @@ pub(crate) fn escape(out: &mut String, text: &str) {
             }
             '\0'..='\u{1f}' | '\u{7f}'..='\u{9f}' | '\u{fffe}' | '\u{ffff}' => {
                 let _ = write!(out, "\\u{{{:x}}}", u32::from(c));
+            }
+            c if is_invisible(c) => {
+                let _ = write!(out, "&#{};", u32::from(c));
             }
             _ => out.push(c),
         }
@@ -202,11 +208,11 @@ mod tests {
     fn whatever_is_written_stays_inside_its_quotes_and_tags() {
         let mut xml = Xml::default();
         xml.open("g").attribute("data-name", "\"><script>");
-        xml.open("text").text("</text>&\u{1}\n").close();
+        xml.open("text").text("</text>&\u{1}\n\u{202e}").close();
         xml.open("rect").attribute("x", tenth(1.0)).close_empty();
         assert_eq!(
             xml.finish(),
-            "<g data-name=\"&quot;&gt;&lt;script&gt;\"><text>&lt;/text&gt;&amp;\\u{1}&#10;</text><rect x=\"1\"/></g>"
+            "<g data-name=\"&quot;&gt;&lt;script&gt;\"><text>&lt;/text&gt;&amp;\\u{1}&#10;&#8238;</text><rect x=\"1\"/></g>"
         );
     }
 }

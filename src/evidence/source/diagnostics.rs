@@ -101,11 +101,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
                 what: Key::Publish(node, topic),
                 source,
                 degree: Degree::Inferred,
-                when: Validity::Signs {
-                    signs,
-                    ends,
-                    held: false,
-                },
+                when: Validity::Signs { signs, ends },
             });
         }
     }

@@ -275,7 +275,6 @@ fn tell(
         when: Validity::Signs {
             signs: echo.texts.iter().map(|(time, _)| *time).collect(),
             ends: Vec::new(),
-            held: false,
         },
     };
     let first = echo.texts.first().map(|(time, _)| *time);

@@ -24,15 +24,17 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
         let node = heard.name(link.node.unwrap_or(name));
         let topic = heard.name(link.topic);
         let words = || format!("{name} logs: {text}");
-        if link.ends {
-            // It was there until now.
-            heard.claim(Claim::Node(node), Degree::Stated, words);
-            heard.claim(Claim::Unsubscribe(node, topic), Degree::Stated, words);
-        } else if link.node.is_some() {
-            heard.claim(Claim::Joins(node, topic), Degree::Stated, words);
-        } else {
-            heard.claim(Claim::Subscribe(node, topic), Degree::Stated, words);
-        }
+        let claim = match link.how {
+            How::Begins => Claim::Joins(node, topic),
+            How::Lasts => Claim::Subscribe(node, topic),
+            How::Refused => Claim::Refused(node, topic),
+            How::Ends => {
+                // It was there until now.
+                heard.claim(Claim::Node(node), Degree::Stated, words);
+                Claim::Unsubscribe(node, topic)
+            }
+        };
+        heard.claim(claim, Degree::Stated, words);
     }
     Ok(())
 }
@@ -43,39 +45,49 @@ struct Link<'a> {
     /// Whose; `None`: the one who logs.
     node: Option<&'a str>,
     topic: &'a str,
-    ends: bool,
+    how: How,
+}
+
+/// What becomes of a subscription.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum How {
+    Begins,
+    Lasts,
+    Refused,
+    Ends,
 }
 
 /// The subscription that a text of roscpp tells of.
 fn link(text: &str) -> Option<Link<'_>> {
     let between = |from: &str, to: &str| Some(text.split_once(from)?.1.split_once(to)?.0);
     let caller = || between("callerid=[", "]");
-    let begins = |node, topic| Link {
-        node,
+    let own = |topic| Link {
+        node: None,
         topic,
-        ends: false,
+        how: How::Lasts,
+    };
+    let clients = |node, topic, how| Link {
+        node: Some(node),
+        topic,
+        how,
     };
     if text.starts_with("Connection: Creating TransportSubscriberLink for topic [") {
         let topic = between("for topic [", "]")?;
-        return Some(begins(Some(caller()?), topic));
+        return Some(clients(caller()?, topic, How::Begins));
     }
     if text.starts_with("Connection to subscriber [callerid=[") && text.contains("dropped") {
         let topic = between("to topic [", "]")?;
-        return Some(Link {
-            node: Some(caller()?),
-            topic,
-            ends: true,
-        });
+        return Some(clients(caller()?, topic, How::Ends));
     }
     if text.starts_with("Client [") && text.contains("to have datatype/md5sum") {
         let topic = between("] wants topic ", " to have datatype")?;
-        return Some(begins(Some(between("Client [", "]")?), topic));
+        return Some(clients(between("Client [", "]")?, topic, How::Refused));
     }
     if text.starts_with("Connection to publisher [") && text.contains("dropped") {
-        return Some(begins(None, between("to topic [", "]")?));
+        return Some(own(between("to topic [", "]")?));
     }
     if text.starts_with("Retrying connection to [") {
-        return Some(begins(None, between("for topic [", "]")?));
+        return Some(own(between("for topic [", "]")?));
     }
     None
 }
@@ -88,17 +100,17 @@ mod tests {
     fn a_subscriber_comes_and_goes() {
         let text = "Connection: Creating TransportSubscriberLink for topic [/scan] connected to \
                     [callerid=[/slam] address=[TCPROS connection on port 1 to [127.0.0.1:2 on socket 3]]]";
-        let slam = |ends| {
+        let slam = |how| {
             Some(Link {
                 node: Some("/slam"),
                 topic: "/scan",
-                ends,
+                how,
             })
         };
-        assert_eq!(link(text), slam(false));
+        assert_eq!(link(text), slam(How::Begins));
         let text =
             "Connection to subscriber [callerid=[/slam] address=[…]] to topic [/scan] dropped";
-        assert_eq!(link(text), slam(true));
+        assert_eq!(link(text), slam(How::Ends));
     }
 
     #[test]
@@ -109,7 +121,7 @@ mod tests {
             Some(Link {
                 node: Some("/bad"),
                 topic: "/scan",
-                ends: false
+                how: How::Refused
             })
         );
     }
@@ -122,7 +134,7 @@ mod tests {
             Some(Link {
                 node: None,
                 topic: "/scan",
-                ends: false
+                how: How::Lasts
             })
         );
         assert_eq!(link("Retrying connection to [127.0.0.1:4]"), None);

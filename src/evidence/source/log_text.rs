@@ -106,11 +106,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
             what,
             source,
             degree: Degree::Stated,
-            when: Validity::Signs {
-                signs,
-                ends,
-                held: false,
-            },
+            when: Validity::Signs { signs, ends },
         };
         let verb = if publishes { "publishes" } else { "subscribes" };
         known.because(proof, first, |known| {

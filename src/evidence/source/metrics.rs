@@ -48,12 +48,12 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
     for (fact, signs, ends) in known.claims(source) {
         if let Claim::Reports(node, topic) = fact.claim {
-            let (node, held) = (known.meant(node), known.lasts(&signs));
+            let node = known.meant(node);
             known.prove(Proof {
                 what: Key::Publish(node, topic),
                 source,
                 degree: fact.degree,
-                when: Validity::Signs { signs, ends, held },
+                when: Validity::Signs { signs, ends },
             });
         }
     }

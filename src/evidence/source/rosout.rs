@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::SourceContext;
+use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
 use crate::evidence::message::cursor::{self, Cursor};
@@ -73,11 +74,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         let Claim::Lists(node, topic) = fact.claim else {
             continue;
         };
-        let own = known.publishers(topic).any(|p| p == node);
+        let own = known.publishers(topic).any(|p| p == node) || has_twin(known, node, topic);
         let others = known.publishers(topic).any(|p| p != node);
         if !own && is_broadcaster(known, node, topic) {
             continue;
         }
+        let told = is_told(known, topic);
         let silent = advertised.as_ref().is_some_and(|all| !all.contains(&topic));
         let what = match (own, others || silent) {
             (true, _) => Key::Publish(node, topic),
@@ -87,21 +89,37 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         known.prove(Proof {
             what,
             source,
-            degree: Degree::Stated,
-            when: Validity::Signs {
-                signs,
-                ends,
-                held: false,
+            // Where headers do not tell all publishers, a node that names a topic may be one of them.
+            degree: if told {
+                Degree::Stated
+            } else {
+                Degree::Inferred
             },
+            when: Validity::Signs { signs, ends },
         });
     }
+}
+
+/// Whether headers tell all publishers of a topic.
+fn is_told(known: &Findings<'_>, topic: Name) -> bool {
+    let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
+    of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
+}
+
+/// Whether a node that differs in an anonymous suffix only publishes a topic whose headers do not tell all publishers.
+fn has_twin(known: &Findings<'_>, node: Name, topic: Name) -> bool {
+    let own = known.text(node);
+    let base = role(&own);
+    let mut publishers = known.publishers(topic);
+    base.len() < own.len()
+        && !is_told(known, topic)
+        && publishers.any(|p| role(&known.text(p)) == base)
 }
 
 /// Whether a node that names `/tf` as its own sends it rather than listens: a listener of tf2 names `/tf_static` too. Asked
 /// only where headers do not tell all publishers.
 fn is_broadcaster(known: &mut Findings<'_>, node: Name, topic: Name) -> bool {
-    let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
-    let told = of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole);
+    let told = is_told(known, topic);
     let text = known.text(topic);
     let twin = match text.strip_suffix("/tf_static") {
         Some(space) => format!("{space}/tf"),

@@ -54,7 +54,6 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
         let node = owner(&logger, &nodes);
         nodes.insert(node.into());
         let what = Key::Publish(known.facts.name(node), topic);
-        let held = known.lasts(&signs);
         known.prove(Proof {
             what,
             source,
@@ -62,7 +61,6 @@ pub(crate) fn conclude(source: SourceId, known: &mut Findings<'_>) {
             when: Validity::Signs {
                 signs,
                 ends: Vec::new(),
-                held,
             },
         });
     }

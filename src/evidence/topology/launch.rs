@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::budget::Budget;
 use super::substitution::{Place, is_true};
 use super::tree::{self, Tree};
 use super::{Element, Entry, Topology, place, python, resolved, unused};
+use crate::base::budget::LaunchWork;
 use crate::base::error::Result;
 
 /// Files that include each other deeper than this go in circles.
@@ -85,7 +85,7 @@ pub(crate) fn nodes(path: &Path, tree: &Tree) -> Vec<LaunchedNode> {
 
 struct Launch {
     undecided: Undecided,
-    budget: Budget,
+    budget: LaunchWork,
     /// The files that are being read, each included by the one before.
     stack: Vec<PathBuf>,
     nested: usize,
@@ -97,8 +97,8 @@ impl Launch {
     fn new(undecided: Undecided) -> Self {
         // Files that a person names may include others; those of a workspace are read each by itself, and are many.
         let budget = match undecided {
-            Undecided::LeftOut => Budget::default(),
-            Undecided::Taken => Budget::of_text(OWN_TEXT),
+            Undecided::LeftOut => LaunchWork::all(),
+            Undecided::Taken => LaunchWork::of_text(OWN_TEXT),
         };
         Self {
             undecided,

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::budget::Budget;
 use super::python;
+use crate::base::budget::LaunchWork;
 
 /// The longest text that substitutions may grow to, in bytes: longer than any path.
 pub(super) const LONGEST: usize = 64 << 10;
@@ -20,11 +20,11 @@ pub(super) struct Place<'a> {
 
 impl Place<'_> {
     /// The text with everything put in; `None` if a part of it is only known when the file runs, or it grows too long.
-    pub(super) fn substitute(&self, text: &str, budget: &mut Budget) -> Option<String> {
+    pub(super) fn substitute(&self, text: &str, budget: &mut LaunchWork) -> Option<String> {
         self.at_depth(text, budget, 0)
     }
 
-    fn at_depth(&self, text: &str, budget: &mut Budget, depth: usize) -> Option<String> {
+    fn at_depth(&self, text: &str, budget: &mut LaunchWork, depth: usize) -> Option<String> {
         budget.spend(text.len())?;
         let mut done = String::new();
         let mut rest = text;
@@ -146,7 +146,7 @@ mod tests {
             path: Path::new("x.launch"),
             arguments: &arguments,
         };
-        place.substitute(text, &mut Budget::default())
+        place.substitute(text, &mut LaunchWork::all())
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use crate::base::words::is_invisible;
 use crate::view::{ItemKind, View};
 
 /// A longer id is cut; the label keeps the whole name.
@@ -89,8 +90,12 @@ pub(super) fn quoted(text: &str) -> String {
             '\n' => out.push_str("\\n"),
             '\r' => out.push_str("\\r"),
             '\t' => out.push_str("\\t"),
-            c if c.is_ascii_control() => {
-                let _ = write!(out, "\\x{:02x}", u32::from(c));
+            c if is_invisible(c) => {
+                let _ = match u32::from(c) {
+                    code @ ..=0xff => write!(out, "\\x{code:02x}"),
+                    code @ ..=0xffff => write!(out, "\\u{code:04x}"),
+                    code => write!(out, "\\U{code:08x}"),
+                };
             }
             c => out.push(c),
         }
@@ -151,7 +156,7 @@ mod tests {
             ("\"\"", r#""\x22\x22""#),
             ("a\\", r#""a\\""#),
             ("a\nb\u{1}", r#""a\nb\x01""#),
-            ("ü", r#""ü""#),
+            ("ü\u{9b}\u{202e}", r#""ü\x9b\u202e""#),
         ] {
             assert_eq!(quoted(text), want);
         }

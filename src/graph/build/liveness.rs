@@ -76,6 +76,16 @@ impl Pulse {
         })
     }
 
+    /// When it beat last.
+    pub(crate) fn last(&self) -> Stamp {
+        self.last
+    }
+
+    /// Whether it is silent for too long at the end.
+    pub(crate) fn broke_off(&self, end: Stamp) -> bool {
+        end.since(self.last) > self.patience()
+    }
+
     /// The longest silence that says nothing.
     fn patience(&self) -> i64 {
         self.period
@@ -107,6 +117,8 @@ pub(crate) struct Liveness {
     pub(crate) senders: (u32, u32),
     /// Whether it is known by more than latched messages.
     pub(crate) speaks: bool,
+    /// Whether it is known by more than moments.
+    pub(crate) lasts: bool,
     /// Whether it lives to the end, whatever its signs say.
     pub(crate) unending: bool,
     /// Whether it is there for the whole mission.
@@ -127,6 +139,7 @@ impl Default for Liveness {
             pulses: Vec::new(),
             senders: (0, 0),
             speaks: false,
+            lasts: false,
             unending: false,
             extent: Extent::Signs,
             lives: Vec::new(),
@@ -163,6 +176,7 @@ impl Liveness {
         self.senders.0 += other.senders.0;
         self.senders.1 += other.senders.1;
         self.speaks |= other.speaks;
+        self.lasts |= other.lasts;
         self.extent = self.extent.max(other.extent.min(Extent::Whole));
     }
 
@@ -236,8 +250,15 @@ impl Liveness {
         }
     }
 
-    /// Where a rhythm broke off for good, if one did.
+    /// Where a rhythm broke off for good, if one did; of what is known by moments only, the last of them.
     fn end(&self, mission: Stamp) -> Option<Bound> {
+        if !self.lasts && !self.unending {
+            return self.signs.last().map(|last| Bound {
+                time: *last,
+                earliest: *last,
+                latest: mission,
+            });
+        }
         let heard = self.heard.filter(|_| !self.unending)?;
         let silence = mission.since(heard);
         let broken = self.pulses.iter().filter(|p| {
@@ -281,7 +302,9 @@ impl Liveness {
                 first.begin_within(around, absent, stated);
             }
             if let Some(last) = inside.last_mut().filter(|l| l.ended.is_none()) {
-                (last.to, last.ended) = (around.to, around.ended);
+                let end = self.end(around.to).filter(|_| !self.lasts);
+                last.to = end.map_or(around.to, |end| end.time.max(last.to));
+                last.ended = end.or(around.ended);
             }
             self.lives.extend(inside);
         }

@@ -5,9 +5,9 @@ use std::io;
 use std::sync::Arc;
 
 use super::Options;
-use super::roles::role;
 use super::values::Values;
 use crate::base::notice::{Notice, NoticeKind};
+use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::code::matching;
@@ -26,7 +26,7 @@ pub(crate) fn prove(
     let start = collected.span.map_or(Stamp(0), |s| s.start);
     let end = collected.span.map_or(Stamp(0), |s| s.end.plus(-1));
     let mut known = Findings::new(&collected.streams, &mut collected.facts, (start, end));
-    known.take_at_their_word(|source| SOURCES.get(source).is_some_and(|s| s.lasting));
+    known.take_at_their_word();
     for (row, source) in SOURCES.iter().enumerate() {
         for conclude in source.conclude {
             conclude(row, &mut known);
@@ -148,6 +148,7 @@ fn explain(known: &mut Findings<'_>, messages: &Stamps) {
             Validity::Always => (None, format!("{} ({})", told(proof.what), source.about)),
             Validity::Signs { .. }
             | Validity::Begins { .. }
+            | Validity::Moments(_)
             | Validity::Unending
             | Validity::Whole => continue,
         };
@@ -181,7 +182,6 @@ fn told(known: &mut Findings<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
                 .map(|to| last(Some(to)).max(at(from, mission.0)))
                 .into_iter()
                 .collect(),
-            held: false,
         },
     };
     let (word, degree) = if entry.declared {

@@ -78,7 +78,9 @@ fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
     });
     of_node
         .flat_map(|proof| match &proof.when {
-            Validity::Signs { signs, .. } | Validity::Begins { signs, .. } => &signs[..],
+            Validity::Signs { signs, .. }
+            | Validity::Begins { signs, .. }
+            | Validity::Moments(signs) => &signs[..],
             _ => &[],
         })
         .copied()

@@ -13,6 +13,9 @@ const LONG: f64 = 4.0;
 /// How many rectangles may be looked at over all labels; the labels of the longest edges are then left out. The largest
 /// graph that is laid out in layers needs a tenth of it.
 const EFFORT: u64 = 20_000_000;
+/// How many cells edges may be noted in, over all of them; the longest are then not avoided. Long edges of a drawing with
+/// tens of thousands of boxes in a column pass through thousands each.
+const CELLS: usize = 2_000_000;
 /// The room between a label and its edge, if it stands beside.
 const ASIDE: f64 = 2.0;
 /// How bad it is to lie on another edge, and to hide most of the own edge.
@@ -22,12 +25,10 @@ const HIDING: f64 = 4.0;
 /// Places the labels of all routes; one that has no room anywhere gets none. Short edges choose first.
 pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
     let lines: Vec<Line> = layout.routes.iter().map(Line::new).collect();
-    let mut order: Vec<usize> = (0..lines.len())
-        .filter(|&i| plan.links[i].label.is_some())
-        .collect();
-    if order.is_empty() {
+    if plan.links.iter().all(|link| link.label.is_none()) {
         return;
     }
+    let mut order: Vec<usize> = (0..lines.len()).collect();
     order.sort_by(|&a, &b| {
         lines[a]
             .length()
@@ -51,8 +52,11 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
         );
     }
     let mut edges = Field::new(taken.cell);
-    for (i, line) in lines.iter().enumerate() {
-        for piece in line.points.windows(2) {
+    for &i in &order {
+        if edges.noted > CELLS {
+            break;
+        }
+        for piece in lines[i].points.windows(2) {
             edges.insert_line(piece[0], piece[1], i);
         }
     }
@@ -194,6 +198,8 @@ struct Field {
     cell: f64,
     cells: BTreeMap<(i64, i64), Vec<usize>>,
     rects: Vec<(Rect, usize)>,
+    /// In how many cells rectangles are noted, one counted again in each.
+    noted: usize,
     /// How many rectangles were looked at.
     looks: Cell<u64>,
 }
@@ -204,6 +210,7 @@ impl Field {
             cell,
             cells: BTreeMap::new(),
             rects: Vec::new(),
+            noted: 0,
             looks: Cell::new(0),
         }
     }
@@ -228,6 +235,7 @@ impl Field {
 
     fn insert(&mut self, rect: Rect, number: usize) {
         for cell in self.cells_of(&rect) {
+            self.noted += 1;
             self.cells.entry(cell).or_default().push(self.rects.len());
         }
         self.rects.push((rect, number));

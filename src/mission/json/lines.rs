@@ -4,6 +4,8 @@ use std::io::{self, Write};
 
 use serde_json::ser::Formatter;
 
+use crate::base::words::visible_json;
+
 /// Breaks lines down to the lists inside a window; everything deeper stays on its line.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
@@ -38,6 +40,15 @@ impl Lines {
 }
 
 impl Formatter for Lines {
+    /// Part of a text, with characters that nobody would see as `\uXXXX`: they mean the same and steer no terminal.
+    fn write_string_fragment<W: ?Sized + Write>(
+        &mut self,
+        writer: &mut W,
+        fragment: &str,
+    ) -> io::Result<()> {
+        writer.write_all(visible_json(fragment).as_bytes())
+    }
+
     fn begin_array<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
         self.open(writer, b"[")
     }

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use super::super::budget::Budget;
 use super::super::substitution::LONGEST;
 use super::value::{DEEPEST, Value};
+use crate::base::budget::LaunchWork;
 use crate::evidence::syntax::{Node, Parsed, children, line};
 
 /// Expressions and calls inside each other deeper than this are not followed.
@@ -18,7 +18,7 @@ pub(super) struct Evaluator<'a> {
     pub(super) parsed: &'a Parsed,
     frames: Vec<Frame>,
     functions: BTreeMap<String, Node<'a>>,
-    pub(super) budget: Budget,
+    pub(super) budget: LaunchWork,
     /// How many conditions that are not known stand around the statement.
     pub(super) undecided: usize,
     nested: usize,
@@ -50,7 +50,7 @@ impl<'a> Evaluator<'a> {
             parsed,
             frames: vec![global],
             functions: BTreeMap::new(),
-            budget: Budget::of_text(parsed.text.len()),
+            budget: LaunchWork::of_text(parsed.text.len()),
             undecided: 0,
             nested: 0,
         }

@@ -1,4 +1,7 @@
-//! The role of a node: its name without the suffix that makes an anonymous name unique.
+//! What an anonymous name holds: the role of a node, which is its name without the suffix that makes it unique, and the
+//! start in that suffix.
+
+use crate::base::time::Stamp;
 
 /// The shortest number of nanoseconds or milliseconds since 1970 that somebody may append, in digits.
 const CLOCK_DIGITS: usize = 13;
@@ -40,6 +43,20 @@ fn ends_well(name: &str) -> bool {
     !name.is_empty() && !name.ends_with('/')
 }
 
+/// The moment in a name: `/x_PID_MILLISECONDS`, `/x_NANOSECONDS`.
+pub(crate) fn start(name: &str) -> Option<Stamp> {
+    let (rest, number) = name.rsplit_once('_')?;
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let process = rest.rsplit_once('_').map_or("", |(_, process)| process);
+    let unit = match number.len() {
+        13 if digits(process) => 1_000_000,
+        19 => 1,
+        _ => return None,
+    };
+    let number: i64 = number.parse().ok().filter(|_| digits(number))?;
+    number.checked_mul(unit).map(Stamp)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,5 +83,20 @@ mod tests {
         ] {
             assert_eq!(role(name), name);
         }
+    }
+
+    #[test]
+    fn anonymous_names_hold_their_start() {
+        let at = |name| start(name).map(|t| t.0);
+        assert_eq!(
+            at("/probe_9665_1795171273454"),
+            Some(1_795_171_273_454_000_000)
+        );
+        assert_eq!(
+            at("/record_1795170682045487216"),
+            Some(1_795_170_682_045_487_216)
+        );
+        assert_eq!(at("/camera_1795171273454"), None);
+        assert_eq!(at("/camera_2"), None);
     }
 }

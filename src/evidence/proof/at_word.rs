@@ -1,0 +1,153 @@
+//! What claims say at their word, and when: signs, and ends by what takes them back.
+
+use std::collections::BTreeMap;
+
+use super::{Findings, Key, Proof, Validity};
+use crate::base::time::Stamp;
+use crate::evidence::claim::{Claim, ClaimRecord, SourceId};
+
+impl Findings<'_> {
+    /// All claims of one source with their signs and ends, sorted.
+    pub(crate) fn claims(
+        &mut self,
+        source: SourceId,
+    ) -> Vec<(ClaimRecord, Vec<Stamp>, Vec<Stamp>)> {
+        let endings = self.endings();
+        let facts = self.facts.list.iter().filter(|f| f.source == source);
+        let facts: Vec<ClaimRecord> = facts.copied().collect();
+        let times = |fact: ClaimRecord| {
+            let (signs, ends) = self.signs_and_ends(&fact, &endings);
+            (fact, signs, ends)
+        };
+        facts.into_iter().map(times).collect()
+    }
+
+    /// What the claims say without any rule: nodes, topics, publications and subscriptions.
+    pub(crate) fn take_at_their_word(&mut self) {
+        let endings = self.endings();
+        let refusals = self.refusals();
+        for fact in self.facts.list.clone() {
+            let what = match fact.claim {
+                Claim::Node(node) => Key::Node(node),
+                Claim::Topic(topic) => Key::Topic(topic),
+                Claim::Publish(node, topic) => Key::Publish(node, topic),
+                Claim::Subscribe(node, topic)
+                | Claim::Joins(node, topic)
+                | Claim::Refused(node, topic) => Key::Subscribe(topic, node),
+                _ => continue,
+            };
+            let (mut signs, ends) = self.signs_and_ends(&fact, &endings);
+            if let (Claim::Joins(..), Some(refused)) = (fact.claim, refusals.get(&what)) {
+                signs.retain(|sign| !is_refused(*sign, refused));
+            }
+            if signs.is_empty() && matches!(fact.claim, Claim::Joins(..)) {
+                continue;
+            }
+            self.prove(Proof {
+                what,
+                source: fact.source,
+                degree: fact.degree,
+                when: match fact.claim {
+                    Claim::Joins(..) => Validity::Begins { signs, ends },
+                    Claim::Refused(..) => Validity::Moments(signs),
+                    _ => Validity::Signs { signs, ends },
+                },
+            });
+        }
+    }
+
+    /// When somebody was refused who wanted to subscribe.
+    fn refusals(&mut self) -> BTreeMap<Key, Vec<Stamp>> {
+        let mut refusals: BTreeMap<Key, Vec<Stamp>> = BTreeMap::new();
+        for fact in self.facts.list.clone() {
+            if let Claim::Refused(node, topic) = fact.claim {
+                let times = self.times(&fact);
+                let key = Key::Subscribe(topic, node);
+                refusals.entry(key).or_default().extend(times);
+            }
+        }
+        refusals
+    }
+
+    /// When something was taken back, and when snapshots were taken.
+    fn endings(&mut self) -> BTreeMap<Claim, Vec<Stamp>> {
+        let mut endings: BTreeMap<Claim, Vec<Stamp>> = BTreeMap::new();
+        for fact in self.facts.list.clone() {
+            if let Claim::NodeGone(_) | Claim::Unsubscribe(..) | Claim::Snapshot(_) = fact.claim {
+                let times = self.times(&fact);
+                endings.entry(fact.claim).or_default().extend(times);
+            }
+        }
+        for times in endings.values_mut() {
+            times.sort_unstable();
+        }
+        endings
+    }
+
+    /// When a claim was made, and when it was taken back, sorted.
+    fn signs_and_ends(
+        &mut self,
+        fact: &ClaimRecord,
+        endings: &BTreeMap<Claim, Vec<Stamp>>,
+    ) -> (Vec<Stamp>, Vec<Stamp>) {
+        let signs = self.times(fact);
+        let ending = match fact.claim {
+            Claim::Node(node) => Some(Claim::NodeGone(node)),
+            Claim::Subscribe(node, topic) | Claim::Joins(node, topic) => {
+                Some(Claim::Unsubscribe(node, topic))
+            }
+            _ => None,
+        };
+        let mut ends = ending
+            .and_then(|e| endings.get(&e))
+            .cloned()
+            .unwrap_or_default();
+        let snapshots = fact
+            .snapshot
+            .and_then(|name| endings.get(&Claim::Snapshot(name)));
+        ends.extend(
+            snapshots
+                .map(|taken| absences(&signs, taken))
+                .unwrap_or_default(),
+        );
+        ends.sort_unstable();
+        ends.dedup();
+        (signs, ends)
+    }
+}
+
+/// A client is refused so soon after it connected, in nanoseconds: both are logged in one go.
+const REFUSED_NS: i64 = 1_000_000_000;
+
+/// Whether a connection made at `time` was refused at once.
+fn is_refused(time: Stamp, refusals: &[Stamp]) -> bool {
+    let soon = |refusal: &Stamp| (0..=REFUSED_NS).contains(&refusal.since(time));
+    refusals.iter().any(soon)
+}
+
+/// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.
+fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
+    let mut absent = Vec::new();
+    let mut from = 0;
+    for sign in signs {
+        let run = &snapshots[from..snapshots.partition_point(|t| t < sign).max(from)];
+        absent.extend(run.first());
+        absent.extend(run.last());
+        from = snapshots.partition_point(|t| t <= sign);
+    }
+    absent.extend(snapshots.get(from));
+    absent
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_snapshot_without_a_claim_tells_of_its_absence() {
+        let stamps = |times: &[i64]| times.iter().map(|t| Stamp(*t)).collect::<Vec<_>>();
+        let absent = absences(&stamps(&[4, 8]), &stamps(&[1, 2, 3, 4, 5, 6, 7, 8, 9]));
+        assert_eq!(absent, stamps(&[1, 3, 5, 7, 9]));
+        assert_eq!(absences(&stamps(&[1, 2]), &stamps(&[1, 2])), []);
+    }
+}

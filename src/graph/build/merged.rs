@@ -1,0 +1,114 @@
+//! When the publisher of a merged stream fell silent. A tool that rewrites bags keeps one connection per topic, so that no
+//! message tells who sent it; but where only one node is known to publish a topic, the end of the topic's rhythm is the
+//! end of its own.
+
+use std::collections::BTreeMap;
+
+use super::Traffic;
+use super::liveness::{Liveness, Pulse};
+use super::rates::Sender;
+use crate::base::role::{role, start};
+use crate::base::time::Stamp;
+use crate::evidence::claim::Name;
+use crate::evidence::collector::Collected;
+use crate::evidence::proof::{Key, Reliability};
+use crate::graph::lives::Stretch;
+
+/// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on says nothing:
+/// somebody else may have taken the topic over.
+pub(crate) fn fall_silent(
+    tracks: &mut BTreeMap<Key, Liveness>,
+    traffic: &Traffic,
+    collected: &Collected,
+    end: Stamp,
+) {
+    for (topic, nodes) in publishers(tracks) {
+        let Some(sender) = merged(traffic, collected, topic) else {
+            continue;
+        };
+        for (node, stretches) in turns(&nodes, sender, collected) {
+            let pulse = Pulse::of(stretches, &[]).filter(|pulse| pulse.broke_off(end));
+            if let (Some(pulse), Some(track)) = (pulse, tracks.get_mut(&Key::Publish(node, topic)))
+            {
+                track.signs.push(pulse.last());
+                track.heard = track.heard.max(Some(pulse.last()));
+                track.pulses.push(pulse);
+            }
+        }
+    }
+}
+
+/// Who is known to publish each topic.
+fn publishers(tracks: &BTreeMap<Key, Liveness>) -> BTreeMap<Name, Vec<Name>> {
+    let mut all: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
+    for what in tracks.keys() {
+        if let Key::Publish(node, topic) = what {
+            all.entry(*topic).or_default().push(*node);
+        }
+    }
+    all
+}
+
+/// The sender that stands for all of a merged topic's, unless messages outlive it.
+fn merged<'a>(traffic: &'a Traffic, collected: &Collected, topic: Name) -> Option<&'a Sender> {
+    let (streams, rates) = traffic.get(&topic)?;
+    let is_merged = |at: &usize| collected.streams[*at].trust == Reliability::First;
+    let sender = rates.senders.iter().find(|sender| sender.node.is_none())?;
+    (streams.iter().all(is_merged) && !sender.latched).then_some(sender)
+}
+
+/// What each of the publishers sent: one alone all of it, those of one role in turns, each from its start to the next
+/// one's.
+fn turns<'a>(
+    nodes: &[Name],
+    sender: &'a Sender,
+    collected: &Collected,
+) -> Vec<(Name, &'a [Stretch])> {
+    if let [only] = nodes {
+        return vec![(*only, &sender.stretches)];
+    }
+    let text = |node: &Name| collected.facts.text(*node);
+    let born = |node: &Name| Some((start(&text(node))?, *node));
+    let births: Option<Vec<(Stamp, Name)>> = nodes.iter().map(born).collect();
+    let is_one_role = nodes
+        .windows(2)
+        .all(|p| role(&text(&p[0])) == role(&text(&p[1])));
+    let mut births = births.filter(|_| is_one_role).unwrap_or_default();
+    births.sort_unstable();
+    let ends = births.iter().skip(1).map(|(next, _)| *next);
+    let ends = ends.chain([Stamp::MAX]);
+    let turns = births.iter().zip(ends);
+    turns
+        .filter_map(|((from, node), to)| Some((*node, within(&sender.stretches, *from, to)?)))
+        .collect()
+}
+
+/// The stretches of a turn; `None` if one goes on into the next turn, so that two send at a time.
+fn within(stretches: &[Stretch], from: Stamp, to: Stamp) -> Option<&[Stretch]> {
+    let first = stretches.partition_point(|s| s.first < from);
+    let next = stretches.partition_point(|s| s.first < to);
+    let own = stretches.get(first..next)?;
+    own.last().is_none_or(|last| last.last < to).then_some(own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_ends_before_the_next_begins() {
+        let stretch = |first, last| Stretch {
+            first: Stamp(first),
+            last: Stamp(last),
+            count: 9,
+            period: 1,
+            is_even: true,
+            is_joined: false,
+        };
+        let all = [stretch(10, 20), stretch(30, 40)];
+        let turn = |from, to| within(&all, Stamp(from), Stamp(to)).map(<[Stretch]>::len);
+        assert_eq!(turn(5, 25), Some(1));
+        assert_eq!(turn(25, 50), Some(1));
+        assert_eq!(turn(5, 15), None);
+    }
+}
