@@ -9,6 +9,7 @@
 )]
 
 mod architecture;
+mod board;
 mod cli;
 mod damaged;
 mod docs;
