@@ -4,7 +4,6 @@
 
 #![expect(clippy::print_stdout, reason = "an example prints what it finds")]
 
-use bagreel::bag::Input;
 use bagreel::{Output, Reading, Render, render};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,10 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let frames = arguments
         .next()
         .ok_or("name the frames, such as `out/{n}.svg`")?;
-    let reading = Reading {
-        inputs: vec![Input::Path(bag.into())],
-        ..Reading::default()
-    };
+    let reading = Reading::of([bag]);
     let job = Render::new(reading, vec![Output::parse(&frames, None)?])?;
     for written in render(&job)?.written {
         println!("{} files, {} bytes", written.files, written.bytes);

@@ -4,22 +4,17 @@
 
 #![expect(clippy::print_stdout, reason = "an example prints what it finds")]
 
-use bagreel::bag::Input;
-use bagreel::base::words;
 use bagreel::{Reading, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let bag = arguments.next().ok_or("name a bag")?;
     let topic = arguments.next().ok_or("name a topic")?;
-    let reading = Reading {
-        inputs: vec![Input::Path(bag.into())],
-        ..Reading::default()
-    };
+    let reading = Reading::of([bag]);
     let mission = read(&reading)?;
     let elements = &mission.elements;
     for window in &mission.windows {
-        println!("{}", words::offset(mission.offset(window.span.start)));
+        println!("{:.0} s", mission.offset(window.span.start) as f64 / 1e9);
         for state in &window.graph.publishes {
             let edge = &elements.publishes[state.id as usize];
             if elements.topics[edge.topic as usize].name.as_str() != topic {
@@ -27,7 +22,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
             let node = &elements.nodes[edge.node as usize].name;
             let evidence: Vec<&str> = edge.evidence.words().collect();
-            let rate = state.hz.map_or_else(|| "?".to_owned(), words::rate);
+            let rate = state
+                .hz
+                .map_or_else(|| "?".to_owned(), |hz| format!("{hz:.1} Hz"));
             println!(
                 "  {node}  {rate}  {} by {}",
                 state.degree.word(),

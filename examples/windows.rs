@@ -4,15 +4,11 @@
 
 #![expect(clippy::print_stdout, reason = "an example prints what it finds")]
 
-use bagreel::bag::Input;
 use bagreel::{Reading, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bag = std::env::args().nth(1).ok_or("name a bag")?;
-    let reading = Reading {
-        inputs: vec![Input::Path(bag.into())],
-        ..Reading::default()
-    };
+    let reading = Reading::of([bag]);
     let mission = read(&reading)?;
     println!(
         "{} messages, windows of {}",

@@ -13,6 +13,7 @@ mod model;
 mod rosbag1;
 mod rosbag2;
 pub(crate) mod source;
+#[cfg(feature = "sqlite")]
 mod sqlite3;
 mod unknown;
 mod zstd;
@@ -34,6 +35,7 @@ use unknown::explain;
 pub const FORMATS: &[FormatRow] = &[
     rosbag1::FORMAT,
     self::mcap::FORMAT,
+    #[cfg(feature = "sqlite")]
     sqlite3::FORMAT,
     rosbag2::FORMAT,
     zstd::FORMAT,
@@ -51,7 +53,7 @@ pub enum Kind {
 /// Tells what `input` is from its first bytes. Standard input is left untouched.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`] with a hint if it is none of ours.
+/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag) with a hint if it is none of ours.
 pub fn sniff(input: &Input) -> Result<Kind> {
     let path = match input {
         Input::Path(path) if !input.is_pipe() => path,
@@ -70,7 +72,7 @@ pub fn sniff(input: &Input) -> Result<Kind> {
 /// Opens a bag of any format, told by its first bytes.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::UnknownBag`], [`Error::Unsupported`] or [`Error::Malformed`] with a
+/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag), [`Error::Unsupported`](crate::Error::Unsupported) or [`Error::Malformed`](crate::Error::Malformed) with a
 /// hint if nothing in it can be.
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let mut place = place(input)?;

@@ -1,17 +1,19 @@
 //! What was typed, turned into work; the only file (with its folder) that knows clap and the environment.
 
+mod applies;
 mod args;
 mod extract;
+mod gate;
 mod look;
 mod stop;
-pub mod terminal;
+pub(crate) mod terminal;
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use clap::{CommandFactory as _, Parser as _};
+use clap::{CommandFactory as _, FromArgMatches as _};
 
 use crate::bag::Input;
 use crate::base::error::Error;
@@ -30,9 +32,10 @@ use crate::pipeline::{
     Drawing, Purpose, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read,
     survey, survey_file,
 };
+use applies::Given;
 use args::{
-    Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat, Inputs,
-    RenderArgs, TimeArgs, Typed,
+    ChangeArgs, Command, EventsArgs, EventsFormat, ExtractArgs, GraphArgs, InfoArgs, InfoFormat,
+    Inputs, RenderArgs, TimeArgs, Typed,
 };
 
 const DONE: u8 = 0;
@@ -64,17 +67,23 @@ fn hush() {
 
 fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
-    let typed = match Typed::try_parse_from(&args) {
-        Ok(typed) => typed,
+    let (given, typed) = match parsed(&args) {
+        Ok(parsed) => parsed,
         Err(error) => return untyped(&args, error),
     };
     let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
     let mut terminal = Terminal::new(typed.quiet, no_colour);
+    let mut failed = FAILED;
     let outcome = match typed.command {
-        Command::Render(args) => render(&args, &mut terminal),
-        Command::Info(args) => info(&args, &mut terminal),
+        Command::Render(args) => render(&args, &given, &mut terminal),
+        Command::Info(args) => info(&args, &given, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
-        Command::Events(args) => log(&args, &mut terminal),
+        Command::Events(args) => log(&args, &given, &mut terminal),
+        Command::Baseline(args) => gate::baseline(&args, &mut terminal),
+        Command::Check(args) => {
+            failed = USAGE;
+            gate::check(&args, &mut terminal)
+        }
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {
             let mut text = Vec::new();
@@ -102,9 +111,17 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         match (error, terminal.stopped_by()) {
             (Error::Interrupted, Some(code)) => code,
             (error, _) if error.is_usage() => USAGE,
-            _ => FAILED,
+            _ => failed,
         }
     })
+}
+
+/// What was typed: the names of the options, and all of it with defaults.
+fn parsed<T: Into<OsString> + Clone>(
+    args: impl IntoIterator<Item = T>,
+) -> Result<(Given, Typed), clap::Error> {
+    let matches = Typed::command().try_get_matches_from(args)?;
+    Ok((Given::of(&matches), Typed::from_arg_matches(&matches)?))
 }
 
 /// Prints the help, the version, or what is wrong with the command line: as it looks with everything in it visible, so
@@ -113,7 +130,7 @@ fn untyped(args: &[OsString], error: clap::Error) -> u8 {
     let shown = args
         .iter()
         .map(|arg| visible(&arg.to_string_lossy()).into_owned());
-    let error = Typed::try_parse_from(shown).err().unwrap_or(error);
+    let error = parsed(shown).err().unwrap_or(error);
     match error.print().and_then(|()| std::io::stdout().flush()) {
         _ if error.use_stderr() => USAGE,
         // A closed pipe has read enough of the help.
@@ -122,7 +139,12 @@ fn untyped(args: &[OsString], error: clap::Error) -> u8 {
     }
 }
 
-fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Reading, Error> {
+fn reading(
+    inputs: &Inputs,
+    time: &TimeArgs,
+    change: &ChangeArgs,
+    graph: &GraphArgs,
+) -> Result<Reading, Error> {
     let infers = |what: &str| graph.infer.iter().any(|word| word == what);
     Ok(Reading {
         inputs: inputs.bags.iter().map(|path| input(path)).collect(),
@@ -136,7 +158,6 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
         },
         skip_unchanged: time.skip_unchanged,
         collect: collector::Options {
-            sizes: graph.bytes,
             infer_stamps: infers("stamps"),
             payload_bytes: if infers("payloads") {
                 u64::MAX
@@ -146,13 +167,13 @@ fn reading(inputs: &Inputs, time: &TimeArgs, graph: &GraphArgs) -> Result<Readin
             ..collector::Options::default()
         },
         graph: graph::Options {
-            grace: graph.grace.unwrap_or(0) as usize,
+            grace: change.grace as usize,
             roles: graph.roles,
             topology: topology::read_all(&graph.topology)?,
             code: None,
         },
         code: source_code(graph)?,
-        rate_change: graph.rate_change,
+        rate_change: change.rate_change,
     })
 }
 
@@ -205,8 +226,20 @@ fn extract(args: &ExtractArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     Ok(if is_whole { DONE } else { SKIPPED })
 }
 
-fn render(args: &RenderArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let job = job(args)?;
+fn render(args: &RenderArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
+    let mut job = job(args)?;
+    job.reading.collect.sizes = args.sizes.bytes;
+    applies::check_outputs(given, args, &job.outputs)?;
+    crate::pipeline::check(&job)?;
+    applies::check_inputs(given, &job.reading)?;
+    if job
+        .outputs
+        .iter()
+        .all(|output| applies::is_figure(args, output))
+        && let Some(note) = applies::about_windows(given, "a figure")
+    {
+        terminal.note(&note);
+    }
     if args.watch {
         return watch(args, job, terminal);
     }
@@ -217,7 +250,6 @@ fn render(args: &RenderArgs, terminal: &mut Terminal) -> Result<u8, Error> {
 
 /// Draws again whenever the style file changes, until interrupted. The bag is read once.
 fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<u8, Error> {
-    crate::pipeline::check(&job)?;
     let mission = read(&job.reading, terminal)?;
     let path = PathBuf::from(&args.look.style);
     if !path.is_file() {
@@ -274,7 +306,7 @@ fn report(done: &Rendered, timings: bool, terminal: &mut Terminal) {
 
 /// The work that `render` was asked to do.
 fn job(args: &RenderArgs) -> Result<Render, Error> {
-    let reading = reading(&args.inputs, &args.time, &args.graph)?;
+    let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
     let title = args
         .look
         .title
@@ -297,7 +329,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .as_deref()
         .map(Purpose::parse)
         .transpose()?;
-    let page = look::options(&args.look, title, args.graph.rate_change);
+    let page = look::options(&args.look, title, args.change.rate_change);
     Ok(Render {
         drawing: Drawing {
             body: look::body(args)?,
@@ -373,8 +405,16 @@ fn default_output(inputs: &[Input], is_figure: bool) -> String {
     format!("out/{}.{extension}", stem.replace('/', "_"))
 }
 
-fn log(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
-    let mission = read(&reading(&args.inputs, &args.time, &args.graph)?, terminal)?;
+fn log(args: &EventsArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
+    let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
+    applies::check_inputs(given, &reading)?;
+    if let Some(note) = applies::about_windows(given, "the log") {
+        terminal.note(&note);
+    }
+    if args.graph.source.is_some() {
+        terminal.note("what only source code says has no times, and is left out of the log");
+    }
+    let mission = read(&reading, terminal)?;
     let options = events::LogOptions {
         parts: args.parts,
         all: args.all,
@@ -391,15 +431,21 @@ fn log(args: &EventsArgs, terminal: &mut Terminal) -> Result<u8, Error> {
     Ok(code(&mission))
 }
 
-fn info(args: &InfoArgs, terminal: &mut Terminal) -> Result<u8, Error> {
+fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
     let time = TimeArgs {
         period: Some(Length::Parts(PARTS)),
         ..TimeArgs::default()
     };
-    let reading = reading(&args.inputs, &time, &args.graph)?;
+    let mut reading = reading(&args.inputs, &time, &ChangeArgs::default(), &args.graph)?;
+    reading.collect.sizes = args.sizes.bytes;
+    applies::check_inputs(given, &reading)?;
     if let ([folder], [input]) = (&args.inputs.bags[..], &reading.inputs[..])
         && is_survey(input)
     {
+        if !args.why.is_empty() {
+            let what = "`--why` explains one mission, and a folder of bags holds many";
+            return Err(Error::usage(what, "name one of the bags"));
+        }
         let Survey { rows, skipped } = survey(folder, &reading, terminal)?;
         match args.format {
             InfoFormat::Text => terminal.results(&survey_text(&rows))?,

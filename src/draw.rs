@@ -1,8 +1,8 @@
 //! Drawings as values: style, measured text and the scene of each window; painters stand in `paint`.
 
-pub mod board;
-pub mod figure;
-pub mod paint;
+pub(crate) mod board;
+pub(crate) mod figure;
+pub(crate) mod paint;
 pub mod picture;
 pub mod scene;
 pub mod strip;

@@ -8,19 +8,19 @@ pub(crate) mod clock;
 pub mod code;
 pub mod collector;
 mod kinds;
-pub mod message;
+pub(crate) mod message;
 pub(crate) mod proof;
 pub(crate) mod publishers;
 pub(crate) mod source;
 pub(crate) mod spread;
 pub(crate) mod syntax;
 pub(crate) mod texts;
-pub mod times;
+pub(crate) mod times;
 pub mod topology;
 
 pub use claim::{Degree, EvidenceLine};
 pub use kinds::Evidence;
-pub use source::Source;
+pub(crate) use source::Source;
 
 use message::{definition, parameters};
 use source::{

@@ -2,30 +2,32 @@
 
 mod animated_svg;
 mod apng;
-pub mod check;
-pub mod dot;
+pub(crate) mod check;
+pub(crate) mod dot;
 pub(crate) mod encoder;
 mod gexf;
 mod gif;
 mod graphml;
-pub mod html;
+pub(crate) mod html;
 mod json;
-pub mod mermaid;
+pub(crate) mod mermaid;
 pub mod options;
-pub mod palette;
+pub(crate) mod palette;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "pdf")]
 mod pdf;
 mod png;
-pub mod report;
+pub(crate) mod report;
 pub mod run;
 pub mod sequence;
-pub mod sink;
+pub(crate) mod sink;
 mod spells;
 mod svg;
-pub mod tables;
-pub mod target;
+pub(crate) mod tables;
+pub(crate) mod target;
 mod tex;
+#[cfg(feature = "video")]
 mod video;
 
 use std::ffi::OsStr;
@@ -33,9 +35,10 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
+pub use encoder::Written;
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
-pub use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Start, Written};
+pub(crate) use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Pack, Packet};
 use sequence::Sequence;
 use target::Target;
 pub(crate) use tex::needs_figure;
@@ -76,7 +79,7 @@ pub const FORMATS: &[Format] = &[
     Format {
         word: "dot",
         what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
-        start: dot::encoder::start,
+        start: dot::start,
         ..DATA
     },
     Format {
@@ -85,6 +88,7 @@ pub const FORMATS: &[Format] = &[
         start: mermaid::encoder::start,
         ..DATA
     },
+    #[cfg(feature = "pdf")]
     Format {
         word: "pdf",
         what: "a page per window as vectors, or the `--strip`",
@@ -99,6 +103,7 @@ pub const FORMATS: &[Format] = &[
         whole: OneDrawing::Asked,
         ..PICTURE
     },
+    #[cfg(feature = "video")]
     Format {
         word: "mp4",
         what: "a video, through `ffmpeg`",
@@ -106,6 +111,7 @@ pub const FORMATS: &[Format] = &[
         start: video::start_mp4,
         ..PICTURE
     },
+    #[cfg(feature = "video")]
     Format {
         word: "webm",
         what: "a video, through `ffmpeg`",
@@ -233,7 +239,7 @@ impl Output {
 ///
 /// # Errors
 /// As [`check::check`], and [`Error::Output`] where a format lacks something.
-pub fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
+pub(crate) fn check(outputs: &[Output], kept: &[PathBuf]) -> Result<()> {
     let targets: Vec<Target> = outputs.iter().flat_map(files).collect();
     check::check(&targets, kept)?;
     outputs
@@ -250,7 +256,7 @@ fn files(output: &Output) -> Vec<Target> {
 }
 
 /// Whether a sequence of this many windows needs a strip for these outputs even if none was asked for.
-pub fn needs_strip(outputs: &[Output], windows: usize) -> bool {
+pub(crate) fn needs_strip(outputs: &[Output], windows: usize) -> bool {
     let strip = |o: &Output| o.format.whole == OneDrawing::Always && !o.target.is_numbered();
     windows > 1 && outputs.iter().any(strip)
 }

@@ -5,8 +5,8 @@
 
 mod build;
 pub mod diff;
-pub mod lives;
-pub mod sending;
+pub(crate) mod lives;
+pub(crate) mod sending;
 pub mod window;
 
 use std::sync::Arc;

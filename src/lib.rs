@@ -4,16 +4,15 @@
 //! bag ──> evidence ──> graph ──> mission ──> view ──> layout ──> draw ──> export
 //! ```
 //!
-//! [`pipeline`] is that line in the order it happens; everything before the scene decides, everything after it only draws.
+//! `pipeline` is that line in the order it happens; everything before the scene decides, everything after it only draws.
 //!
 //! ```
-//! use bagreel::bag::Input;
 //! use bagreel::{Output, Reading, Render, read, render};
 //!
 //! # let folder = tempfile::tempdir().map_err(bagreel::Error::io("make", std::path::Path::new("a folder")))?;
 //! # let page = folder.path().join("courier.html").display().to_string();
 //! let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
-//! let reading = Reading { inputs: vec![Input::Path(bag.into())], ..Reading::default() };
+//! let reading = Reading::of([bag]);
 //! let mission = read(&reading)?;
 //! for window in &mission.windows {
 //!     println!("{}: {} nodes, {} changes", window.index, window.graph.nodes.len(), window.changes.len());
@@ -28,21 +27,22 @@
 //!
 //! | station | takes | gives |
 //! |---|---|---|
-//! | [`base`] | | times, names, errors, notices, words: the nouns that all share |
+//! | `base` | | times, names, errors, notices, words: the nouns that all share |
 //! | [`bag`] | files | connections and messages, told apart by the first bytes |
-//! | [`evidence`] | messages | claims: who talks to whom, how we know, how strongly |
-//! | [`graph`] | claims and windows | the computation graph of each window, and what changed |
-//! | [`mission`] | graphs | the whole sequence, as a value and as JSON; its log and its summary |
-//! | [`view`] | a mission | what the picture shows of it: filtered, grouped, collapsed, counted |
-//! | [`layout`] | the union of a view | places for everything, once, so that nothing moves |
-//! | [`draw`] | a view with places | scenes, and the painters that turn a scene into SVG, PDF or pixels |
-//! | [`export`] | scenes and missions | files |
-//! | [`pipeline`] | what was asked for | the whole program in the order it happens |
-//! | [`cli`] | the command line | a job for the pipeline |
+//! | `evidence` | messages | claims: who talks to whom, how we know, how strongly |
+//! | `graph` | claims and windows | the computation graph of each window, and what changed |
+//! | `mission` | graphs | the whole sequence, as a value and as JSON; its log and its summary |
+//! | `view` | a mission | what the picture shows of it: filtered, grouped, collapsed, counted |
+//! | `layout` | the union of a view | places for everything, once, so that nothing moves |
+//! | `draw` | a view with places | scenes, and the painters that turn a scene into SVG, PDF or pixels |
+//! | `export` | scenes and missions | files |
+//! | `gate` | missions and expectations | what differs, and whether that is allowed |
+//! | `pipeline` | what was asked for | the whole program in the order it happens |
+//! | `cli` | the command line | a job for the pipeline |
 //!
 //! Where to add things: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
-//! `evidence/source/` and [`evidence::SOURCES`], an output one in `export/` and [`export::FORMATS`], a style one in
-//! `styles/` and [`draw::style::BUILTIN`], a layout engine one in `layout/` and [`layout::ENGINES`].
+//! `evidence/source/` and `evidence::SOURCES`, an output one in `export/` and `export::FORMATS`, a style one in
+//! `styles/` and `draw::style::BUILTIN`, a layout engine one in `layout/` and `layout::ENGINES`.
 //!
 //! Glossary. A *bag* is a recording; a *connection* one source of messages in it. A *period* is a length of time, a
 //! *window* one half-open interval `[start, end)`. A *claim* is what one source says about the graph, with the times at
@@ -52,31 +52,34 @@
 //! (boxes) and *arrows*; a *mark* says what changed about one. A *scene* is a drawing with every place and colour
 //! decided; a *painter* writes it down; an *encoder* makes a file of it.
 //!
-//! The library is silent and repeatable: it never prints (but for [`cli`]), reads no clock, and writes the same bytes
+//! The library is silent and repeatable: it never prints (but for `cli`), reads no clock, and writes the same bytes
 //! for the same bag.
 
 // In the order of the line, which is why they stand apart: sorted they would tell nothing.
-pub mod base;
+mod base;
 
 pub mod bag;
 
-pub mod evidence;
+mod evidence;
 
-pub mod graph;
+mod graph;
 
-pub mod mission;
+mod mission;
 
-pub mod view;
+mod view;
 
-pub mod layout;
+mod layout;
 
-pub mod draw;
+mod draw;
 
-pub mod export;
+mod export;
 
-pub mod pipeline;
+mod gate;
 
-pub mod cli;
+mod pipeline;
+
+#[cfg(feature = "cli")]
+mod cli;
 
 pub use base::error::{Error, Result};
 pub use draw::style::Style;
@@ -85,6 +88,41 @@ pub use graph::Graph;
 pub use graph::diff::Change;
 pub use mission::{Ledger, Mission, Window};
 pub use pipeline::{Reading, Render, Rendered};
+
+pub mod values {
+    //! What the values of the front page are made of: times and names, the elements of a graph, the entries of a ledger,
+    //! and what can be asked for.
+
+    pub use crate::base::name::{NodeName, TopicName};
+    pub use crate::base::notice::{Notice, NoticeKind, Notices};
+    pub use crate::base::time::{Period, Span, Stamp};
+    pub use crate::evidence::{Degree, Evidence};
+    pub use crate::graph::window::{Division, Length};
+    pub use crate::graph::{
+        Edge, EdgeId, EdgeState, Element, Elements, Node, NodeId, NodeState, State, Topic, TopicId,
+        TopicState,
+    };
+    pub use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Phase};
+    pub use crate::pipeline::{Drawing, Phases, Stage, Unwatched, Watch};
+    pub use crate::view::{Grouping, Hide, Mode, ViewOptions};
+}
+
+pub mod commands {
+    //! What the commands beside `render` do: the summary, the log, the table of messages, the survey of a folder.
+
+    pub use crate::mission::events::{LogFormat, LogOptions, log};
+    pub use crate::mission::info::{Info, info};
+    pub use crate::pipeline::{
+        Extract, Extracted, Survey, extract, is_survey, survey, survey_file,
+    };
+}
+
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use cli::run as run_command;
+
+#[doc(hidden)]
+pub mod internals;
 
 /// Reads bags, or a mission's own JSON, into a mission.
 ///

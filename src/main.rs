@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    ExitCode::from(bagreel::cli::run(std::env::args_os()))
+    ExitCode::from(bagreel::run_command(std::env::args_os()))
 }

@@ -1,6 +1,6 @@
 //! The whole sequence: every window with its graph and what changed; written as JSON and read back as an input.
 
-pub mod activity;
+pub(crate) mod activity;
 pub mod events;
 pub mod info;
 pub mod ledger;
@@ -19,10 +19,12 @@ use crate::graph::lives::Lives;
 use crate::graph::{Elements, Graph, NodeId};
 
 pub use activity::Activity;
-pub use ledger::{EntryId, Ledger};
+pub(crate) use ledger::EntryId;
+pub use ledger::Ledger;
 
 /// One window with its graph.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Window {
     /// Its place, 0...
     pub index: usize,
@@ -42,6 +44,7 @@ pub struct Window {
 
 /// A mission as a sequence of graphs.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Mission {
     /// The bags it was read from, in order.
     pub bags: Vec<Report>,

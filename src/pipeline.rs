@@ -5,20 +5,27 @@ mod draw;
 mod export;
 mod extract;
 mod figure;
+pub(crate) mod gate;
 mod purpose;
 mod read;
 mod survey;
 
-pub use draw::{Body, Drawing};
-pub use export::{Render, Rendered, check, render, show};
+pub(crate) use draw::Body;
+pub use draw::Drawing;
+pub(crate) use export::render;
+pub use export::{Render, Rendered};
+#[cfg(feature = "cli")]
+pub(crate) use export::{check, show};
 pub use extract::{Extract, Extracted, extract};
 pub use figure::Phases;
-pub use purpose::Purpose;
+pub(crate) use purpose::Purpose;
+pub(crate) use read::mission_file;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};
 
 /// A part of the work, as progress and timings tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Stage {
     /// Bags are read; progress counts bytes.
     Read,
@@ -52,6 +59,9 @@ pub trait Watch {
 
     /// How far the stage is: `done` of `total`.
     fn progress(&mut self, _done: u64, _total: u64) {}
+
+    /// Where the time of the stage went: the words of its steps and their shares, the largest first.
+    fn shares(&mut self, _shares: &[(&'static str, f64)]) {}
 
     /// Whether to stop at the next good moment, leaving nothing half-written.
     fn stopped(&self) -> bool {

@@ -15,11 +15,11 @@ mod marks;
 mod names;
 mod options;
 mod roles;
-pub mod runs;
+pub(crate) mod runs;
 mod select;
 mod settle;
 mod state;
-pub mod union;
+pub(crate) mod union;
 
 use std::sync::Arc;
 
@@ -31,9 +31,8 @@ use crate::graph::{Element, State};
 use crate::mission::Mission;
 use crate::mission::ledger::{EntryId, Kind};
 
-pub use collapse::Candidate;
-pub use filter::NameFilter;
-pub use filtered::filtered;
+pub(crate) use filter::NameFilter;
+pub(crate) use filtered::filtered;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 
 /// What the picture shows of a mission, and a notice for everything that it leaves out.
@@ -45,7 +44,7 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
 }
 
 /// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
-pub fn outline(mission: &Mission, options: &ViewOptions) -> View {
+pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     let viewed = items::Viewed::new(&mission.elements, options);
     stage(viewed, options, Vec::new())
 }
@@ -117,6 +116,8 @@ pub enum ArrowKind {
     Subscribe,
     /// From a node to a node, over this topic (mode *nodes only*).
     Direct(Arc<str>),
+    /// From a box to a box, over all topics between them (mode *bundles*).
+    Bundle,
 }
 
 impl ArrowKind {
@@ -126,6 +127,7 @@ impl ArrowKind {
             Self::Publish => "publish",
             Self::Subscribe => "subscribe",
             Self::Direct(_) => "direct",
+            Self::Bundle => "bundle",
         }
     }
 }
@@ -141,6 +143,17 @@ pub struct Arrow {
     pub kind: ArrowKind,
     /// The edges it stands for, sorted.
     pub members: Vec<Element>,
+}
+
+impl Arrow {
+    /// What an arrow from node to node carries in a window: a topic, or how many; `None` for one from or to a topic.
+    pub fn carries(&self, shown: &Shown) -> Option<String> {
+        match &self.kind {
+            ArrowKind::Publish | ArrowKind::Subscribe => None,
+            ArrowKind::Direct(topic) => Some(topic.to_string()),
+            ArrowKind::Bundle => Some(words::count(shown.topics, "topic")),
+        }
+    }
 }
 
 /// What happened to an item or arrow in a window.
@@ -198,7 +211,9 @@ pub struct Shown {
     pub is_paused: bool,
     /// The headlines that `mark` tells, sorted: places in the ledger.
     pub entries: Vec<EntryId>,
-    /// What happened inside a folded namespace.
+    /// How many topics a bundle carries; 0 for all else.
+    pub topics: usize,
+    /// What happened inside a folded namespace or a bundle.
     pub inside: Option<Box<Counts>>,
     /// Messages in the window, if known.
     pub count: Option<u64>,
@@ -219,6 +234,7 @@ impl Shown {
             rates: None,
             is_paused: false,
             entries: Vec::new(),
+            topics: 0,
             inside: None,
             count: None,
             lifecycle: None,

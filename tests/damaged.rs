@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use bagreel::bag::{OpenOptions, Report, Tier, Want};
-use bagreel::base::notice::NoticeKind;
-use bagreel::base::time::Stamp;
+use bagreel::internals::base::notice::NoticeKind;
+use bagreel::internals::base::time::Stamp;
 use tempfile::TempDir;
 
 use crate::support::rosbag1::Pack;

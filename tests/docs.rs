@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use bagreel::evidence::SOURCES;
-use bagreel::export::FORMATS;
+use bagreel::internals::evidence::SOURCES;
+use bagreel::internals::export::FORMATS;
 
 const README: &str = include_str!("../README.md");
 

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 
 use bagreel::bag::{Connection, ConnectionId, Encoding, Message, Sink as _};
-use bagreel::base::time::{Span, Stamp};
-use bagreel::evidence::collector::{Collected, Collector, Options};
-use bagreel::evidence::topology::{Element, Entry, Topology};
-use bagreel::evidence::{Degree, EvidenceLine};
-use bagreel::graph::{self, Built};
+use bagreel::internals::base::time::{Span, Stamp};
+use bagreel::internals::evidence::collector::{Collected, Collector, Options};
+use bagreel::internals::evidence::topology::{Element, Entry, Topology};
+use bagreel::internals::evidence::{Degree, EvidenceLine};
+use bagreel::internals::graph::{self, Built};
 
 use crate::support::cdr::Cdr;
 use crate::support::{ORIGIN, Recording};
@@ -63,7 +63,8 @@ fn concluded(bag: &Recording, options: Options) -> (Built, Vec<EvidenceLine>) {
 fn proved(bag: &Recording, by: &str, options: Options) -> Vec<String> {
     let (built, _) = concluded(bag, options);
     let all = &built.elements;
-    let by = |evidence: bagreel::evidence::Evidence| evidence.words().any(|word| word == by);
+    let by =
+        |evidence: bagreel::internals::evidence::Evidence| evidence.words().any(|word| word == by);
     let node = |id: u32| all.nodes[id as usize].name.as_str();
     let topic = |id: u32| all.topics[id as usize].name.as_str();
     let degree = |states: &[graph::EdgeState], id: usize| {

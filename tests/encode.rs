@@ -5,21 +5,20 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use bagreel::base::error::{Error, Result};
-use bagreel::base::geometry::{Rect, Size};
-use bagreel::base::notice;
-use bagreel::base::time::{Period, Span, Stamp};
-use bagreel::draw::paint::raster::Painter;
-use bagreel::draw::scene::{Form, Group, Scene, Shape};
-use bagreel::draw::style::Style;
-use bagreel::draw::text::Fonts;
-use bagreel::export::run;
-use bagreel::export::sequence::{Drawings, Options, Sequence};
-use bagreel::export::{Output, Written};
-use bagreel::graph::{self, Element};
-use bagreel::mission::Mission;
-use bagreel::mission::ledger::Kind;
-use bagreel::view::{Counts, Frame, Headline, View};
+use bagreel::internals::base::error::{Error, Result};
+use bagreel::internals::base::geometry::{Rect, Size};
+use bagreel::internals::base::time::{Span, Stamp};
+use bagreel::internals::draw::paint::raster::Painter;
+use bagreel::internals::draw::scene::{Form, Group, Scene, Shape};
+use bagreel::internals::draw::style::Style;
+use bagreel::internals::draw::text::Fonts;
+use bagreel::internals::export::run;
+use bagreel::internals::export::sequence::{Drawings, Options, Sequence};
+use bagreel::internals::export::{Output, Written};
+use bagreel::internals::graph::Element;
+use bagreel::internals::mission::ledger::Kind;
+use bagreel::internals::mission::{Mission, read_json};
+use bagreel::internals::view::{Counts, Frame, Headline, View};
 
 /// A disc that moves through every window, over discs in all colours.
 struct Discs;
@@ -51,24 +50,16 @@ impl Drawings for Discs {
 /// Windows of which the odd ones show a change.
 fn mission(windows: usize) -> (Mission, View) {
     let second = |i: usize| Stamp(i64::try_from(i).unwrap() * 1_000_000_000);
-    let period = Period::parse("1s").unwrap();
-    let mission = Mission {
-        undrawn: Vec::new(),
-        bags: Vec::new(),
-        span: Span {
-            start: second(0),
-            end: second(windows),
-        },
-        messages: 0,
-        period,
-        step: period,
-        elements: graph::Elements::default(),
-        windows: Vec::new(),
-        ledger: bagreel::mission::Ledger::default(),
-        activity: bagreel::mission::Activity::default(),
-        layout: None,
-        notices: notice::Notices::new(),
+    let window = |i: usize| {
+        let (start, end) = (second(i).0, second(i + 1).0);
+        format!(r#"{{"start_ns": {start}, "end_ns": {end}}}"#)
     };
+    let spans: Vec<String> = (0..windows).map(window).collect();
+    let text = format!(
+        r#"{{"schema": "bagreel.evolution/2", "windows": [{}]}}"#,
+        spans.join(", ")
+    );
+    let mission = read_json(&text, "mission.json".as_ref()).unwrap();
     let frame = |index: usize| Frame {
         index,
         span: Span {
@@ -132,7 +123,7 @@ fn run(
         strip: None,
         options,
     };
-    run::run(&sequence, outputs, progress)
+    run::run(&sequence, outputs, &run::Steps::default(), progress)
 }
 
 fn png(path: &Path) -> image::RgbImage {

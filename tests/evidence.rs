@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
-use bagreel::base::notice::Notice;
-use bagreel::base::time::{Span, Stamp};
-use bagreel::evidence::collector::{Collector, Options};
-use bagreel::graph::{self, Built};
+use bagreel::internals::base::notice::Notice;
+use bagreel::internals::base::time::{Span, Stamp};
+use bagreel::internals::evidence::collector::{Collector, Options};
+use bagreel::internals::graph::{self, Built};
 
 const SECOND: i64 = 1_000_000_000;
 

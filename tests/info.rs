@@ -1,31 +1,26 @@
 //! What `info` tells of a recording, and what it advises.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use bagreel::bag::Input;
-use bagreel::mission::info::{Info, info};
-use bagreel::pipeline::{Reading, Unwatched, explain, read};
+use bagreel::internals::mission::info::{Info, info};
+use bagreel::internals::pipeline::{Reading, Unwatched, explain, read};
 
 use crate::support::cdr::Cdr;
 use crate::support::{ORIGIN, Recording, mcap};
 
-fn example(name: &str) -> Vec<Input> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
-        .join(name);
-    vec![Input::Path(path)]
+        .join(name)
 }
 
-fn told(inputs: Vec<Input>) -> Info {
-    let reading = Reading {
-        inputs,
-        ..Reading::default()
-    };
+fn told(bag: PathBuf) -> Info {
+    let reading = Reading::of([bag]);
     info(&read(&reading, &mut Unwatched).unwrap())
 }
 
 /// A recording of ROS 2 by a recorder that logs, as a file in a folder of its own.
-fn recorded() -> (tempfile::TempDir, Vec<Input>) {
+fn recorded() -> (tempfile::TempDir, PathBuf) {
     let mut bag = Recording::default();
     let log = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
     let scan = bag.publisher("", "/scan", "sensor_msgs/msg/LaserScan");
@@ -43,7 +38,7 @@ fn recorded() -> (tempfile::TempDir, Vec<Input>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     std::fs::write(&path, mcap::write(&bag, &options)).unwrap();
-    (folder, vec![Input::Path(path)])
+    (folder, path)
 }
 
 #[test]
@@ -86,10 +81,7 @@ fn advice_on_ros2_says_what_is_missing_what_files_add_and_what_would_have_told_a
 
 #[test]
 fn the_evidence_of_an_edge_includes_what_was_concluded() {
-    let mut reading = Reading {
-        inputs: example("warehouse.bag"),
-        ..Reading::default()
-    };
+    let mut reading = Reading::of([example("warehouse.bag")]);
     let mut why = |names: [&str; 2]| {
         reading.collect.why = names.map(str::to_owned).to_vec();
         let (_, pieces) = explain(&reading, &mut Unwatched).unwrap();

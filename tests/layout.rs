@@ -3,8 +3,8 @@
 #[path = "bench/layout/measure.rs"]
 mod measure;
 
-use bagreel::base::geometry::{Point, Rect, Size};
-use bagreel::layout::{self, Cluster, Layout, Link, Orientation, Outline, Plan, Vertex};
+use bagreel::internals::base::geometry::{Point, Rect, Size};
+use bagreel::internals::layout::{self, Cluster, Layout, Link, Orientation, Outline, Plan, Vertex};
 use proptest::prelude::*;
 
 fn options(orientation: Option<Orientation>) -> layout::Options {

@@ -18,10 +18,10 @@ fn rendered(mission: &Value, extensions: &[&str]) -> TempDir {
 
 fn render(input: &Path, folder: &Path, extensions: &[&str]) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
-    command
-        .arg("render")
-        .arg(input)
-        .args(["--quiet", "--fit", "none"]);
+    command.arg("render").arg(input).arg("--quiet");
+    if extensions.iter().any(|e| !["md", "mmd"].contains(e)) {
+        command.args(["--fit", "none"]);
+    }
     for extension in extensions {
         command.arg("-o").arg(folder.join(format!("x.{extension}")));
     }

@@ -2,23 +2,16 @@
 
 use std::path::Path;
 
-use bagreel::bag::Input;
-use bagreel::base::time::Period;
-use bagreel::graph::window::{Division, Length};
-use bagreel::mission::Mission;
-use bagreel::pipeline::{Reading, Unwatched, read};
+use bagreel::internals::base::time::Period;
+use bagreel::internals::graph::window::Length;
+use bagreel::internals::mission::Mission;
+use bagreel::internals::pipeline::{Reading, Unwatched, read};
 
 use crate::support;
 
 fn mission(path: &Path, length: Length) -> Mission {
-    let reading = Reading {
-        inputs: vec![Input::Path(path.to_owned())],
-        division: Division {
-            length,
-            ..Division::default()
-        },
-        ..Reading::default()
-    };
+    let mut reading = Reading::of([path]);
+    reading.division.length = length;
     read(&reading, &mut Unwatched).unwrap()
 }
 

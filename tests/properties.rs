@@ -1,8 +1,8 @@
 //! What holds for every graph and every mission, tried on random ones.
 
-use bagreel::evidence::Degree;
-use bagreel::graph::diff::{apply, diff};
-use bagreel::graph::{EdgeState, Graph, NodeState, State, TopicState};
+use bagreel::internals::evidence::Degree;
+use bagreel::internals::graph::diff::{apply, diff};
+use bagreel::internals::graph::{EdgeState, Graph, NodeState, State, TopicState};
 use proptest::collection::btree_map;
 use proptest::prelude::*;
 

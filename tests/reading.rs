@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use bagreel::bag::{self, FORMATS, Input, Kind, OpenOptions, Tier, Want};
-use bagreel::base::error::Error;
-use bagreel::base::notice::NoticeKind;
-use bagreel::base::time::{Span, Stamp};
+use bagreel::internals::base::error::Error;
+use bagreel::internals::base::notice::NoticeKind;
+use bagreel::internals::base::time::{Span, Stamp};
 use tempfile::TempDir;
 
 use crate::support::rosbag1::Pack;

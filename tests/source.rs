@@ -12,14 +12,14 @@ use crate::support::cdr::Cdr;
 use crate::support::mission::definition;
 use crate::support::{ORIGIN, Recording, mcap};
 
-/// A recording of ROS 2: these topics with their types, each offered by one publisher, and a log record of each node.
-fn bag(topics: &[(&str, &str)], nodes: &[&str]) -> Vec<u8> {
+/// A recording of ROS 2: these topics with their types, each offered by one publisher, and log records of each node;
+/// what ends in `late` begins in the middle.
+pub(crate) fn bag(topics: &[(&str, &str)], nodes: &[&str]) -> Vec<u8> {
     let mut bag = Recording::default();
     let rosout = bag.publisher("", "/rosout", "rcl_interfaces/msg/Log");
     bag.publishers[rosout].definition = definition("rcl_interfaces/msg/Log");
     for node in nodes {
         let name = node.trim_start_matches('/').replace('/', ".");
-        // A node of this name starts in the middle.
         let first = if name.ends_with("late") { 5 } else { 0 };
         for second in first..10 {
             let at = ORIGIN + second * 1_000_000_000;
@@ -33,7 +33,8 @@ fn bag(topics: &[(&str, &str)], nodes: &[&str]) -> Vec<u8> {
         bag.publishers[place]
             .qos
             .push_str("- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n");
-        bag.send(place, (0, 10_000), 500, &[0, 1, 0, 0, 1, 2, 3, 4]);
+        let first = if topic.ends_with("late") { 5_000 } else { 0 };
+        bag.send(place, (first, 10_000), 500, &[0, 1, 0, 0, 1, 2, 3, 4]);
     }
     bag.messages.sort_by_key(|m| m.1);
     let options = mcap::Options {
@@ -102,11 +103,11 @@ fn set(edges: &[&str]) -> BTreeSet<String> {
     edges.iter().map(|e| (*e).to_owned()).collect()
 }
 
-const STRING: &str = "std_msgs/msg/String";
-const PACKAGE: (&str, &str) = ("p/package.xml", "<package><name>p</name></package>");
+pub(crate) const STRING: &str = "std_msgs/msg/String";
+pub(crate) const PACKAGE: (&str, &str) = ("p/package.xml", "<package><name>p</name></package>");
 
 /// A node in Python that publishes one topic and subscribes another.
-fn node(name: &str, publishes: &str, subscribes: &str) -> String {
+pub(crate) fn node(name: &str, publishes: &str, subscribes: &str) -> String {
     format!(
         "from std_msgs.msg import String\nclass N(Node):\n    def __init__(self):\n        super().__init__('{name}')\n        \
          self.create_publisher(String, '{publishes}', 1)\n        \

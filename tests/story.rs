@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bagreel::bag::Input;
-use bagreel::base::time::Period;
-use bagreel::graph::diff::{apply, diff};
-use bagreel::graph::window::{Division, Length};
-use bagreel::mission::events::{LogFormat, LogOptions, log};
-use bagreel::mission::ledger::Kind;
-use bagreel::mission::{Mission, read_json, write_json};
+use bagreel::internals::base::time::Period;
+use bagreel::internals::graph::diff::{apply, diff};
+use bagreel::internals::graph::window::Length;
+use bagreel::internals::mission::events::{LogFormat, LogOptions, log};
+use bagreel::internals::mission::ledger::Kind;
+use bagreel::internals::mission::{Mission, read_json, write_json};
 use bagreel::{Reading, read};
 
 /// A mission of ours, in windows of so many seconds.
@@ -18,15 +17,9 @@ fn mission(file: &str, seconds: i64) -> Mission {
         .join("examples")
         .join(file);
     let period = Period::from_nanos(seconds * 1_000_000_000).unwrap();
-    read(&Reading {
-        inputs: vec![Input::Path(bag)],
-        division: Division {
-            length: Length::Fixed(period),
-            ..Division::default()
-        },
-        ..Reading::default()
-    })
-    .unwrap()
+    let mut reading = Reading::of([bag]);
+    reading.division.length = Length::Fixed(period);
+    read(&reading).unwrap()
 }
 
 const ALL: LogOptions = LogOptions {
@@ -39,7 +32,8 @@ const ALL: LogOptions = LogOptions {
 fn told(mission: &Mission, kind: Kind) -> Vec<(String, i64)> {
     let headlines = mission.ledger.entries.iter();
     let of_kind = headlines.filter(|e| e.kind == kind && e.is_headline());
-    let name = |e: &bagreel::mission::ledger::Entry| match mission.elements.ends(e.what) {
+    let name = |e: &bagreel::internals::mission::ledger::Entry| match mission.elements.ends(e.what)
+    {
         (Some(node), _) => mission.elements.nodes[node as usize].role.to_string(),
         (None, Some(topic)) => mission.elements.topics[topic as usize].name.to_string(),
         (None, None) => String::new(),

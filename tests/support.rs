@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 use bagreel::bag::{
     self, Connection, ConnectionId, Input, Message, OpenOptions, Report, Sink, Want,
 };
-use bagreel::base::error::Result;
-use bagreel::base::notice::Notice;
-use bagreel::base::time::{Span, Stamp};
+use bagreel::internals::base::error::Result;
+use bagreel::internals::base::notice::Notice;
+use bagreel::internals::base::time::{Span, Stamp};
 
 /// What publishes in a described bag.
 #[derive(Clone, Debug, Default)]

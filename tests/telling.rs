@@ -3,21 +3,17 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use bagreel::bag::Input;
-use bagreel::pipeline::{Reading, Unwatched, read};
-use bagreel::view::{Frame, Mark, Shown, View, ViewOptions, view};
+use bagreel::internals::pipeline::{Reading, Unwatched, read};
+use bagreel::internals::view::{Frame, Mark, Shown, View, ViewOptions, view};
 
 /// What an example shows in windows of this length, or of the usual one.
 fn example(name: &str, period: Option<&str>) -> View {
     let bag = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
         .join(name);
-    let mut reading = Reading {
-        inputs: vec![Input::Path(bag)],
-        ..Reading::default()
-    };
-    if let Some(period) = period.and_then(bagreel::base::time::Period::parse) {
-        reading.division.length = bagreel::graph::window::Length::Fixed(period);
+    let mut reading = Reading::of([bag]);
+    if let Some(period) = period.and_then(bagreel::internals::base::time::Period::parse) {
+        reading.division.length = bagreel::internals::graph::window::Length::Fixed(period);
     }
     let mission = read(&reading, &mut Unwatched).unwrap();
     view(&mission, &ViewOptions::default()).0
@@ -87,14 +83,11 @@ fn a_window_without_a_headline_looks_like_the_one_before() {
 #[test]
 fn a_node_that_restarts_keeps_its_arrows() {
     let bag = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
-    let mut reading = Reading {
-        inputs: vec![Input::Path(bag)],
-        ..Reading::default()
-    };
+    let mut reading = Reading::of([bag]);
     // Away from 4:06 to 4:13: gone when the window from 4:00 to 4:10 ends.
-    reading.division.length = bagreel::base::time::Period::parse("10").map_or(
+    reading.division.length = bagreel::internals::base::time::Period::parse("10").map_or(
         reading.division.length,
-        bagreel::graph::window::Length::Fixed,
+        bagreel::internals::graph::window::Length::Fixed,
     );
     let mission = read(&reading, &mut Unwatched).unwrap();
     let view = view(&mission, &ViewOptions::default()).0;

@@ -3,24 +3,17 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bagreel::bag::Input;
-use bagreel::base::time::Period;
-use bagreel::graph::window::{Division, Length};
-use bagreel::mission::Mission;
-use bagreel::pipeline::{Reading, Unwatched, read};
+use bagreel::internals::base::time::Period;
+use bagreel::internals::graph::window::Length;
+use bagreel::internals::mission::Mission;
+use bagreel::internals::pipeline::{Reading, Unwatched, read};
 
 /// The mission in 10-second windows.
 fn mission() -> Mission {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
     let length = Period::parse("10").map_or(Length::Auto, Length::Fixed);
-    let reading = Reading {
-        inputs: vec![Input::Path(path)],
-        division: Division {
-            length,
-            ..Division::default()
-        },
-        ..Reading::default()
-    };
+    let mut reading = Reading::of([path]);
+    reading.division.length = length;
     read(&reading, &mut Unwatched).unwrap()
 }
 

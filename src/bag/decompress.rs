@@ -143,6 +143,7 @@ const UNFOLDS: &str = "the bag unfolds to far more than its size";
 /// The largest look-back that a Zstandard frame may ask for, as a power of two: 8 MiB, what every decoder must offer.
 const LARGEST_WINDOW: u32 = 23;
 
+#[cfg(feature = "sqlite")]
 /// The whole of one Zstandard frame of at most `limit` bytes, such as a payload that rosbag2 compressed by itself.
 /// `None` if it is damaged or larger.
 pub(crate) fn zstd_payload(

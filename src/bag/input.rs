@@ -50,7 +50,7 @@ pub fn size_on_disk(input: &Input) -> Option<u64> {
     }
 }
 
-/// A row of [`FORMATS`].
+/// A row of `FORMATS`.
 pub struct FormatRow {
     /// Its word in JSON.
     pub name: &'static str,

@@ -19,6 +19,7 @@ pub(crate) const USER_TEXT: u64 = 16 << 20;
 /// the largest launch system seen (all of Autoware's), and a second or two of work.
 pub(crate) const LAUNCH_WORK: usize = 64 << 20;
 
+#[cfg(feature = "cli")]
 /// The longest font file, in bytes: collections of Chinese, Japanese and Korean have 20 MB.
 pub(crate) const FONT: u64 = 64 << 20;
 
@@ -47,6 +48,7 @@ pub(crate) const EVIDENCE_LINES: usize = 1 << 16;
 /// See [`EVIDENCE_LINES`].
 pub(crate) const EVIDENCE_LINE: usize = 500;
 
+#[cfg(feature = "video")]
 /// How much of what a child process says is kept, in bytes: its last words.
 pub(crate) const LAST_WORDS: usize = 1 << 16;
 

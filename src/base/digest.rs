@@ -10,6 +10,15 @@ pub(crate) fn policy(text: &str) -> String {
     out
 }
 
+/// The first `digits` hex digits of a text's digest, 64 at most.
+pub(crate) fn hex(text: &str, digits: usize) -> String {
+    const DIGITS: &[u8; 16] = b"0123456789abcdef";
+    let digest = Sha256::digest(text.as_bytes());
+    let nibbles = digest.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    let all = nibbles.map(|nibble| char::from(DIGITS[usize::from(nibble)]));
+    all.take(digits).collect()
+}
+
 /// Appends `data` in base64 with padding (RFC 4648, section 4).
 pub(crate) fn base64(out: &mut String, data: &[u8]) {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -38,6 +47,11 @@ mod tests {
             policy(""),
             "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
         );
+    }
+
+    #[test]
+    fn hex_begins_where_the_digest_does() {
+        assert_eq!(hex("", 12), "e3b0c44298fc");
     }
 
     #[test]

@@ -64,6 +64,19 @@ pub enum Error {
         /// What to do.
         hint: String,
     },
+    /// An expectation that says something wrong.
+    BadExpectation {
+        /// The file.
+        path: PathBuf,
+        /// The line, 1..; 0 where none can be named.
+        line: usize,
+        /// The character in it, 1...
+        column: usize,
+        /// What is wrong.
+        reason: String,
+        /// What to do.
+        hint: String,
+    },
     /// A value that was asked for and makes no sense. Exit code 2.
     Usage {
         /// What is wrong, with the value.
@@ -116,6 +129,7 @@ impl Error {
             | Self::Unsupported { hint, .. }
             | Self::NoMessages { hint, .. }
             | Self::BadFile { hint, .. }
+            | Self::BadExpectation { hint, .. }
             | Self::Usage { hint, .. }
             | Self::Output { hint, .. } => hint.clone(),
         }
@@ -166,6 +180,20 @@ impl fmt::Display for Error {
             } => match line {
                 0 => write!(f, "`{}`: {reason}", path.display()),
                 _ => write!(f, "`{}` line {line}: {reason}", path.display()),
+            },
+            Self::BadExpectation {
+                path,
+                line,
+                column,
+                reason,
+                ..
+            } => match line {
+                0 => write!(f, "`{}`: {reason}", path.display()),
+                _ => write!(
+                    f,
+                    "`{}` line {line}, column {column}: {reason}",
+                    path.display()
+                ),
             },
             Self::Usage { what, .. } => f.write_str(what),
             Self::Interrupted => f.write_str("interrupted; unfinished outputs were removed"),

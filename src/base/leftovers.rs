@@ -1,7 +1,6 @@
 //! Files and folders with temporary names: should a signal end the process before their owners remove them, this does.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -30,11 +29,12 @@ impl Drop for Leftover {
     }
 }
 
+#[cfg(feature = "cli")]
 /// Removes whatever is there, just before the process ends.
 pub(crate) fn remove() {
     for path in all().iter() {
         // What is gone, or cannot be removed now, nobody could do more about.
-        let _ = fs::remove_file(path).or_else(|_| fs::remove_dir_all(path));
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }
 }
 
@@ -46,17 +46,17 @@ mod tests {
     fn what_is_still_remembered_is_removed() {
         let folder = tempfile::tempdir().unwrap();
         let place = |name: &str| folder.path().join(name);
-        fs::write(place("half"), "").unwrap();
-        fs::create_dir(place("unpacked")).unwrap();
-        fs::write(place("unpacked/bag"), "").unwrap();
-        fs::write(place("whole"), "").unwrap();
+        std::fs::write(place("half"), "").unwrap();
+        std::fs::create_dir(place("unpacked")).unwrap();
+        std::fs::write(place("unpacked/bag"), "").unwrap();
+        std::fs::write(place("whole"), "").unwrap();
         let _kept = [
             Leftover::at(&place("half")),
             Leftover::at(&place("unpacked")),
         ];
         drop(Leftover::at(&place("whole")));
         remove();
-        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+        let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
         assert_eq!(left.len(), 1, "{left:?}");
     }
 }

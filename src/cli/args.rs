@@ -1,5 +1,7 @@
 //! What can be typed: every command and flag with its help text.
 
+pub(super) mod gate;
+
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -8,6 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::base::time::{Moment, Period, parse_nanos};
 use crate::export::FORMATS;
 use crate::export::tables::TableFormat;
+use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::{Align, Length};
 
 /// See how a robot's software reconfigures during a mission, straight from its bag files.
@@ -36,6 +39,12 @@ pub(super) enum Command {
     Extract(Box<ExtractArgs>),
     /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
+    /// Write down what healthy runs have in common, as an expectation to edit and to keep.
+    #[command(after_help = gate::BASELINE_HELP)]
+    Baseline(Box<gate::BaselineArgs>),
+    /// Hold a mission against an expectation: what is missing, new, late, slow, or not as it was.
+    #[command(after_help = gate::check_help())]
+    Check(Box<gate::CheckArgs>),
     /// List the built-in styles, or print one to start your own from.
     Styles {
         /// The style to print as TOML.
@@ -62,7 +71,11 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) time: TimeArgs,
     #[command(flatten)]
+    pub(super) change: ChangeArgs,
+    #[command(flatten)]
     pub(super) graph: GraphArgs,
+    #[command(flatten)]
+    pub(super) sizes: SizeArgs,
     #[command(flatten)]
     pub(super) view: ViewArgs,
     #[command(flatten)]
@@ -87,10 +100,12 @@ pub(super) struct InfoArgs {
     #[arg(long, value_enum, default_value_t)]
     pub(super) format: InfoFormat,
     /// Explain these elements: each piece of evidence with its time and text. One name for a node or topic, two for an edge.
-    #[arg(long, num_args = 1..=2, value_names = ["NAME", "NAME"])]
+    #[arg(long, num_args = 1..=2, value_names = ["NAME", "NAME"], conflicts_with_all = ["format", "verify"])]
     pub(super) why: Vec<String>,
     #[command(flatten)]
     pub(super) graph: GraphArgs,
+    #[command(flatten)]
+    pub(super) sizes: SizeArgs,
 }
 
 #[derive(Debug, Args)]
@@ -111,6 +126,8 @@ pub(super) struct EventsArgs {
     pub(super) phases: bool,
     #[command(flatten)]
     pub(super) time: TimeArgs,
+    #[command(flatten)]
+    pub(super) change: ChangeArgs,
     #[command(flatten)]
     pub(super) graph: GraphArgs,
 }
@@ -211,14 +228,28 @@ pub(super) struct TimeArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Graph")]
-pub(super) struct GraphArgs {
+#[command(next_help_heading = "Windows")]
+pub(super) struct ChangeArgs {
     /// A rate that changes by more than this share counts as a change.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = RATE_CHANGE, value_parser = share)]
     pub(super) rate_change: f64,
     /// Windows of silence after which something that never speaks again counts as gone.
-    #[arg(long, value_name = "WINDOWS")]
-    pub(super) grace: Option<u32>,
+    #[arg(long, value_name = "WINDOWS", default_value_t = 0)]
+    pub(super) grace: u32,
+}
+
+impl Default for ChangeArgs {
+    fn default() -> Self {
+        Self {
+            rate_change: RATE_CHANGE,
+            grace: 0,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Graph")]
+pub(super) struct GraphArgs {
     /// Draw and compare roles instead of names: anonymous suffixes folded.
     #[arg(long)]
     pub(super) roles: bool,
@@ -237,6 +268,10 @@ pub(super) struct GraphArgs {
     /// bag does not name from the only place in the source code that can be meant.
     #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]
     pub(super) infer: Vec<String>,
+}
+
+#[derive(Debug, Default, Args)]
+pub(super) struct SizeArgs {
     /// Read the size of every message, even where the index does not tell it.
     #[arg(long)]
     pub(super) bytes: bool,
@@ -249,8 +284,9 @@ pub(super) struct ViewArgs {
     /// knows the publisher and no option asks for the graph.
     #[arg(long, value_name = "graph|board", value_parser = ["graph", "board"], conflicts_with = "figure")]
     pub(super) view: Option<String>,
-    /// What to draw: nodes only, nodes and active topics, or all topics.
-    #[arg(long, value_name = "nodes|active|all", value_parser = ["nodes", "active", "all"])]
+    /// What to draw: nodes only, nodes with one arrow for all topics between two of them, nodes and active topics, or
+    /// all topics.
+    #[arg(long, value_name = "nodes|bundles|active|all", value_parser = ["nodes", "bundles", "active", "all"])]
     pub(super) mode: Option<String>,
     /// Names of nodes to draw, as in `rqt_graph`: `/nav/.*,-/nav/debug`.
     #[arg(long, value_name = "FILTER", allow_hyphen_values = true)]
@@ -292,7 +328,7 @@ pub(super) struct LookArgs {
     pub(super) size: Option<(u32, u32)>,
     /// Where the picture will be seen, which sets page, text and furniture so that it can be read there: on a
     /// repository's front page (830 pixels), a slide (1280 × 720), in a paper's column (88 mm) or on its page (181 mm).
-    #[arg(long = "for", value_name = "readme|slide|column|page", value_parser = ["readme", "slide", "column", "page"],
+    #[arg(id = "for", long = "for", value_name = "readme|slide|column|page", value_parser = ["readme", "slide", "column", "page"],
         conflicts_with_all = ["size", "width", "figure", "strip", "layout_from"])]
     pub(super) purpose: Option<String>,
     /// The width of a vector figure on paper: `88mm`, `180mm`.

@@ -15,12 +15,14 @@ use crate::pipeline::{Stage, Watch};
 
 /// Standard error and output, as the user set them up.
 #[derive(Debug)]
-pub struct Terminal {
+pub(crate) struct Terminal {
     quiet: bool,
     colour: bool,
     bar: Option<ProgressBar>,
     stage: Option<(Stage, Instant)>,
     spent: BTreeMap<Stage, Duration>,
+    /// Where the time of a stage went, in words.
+    shares: BTreeMap<Stage, String>,
     begun: Instant,
     stop: Stop,
 }
@@ -28,20 +30,21 @@ pub struct Terminal {
 impl Terminal {
     /// A terminal that says nothing but errors if `quiet`. Colours only where standard error is a terminal and
     /// `no_colour` is false; progress only on a terminal.
-    pub fn new(quiet: bool, no_colour: bool) -> Self {
+    pub(crate) fn new(quiet: bool, no_colour: bool) -> Self {
         Self {
             quiet,
             colour: io::stderr().is_terminal() && !no_colour,
             bar: None,
             stage: None,
             spent: BTreeMap::new(),
+            shares: BTreeMap::new(),
             begun: Instant::now(),
             stop: Stop::listen(last_words),
         }
     }
 
     /// Prints an error and its way out.
-    pub fn error(&mut self, error: &Error) {
+    pub(crate) fn error(&mut self, error: &Error) {
         self.end_stage();
         self.line("31", "error", &error.to_string());
         let hint = error.hint();
@@ -51,7 +54,7 @@ impl Terminal {
     }
 
     /// Prints notices, one line each.
-    pub fn notices(&mut self, notices: &Notices) {
+    pub(crate) fn notices(&mut self, notices: &Notices) {
         if self.quiet {
             return;
         }
@@ -71,7 +74,7 @@ impl Terminal {
     }
 
     /// Prints a line on standard error unless quiet.
-    pub fn say(&mut self, text: &str) {
+    pub(crate) fn say(&mut self, text: &str) {
         if !self.quiet {
             // A closed standard error is nobody to tell.
             let _ = writeln!(io::stderr(), "{}", visible(text));
@@ -82,7 +85,11 @@ impl Terminal {
     ///
     /// # Errors
     /// [`Error::Io`] where not all of it could be written.
-    pub fn results(&mut self, text: &str) -> Result<()> {
+    #[expect(
+        clippy::unused_self,
+        reason = "whoever holds the terminal may print and wait"
+    )]
+    pub(crate) fn results(&mut self, text: &str) -> Result<()> {
         print(printable(text).as_bytes())
     }
 
@@ -90,7 +97,7 @@ impl Terminal {
     ///
     /// # Errors
     /// As [`Terminal::results`].
-    pub fn table(&mut self, table: &[u8]) -> Result<()> {
+    pub(crate) fn table(&mut self, table: &[u8]) -> Result<()> {
         match std::str::from_utf8(table) {
             Ok(text) => self.results(text),
             Err(_) => print(table),
@@ -98,34 +105,41 @@ impl Terminal {
     }
 
     /// The exit code for the signal that asked us to stop; `None` if none did.
-    pub fn stopped_by(&self) -> Option<u8> {
+    pub(crate) fn stopped_by(&self) -> Option<u8> {
         self.stop.code()
     }
 
     /// Prints something worth knowing unless quiet.
-    pub fn note(&mut self, text: &str) {
+    pub(crate) fn note(&mut self, text: &str) {
         if !self.quiet {
             self.line("36", "note", text);
         }
     }
 
     /// Waits a moment before looking at a file again.
-    pub fn wait(&self) {
+    #[expect(
+        clippy::unused_self,
+        reason = "whoever holds the terminal may print and wait"
+    )]
+    pub(crate) fn wait(&self) {
         std::thread::sleep(Duration::from_millis(200));
     }
 
     /// Seconds since the command began.
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// Prints how long each stage took.
-    pub fn timings(&mut self) {
+    /// Prints how long each stage took, and its largest steps.
+    pub(crate) fn timings(&mut self) {
         self.end_stage();
         let lines: Vec<String> = self
             .spent
             .iter()
-            .map(|(stage, time)| format!("{:>9.3} s  {}", time.as_secs_f64(), stage.word()))
+            .map(|(stage, time)| {
+                let shares = self.shares.get(stage).map_or("", String::as_str);
+                format!("{:>9.3} s  {}{shares}", time.as_secs_f64(), stage.word())
+            })
             .collect();
         for line in &lines {
             self.say(line);
@@ -164,6 +178,20 @@ impl Watch for Terminal {
         if let Some(bar) = &self.bar {
             bar.set_length(total.max(done));
             bar.set_position(done);
+        }
+    }
+
+    fn shares(&mut self, shares: &[(&'static str, f64)]) {
+        let Some((stage, _)) = self.stage else {
+            return;
+        };
+        let shares = shares.iter().filter(|(_, share)| *share >= 0.005);
+        let words: Vec<String> = shares
+            .map(|(word, share)| format!("{word} {:.0} %", share * 100.0))
+            .collect();
+        if !words.is_empty() {
+            self.shares
+                .insert(stage, format!(" ({})", words.join(", ")));
         }
     }
 

@@ -34,7 +34,7 @@ const BELOW: f64 = 9.0;
 const PILL: f64 = 3.5;
 
 /// A board ready to be drawn, one scene per window.
-pub struct Board<'a> {
+pub(crate) struct Board<'a> {
     view: &'a View,
     source: &'a Source<'a>,
     style: &'a Style,
@@ -54,7 +54,7 @@ pub struct Board<'a> {
 
 /// The whole board in one drawing, and where the head stands in each window.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Overview {
+pub(crate) struct Overview {
     /// The board with everything that was sent; no head.
     pub scene: Scene,
     /// The head in pixels, per window.
@@ -129,7 +129,7 @@ impl<'a> Board<'a> {
     }
 
     /// The board in the window at place `k` of the view; `phase`, above 0 to 1, is how far its head has come there.
-    pub fn scene(&self, k: usize, phase: f64) -> Scene {
+    pub(crate) fn scene(&self, k: usize, phase: f64) -> Scene {
         let mut scene = self.empty();
         let Some(frame) = self.view.frames.get(k) else {
             return scene;
@@ -158,7 +158,7 @@ impl<'a> Board<'a> {
     }
 
     /// All windows in one drawing.
-    pub fn overview(&self) -> Overview {
+    pub(crate) fn overview(&self) -> Overview {
         let mut scene = self.empty();
         let mut canvas = self.canvas();
         canvas.begin("past");

@@ -33,7 +33,7 @@ use crate::mission::Mission;
 use crate::view::NameFilter;
 
 use canvas::Sizes;
-pub use course::Course;
+pub(crate) use course::Course;
 use source::Source;
 
 /// Which figure.
@@ -119,7 +119,7 @@ pub struct Options {
     pub text_pt: f64,
     /// What rows and boxes stand for; as much as fits if `None`.
     pub rows: Option<Rows>,
-    /// The boundaries that [`Kind::Steps`] shows, by the number of the phase that begins, 2..; the largest if empty.
+    /// The boundaries that `Kind::Steps` shows, by the number of the phase that begins, 2..; the largest if empty.
     pub steps: Vec<usize>,
     /// Whether legend and notes are left to the caption.
     pub is_bare: bool,
@@ -143,7 +143,7 @@ impl Default for Options {
 
 /// A figure that was drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// The drawing; its size is that on paper.
     pub scene: Scene,
     /// A caption for `LaTeX`, escaped: what is drawn, the phases with their times, bag and length, the legend in words.
@@ -159,7 +159,7 @@ pub(crate) const MOST_HEIGHT: f64 = 225.0;
 ///
 /// # Errors
 /// [`Error::Usage`] where nothing is left, or it does not fit whatever is put together: with a filter that would do.
-pub fn figure(
+pub(crate) fn figure(
     mission: &Mission,
     filters: (&NameFilter, &NameFilter),
     fonts: &Fonts,
@@ -182,6 +182,6 @@ pub fn figure(
 }
 
 /// A `LaTeX` file that shows the figure of this file name.
-pub fn latex(figure: &Figure, picture: &str, options: &Options) -> String {
+pub(crate) fn latex(figure: &Figure, picture: &str, options: &Options) -> String {
     tex::file(figure, picture, options)
 }

@@ -54,7 +54,7 @@ pub struct PageOptions {
     /// Whether the signs are explained.
     pub has_legend: bool,
     /// Who lived when, for the strip at the bottom; without it the strip shows messages per second.
-    pub course: Option<Course>,
+    pub(crate) course: Option<Course>,
     /// From which relative change of a rate on it is told, for the legend.
     pub rate_change: f64,
 }
@@ -404,6 +404,7 @@ fn arrow_id(arrow: &Arrow, ends: &[String; 2]) -> String {
         ArrowKind::Publish => format!("p{from}..{to}"),
         ArrowKind::Subscribe => format!("s{from}..{to}"),
         ArrowKind::Direct(topic) => format!("d{from}..{to}..{}", encoded(topic)),
+        ArrowKind::Bundle => format!("b{from}..{to}"),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! What a node does stands in its code almost always in plain sight; what the code does not say is which nodes ran. So a
 //! node that the bag names gets the publishers and subscribers that its code declares, where topic and type are recorded
-//! under exactly these names. Tried on 182 public repositories and 242 bags; [`matching`] says how right that is.
+//! under exactly these names. Tried on 182 public repositories and 242 bags; `matching` says how right that is.
 
 mod cpp;
 mod declaration;

@@ -1,6 +1,6 @@
 //! Payloads as values: a cursor over ROS 1 and CDR bytes, and the message definitions that say what they hold.
 
-pub mod cursor;
+pub(crate) mod cursor;
 pub(crate) mod definition;
 pub(crate) mod dynamic;
 pub(crate) mod fields;

@@ -12,7 +12,7 @@ use tempfile::SpooledTempFile;
 
 use crate::base::time::Stamp;
 
-pub use merge::Timed;
+pub(crate) use merge::Timed;
 
 /// Stamps per block: enough to make a block's head (32 bytes) not matter, few enough to sort in the cache.
 const BLOCK: usize = 1024;
@@ -24,7 +24,7 @@ const DAY: i64 = 86_400_000_000_000;
 
 /// One sequence of times: 0...
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SeriesId(pub u32);
+pub(crate) struct SeriesId(pub u32);
 
 /// An encoded run of stamps and where it lies.
 #[derive(Clone, Debug)]
@@ -48,7 +48,7 @@ struct Series {
 
 /// Any number of sequences of times, each message with its size where that is known.
 #[derive(Debug)]
-pub struct Stamps {
+pub(crate) struct Stamps {
     series: Vec<Series>,
     spool: SpooledTempFile,
     written: u64,
@@ -73,13 +73,13 @@ impl Default for Stamps {
 
 impl Stamps {
     /// A new, empty sequence.
-    pub fn series(&mut self) -> SeriesId {
+    pub(crate) fn series(&mut self) -> SeriesId {
         self.series.push(Series::default());
         SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
     }
 
     /// Adds times; `sizes`, if given, is as long as `stamps`. A sequence that was never made takes nothing.
-    pub fn add(&mut self, id: SeriesId, stamps: &[Stamp], sizes: Option<&[u32]>) {
+    pub(crate) fn add(&mut self, id: SeriesId, stamps: &[Stamp], sizes: Option<&[u32]>) {
         let Some(series) = self.series.get_mut(id.0 as usize) else {
             return;
         };
@@ -115,7 +115,7 @@ impl Stamps {
     ///
     /// # Errors
     /// If times could not be written to the unnamed file.
-    pub fn finish(&mut self) -> io::Result<()> {
+    pub(crate) fn finish(&mut self) -> io::Result<()> {
         self.close_all();
         for series in &mut self.series {
             series.blocks.sort_by_key(|b| (b.first, b.last, b.at));
@@ -124,22 +124,22 @@ impl Stamps {
     }
 
     /// How many times a sequence holds.
-    pub fn count(&self, id: SeriesId) -> u64 {
+    pub(crate) fn count(&self, id: SeriesId) -> u64 {
         self.get(id).map_or(0, |s| s.count)
     }
 
     /// The first and last time of a sequence, as far as they are in blocks.
-    pub fn bounds(&self, id: SeriesId) -> Option<(Stamp, Stamp)> {
+    pub(crate) fn bounds(&self, id: SeriesId) -> Option<(Stamp, Stamp)> {
         self.get(id).and_then(|s| s.bounds)
     }
 
     /// Whether every message of a sequence came with its size.
-    pub fn sized(&self, id: SeriesId) -> bool {
+    pub(crate) fn sized(&self, id: SeriesId) -> bool {
         self.get(id).is_some_and(|s| !s.size_unknown)
     }
 
     /// Messages per day since 1970, as far as they are in blocks.
-    pub fn days(&self) -> &BTreeMap<i64, u64> {
+    pub(crate) fn days(&self) -> &BTreeMap<i64, u64> {
         &self.days
     }
 
@@ -147,7 +147,7 @@ impl Stamps {
     ///
     /// # Errors
     /// If the unnamed file cannot be read.
-    pub fn times(&mut self, id: SeriesId) -> io::Result<Vec<Stamp>> {
+    pub(crate) fn times(&mut self, id: SeriesId) -> io::Result<Vec<Stamp>> {
         let mut times = Vec::new();
         self.merge(&[id], |timed| times.push(timed.time))?;
         Ok(times)

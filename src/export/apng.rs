@@ -3,10 +3,10 @@
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Frame, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::export::palette::{self, Area, Palette};
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::Sink;
 use crate::export::target::Target;
 
@@ -56,13 +56,6 @@ impl Apng {
     fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
         Error::io("write", self.target.path())
     }
-
-    fn begin(&self, frame: &Frame<'_>) -> Result<Animation<Shared>> {
-        let size = (frame.pixels.width, frame.pixels.height);
-        let frames = u32::try_from(self.frames).unwrap_or(u32::MAX);
-        let animation = Animation::new(self.out.clone(), size, frame.palette, frames);
-        animation.map_err(self.error())
-    }
 }
 
 impl Encoder for Apng {
@@ -74,16 +67,23 @@ impl Encoder for Apng {
         true
     }
 
-    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
-        let mut animation = match self.animation.take() {
-            Some(animation) => animation,
-            None => self.begin(frame)?,
-        };
-        animation
-            .add(frame.indices, frame.frame_time.ms)
-            .map_err(self.error())?;
-        self.animation = Some(animation);
+    fn pack(&self) -> Pack {
+        pack
+    }
+
+    fn begin(&mut self, size: (u32, u32), palette: &Palette) -> Result<()> {
+        let frames = u32::try_from(self.frames).unwrap_or(u32::MAX);
+        let animation = Animation::new(self.out.clone(), size, palette, frames);
+        self.animation = Some(animation.map_err(self.error())?);
         Ok(())
+    }
+
+    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
+        let failed = self.error();
+        match &mut self.animation {
+            Some(animation) => animation.add(packet, frame_time.ms).map_err(failed),
+            None => Ok(()),
+        }
     }
 
     fn finish(mut self: Box<Self>) -> Result<Written> {
@@ -100,19 +100,34 @@ impl Encoder for Apng {
     }
 }
 
+/// What differs from the frame before; one pixel where nothing does, as every frame needs some.
+#[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
+fn pack(frame: &Frame<'_>) -> Result<Packet> {
+    if frame.before.is_empty() {
+        return Ok(Packet::Bytes(frame.indices.to_vec()));
+    }
+    let pixel = Area {
+        x: 0,
+        y: 0,
+        width: 1,
+        height: 1,
+    };
+    let width = frame.pixels.width as usize;
+    let area = palette::difference(frame.before, frame.indices, width).unwrap_or(pixel);
+    let clear = u8::try_from(frame.palette.colours().len()).unwrap_or(u8::MAX);
+    let pixels = palette::patch(frame.before, frame.indices, width, area, clear);
+    Ok(Packet::Patch(area, pixels))
+}
+
 /// An APNG being written. It states the number of frames in front, so equal frames are not joined.
 struct Animation<W: Write> {
     writer: png::Writer<W>,
-    clear: u8,
-    width: usize,
-    before: Vec<u8>,
 }
 
 impl<W: Write> Animation<W> {
     /// Begins an endless loop of `frames` frames; the palette has at most 255 colours.
     fn new(out: W, size: (u32, u32), palette: &Palette, frames: u32) -> io::Result<Self> {
         let mut colours = palette.bytes();
-        let clear = u8::try_from(palette.colours().len()).map_err(io::Error::other)?;
         colours.extend([0; 3]);
         let mut opacity = vec![255; palette.colours().len()];
         opacity.push(0);
@@ -129,30 +144,21 @@ impl<W: Write> Animation<W> {
         encoder.set_blend_op(png::BlendOp::Over).map_err(to_io)?;
         Ok(Self {
             writer: encoder.write_header().map_err(to_io)?,
-            clear,
-            width: usize::try_from(size.0).map_err(io::Error::other)?,
-            before: Vec::new(),
         })
     }
 
     /// Shows a frame for `ms` milliseconds.
-    fn add(&mut self, indices: &[u8], ms: u32) -> io::Result<()> {
+    fn add(&mut self, packet: Packet, ms: u32) -> io::Result<()> {
         let (delay, parts) = delay(ms);
         self.writer.set_frame_delay(delay, parts).map_err(to_io)?;
-        if self.before.is_empty() {
-            self.before = indices.to_vec();
-            return self.writer.write_image_data(indices).map_err(to_io);
-        }
-        let pixel = Area {
-            x: 0,
-            y: 0,
-            width: 1,
-            height: 1,
+        let pixels = match packet {
+            Packet::Patch(area, pixels) => {
+                self.place(area).map_err(to_io)?;
+                pixels
+            }
+            Packet::Bytes(pixels) => pixels,
+            _ => return Ok(()),
         };
-        let area = palette::difference(&self.before, indices, self.width).unwrap_or(pixel);
-        let pixels = palette::patch(&self.before, indices, self.width, area, self.clear);
-        self.before.copy_from_slice(indices);
-        self.place(area).map_err(to_io)?;
         self.writer.write_image_data(&pixels).map_err(to_io)
     }
 
@@ -191,6 +197,7 @@ fn to_io(error: png::EncodingError) -> io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::export::encoder::testing::packed;
 
     const SIZE: (u32, u32) = (40, 30);
 
@@ -206,8 +213,11 @@ mod tests {
         let mut bytes = Vec::new();
         let count = u32::try_from(frames.len()).unwrap();
         let mut animation = Animation::new(&mut bytes, SIZE, &palette, count).unwrap();
+        let mut before: &[u8] = &[];
         for (frame, ms) in frames {
-            animation.add(frame, *ms).unwrap();
+            let packet = packed(&palette, before, frame, (40, 30), pack);
+            animation.add(packet, *ms).unwrap();
+            before = frame;
         }
         animation.finish().unwrap();
         bytes

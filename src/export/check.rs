@@ -17,7 +17,7 @@ use crate::base::error::{Error, Result};
 /// # Errors
 /// [`Error::Usage`] where targets meet each other or what is kept, [`Error::Output`] or [`Error::Io`] where a folder
 /// cannot be written.
-pub fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
+pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     for (at, target) in targets.iter().enumerate() {
         let name = target.path().display();
         if let Some(other) = targets[..at].iter().find(|t| t.may_meet(target)) {
@@ -129,7 +129,7 @@ fn check_place(target: &Target) -> Result<()> {
 ///
 /// # Errors
 /// Where the system refuses.
-pub fn make_folder(target: &Target) -> Result<()> {
+pub(crate) fn make_folder(target: &Target) -> Result<()> {
     match target {
         Target::Stdout => Ok(()),
         Target::Path(path) => {

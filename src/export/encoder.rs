@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use super::palette::Palette;
+use super::palette::{Area, Palette};
 use super::sequence::{FrameTime, Sequence};
 use super::sink::Sink;
 use super::target::Target;
@@ -24,13 +24,11 @@ pub enum Needs {
     Indices,
 }
 
-/// One frame as all encoders of its size share it.
+/// One frame as all encoders of its size share it, on the core that drew it.
 #[derive(Clone, Copy)]
 pub struct Frame<'a> {
-    /// The index of its window.
-    pub index: usize,
     /// What it shows and for how long.
-    pub frame_time: FrameTime,
+    pub time: FrameTime,
     /// The drawing.
     pub scene: &'a Scene,
     /// The drawing as pixels; empty unless somebody needs them.
@@ -39,7 +37,25 @@ pub struct Frame<'a> {
     pub palette: &'a Palette,
     /// The place in the palette of every pixel; empty unless somebody needs them.
     pub indices: &'a [u8],
+    /// The same of the frame before; empty for the first.
+    pub before: &'a [u8],
 }
+
+/// What an encoder makes of a frame: far smaller than its pixels, so that many may wait to be written.
+#[derive(Debug)]
+pub enum Packet {
+    /// Nothing, or nothing new.
+    Nothing,
+    /// Bytes as they are written, or a file of its own.
+    Bytes(Vec<u8>),
+    /// What replaces an area of the frame before.
+    Patch(Area, Vec<u8>),
+    /// The drawing itself.
+    Drawing(Box<Scene>),
+}
+
+/// Makes a packet of a frame. It runs on any core, for several frames at a time and in any order.
+pub(crate) type Pack = fn(&Frame<'_>) -> Result<Packet>;
 
 /// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -115,18 +131,36 @@ pub trait Encoder: Send {
         false
     }
 
-    /// Takes the next frame. All frames have one size.
+    /// What makes its packets, which [`Encoder::take`] is given in order.
+    fn pack(&self) -> Pack {
+        |_| Ok(Packet::Nothing)
+    }
+
+    /// How many bytes a packet may have, per pixel of a frame.
+    fn packet_density(&self) -> f64 {
+        1.0
+    }
+
+    /// Begins, before the first packet, with the size of all frames and their palette.
+    ///
+    /// # Errors
+    /// [`Error::Io`] with the output's path where it cannot be written; [`Error::Output`] where the format cannot say it.
+    fn begin(&mut self, _size: (u32, u32), _palette: &Palette) -> Result<()> {
+        Ok(())
+    }
+
+    /// Takes the packet of the next frame. `index` is the number of its window in the mission.
     ///
     /// # Errors
     /// [`Error::Io`] with the output's path where it cannot be written.
-    fn frame(&mut self, _frame: &Frame<'_>) -> Result<()> {
+    fn take(&mut self, _index: usize, _frame_time: FrameTime, _packet: Packet) -> Result<()> {
         Ok(())
     }
 
     /// Ends the output and gives it its final name.
     ///
     /// # Errors
-    /// As [`Encoder::frame`].
+    /// As [`Encoder::take`].
     fn finish(self: Box<Self>) -> Result<Written>;
 }
 
@@ -167,7 +201,7 @@ impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
 }
 
 /// Begins an output. Under `max_bytes`, an animation of more bytes fails as [`std::io::ErrorKind::FileTooLarge`].
-pub type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
+pub(crate) type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn Encoder + 'a>>;
 
 /// Whether a format holds one drawing of the whole mission: a film strip or a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -231,4 +265,47 @@ pub(crate) const DATA: Format = Format {
 /// The start that each row replaces by its own.
 fn nothing<'a>(_: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
     AtOnce::start(target, || (String::new(), Vec::new()))
+}
+
+#[cfg(test)]
+pub(crate) mod testing {
+    use super::*;
+    use crate::base::geometry::Size;
+    use crate::draw::style::Color;
+
+    /// The packet of a frame of these places in the palette.
+    pub(crate) fn packed(
+        palette: &Palette,
+        before: &[u8],
+        indices: &[u8],
+        (width, height): (u16, u16),
+        pack: Pack,
+    ) -> Packet {
+        let pixels = Pixels {
+            width: width.into(),
+            height: height.into(),
+            rgba: Vec::new(),
+        };
+        let scene = Scene {
+            size: Size::new(width.into(), height.into()),
+            width_mm: None,
+            background: Color::NONE,
+            title: String::new(),
+            groups: Vec::new(),
+        };
+        let frame_time = FrameTime {
+            window: 0,
+            phase: 1.0,
+            ms: 100,
+        };
+        pack(&Frame {
+            time: frame_time,
+            scene: &scene,
+            pixels: &pixels,
+            palette,
+            indices,
+            before,
+        })
+        .unwrap()
+    }
 }

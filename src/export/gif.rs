@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Frame, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::export::palette::{self, Area, Palette};
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::Sink;
 use crate::export::target::Target;
 
@@ -41,23 +41,6 @@ impl Gif {
     fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
         Error::io("write", self.target.path())
     }
-
-    fn begin(&mut self, frame: &Frame<'_>) -> Result<()> {
-        let Some(sink) = self.sink.take() else {
-            return Ok(());
-        };
-        let (width, height) = (frame.pixels.width, frame.pixels.height);
-        let (Ok(w), Ok(h)) = (u16::try_from(width), u16::try_from(height)) else {
-            return Err(Error::Output {
-                path: self.target.path().to_owned(),
-                reason: format!("{width} by {height} pixels are more than GIF can say"),
-                hint: "give a `--size` below 65,536 pixels, or write `.apng`".to_owned(),
-            });
-        };
-        let animation = Animation::new(sink, (w, h), frame.palette, frame.indices);
-        self.animation = Some(animation.map_err(self.error())?);
-        Ok(())
-    }
 }
 
 impl Encoder for Gif {
@@ -69,13 +52,30 @@ impl Encoder for Gif {
         true
     }
 
-    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
-        self.begin(frame)?;
+    fn pack(&self) -> Pack {
+        pack
+    }
+
+    fn begin(&mut self, (width, height): (u32, u32), palette: &Palette) -> Result<()> {
+        let Some(sink) = self.sink.take() else {
+            return Ok(());
+        };
+        let (Ok(w), Ok(h)) = (u16::try_from(width), u16::try_from(height)) else {
+            return Err(Error::Output {
+                path: self.target.path().to_owned(),
+                reason: format!("{width} by {height} pixels are more than GIF can say"),
+                hint: "give a `--size` below 65,536 pixels, or write `.apng`".to_owned(),
+            });
+        };
+        let animation = Animation::new(sink, (w, h), palette);
+        self.animation = Some(animation.map_err(self.error())?);
+        Ok(())
+    }
+
+    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
         let failed = self.error();
         match &mut self.animation {
-            Some(animation) => animation
-                .add(frame.indices, frame.frame_time.ms)
-                .map_err(failed),
+            Some(animation) => animation.add(packet, frame_time.ms).map_err(failed),
             None => Ok(()),
         }
     }
@@ -90,53 +90,78 @@ impl Encoder for Gif {
     }
 }
 
+/// The frame as GIF compresses it: all of it, or the area that differs from the frame before.
+#[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
+fn pack(frame: &Frame<'_>) -> Result<Packet> {
+    let width = frame.pixels.width as usize;
+    let clear = clear(frame.palette);
+    let (area, pixels) = if frame.before.is_empty() {
+        let area = Area {
+            x: 0,
+            y: 0,
+            width,
+            height: frame.pixels.height as usize,
+        };
+        (area, frame.indices.to_vec())
+    } else {
+        match palette::difference(frame.before, frame.indices, width) {
+            Some(area) => (
+                area,
+                palette::patch(frame.before, frame.indices, width, area, clear),
+            ),
+            None => return Ok(Packet::Nothing),
+        }
+    };
+    Ok(Packet::Patch(area, compressed(pixels)))
+}
+
+/// The place after the last colour: pixels that stay as they are.
+fn clear(palette: &Palette) -> u8 {
+    u8::try_from(palette.colours().len()).unwrap_or(u8::MAX)
+}
+
+fn compressed(pixels: Vec<u8>) -> Vec<u8> {
+    let mut frame = gif::Frame {
+        buffer: pixels.into(),
+        ..gif::Frame::default()
+    };
+    frame.make_lzw_pre_encoded();
+    frame.buffer.into_owned()
+}
+
 /// A GIF being written. A frame is held back until the next one differs, since only then its time is known.
 struct Animation<W: Write> {
     encoder: gif::Encoder<W>,
-    /// The place after the last colour: pixels that stay as they are.
     clear: u8,
-    width: usize,
-    before: Vec<u8>,
-    waiting: gif::Frame<'static>,
+    waiting: Option<gif::Frame<'static>>,
     /// When the waiting frame began and when the next begins, in milliseconds.
     began: u64,
     now: u64,
 }
 
 impl<W: Write> Animation<W> {
-    /// Begins an endless loop. `first` holds a palette place for each pixel; the palette has at most 255 colours.
-    fn new(out: W, size: (u16, u16), palette: &Palette, first: &[u8]) -> io::Result<Self> {
+    /// Begins an endless loop; the palette has at most 255 colours.
+    fn new(out: W, size: (u16, u16), palette: &Palette) -> io::Result<Self> {
         let mut colours = palette.bytes();
-        let clear = u8::try_from(palette.colours().len()).map_err(io::Error::other)?;
         colours.extend([0; 3]);
         let mut encoder = gif::Encoder::new(out, size.0, size.1, &colours).map_err(to_io)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(to_io)?;
-        let waiting = gif::Frame {
-            width: size.0,
-            height: size.1,
-            buffer: first.to_vec().into(),
-            dispose: gif::DisposalMethod::Keep,
-            ..gif::Frame::default()
-        };
         Ok(Self {
             encoder,
-            clear,
-            width: usize::from(size.0),
-            before: first.to_vec(),
-            waiting,
+            clear: clear(palette),
+            waiting: None,
             began: 0,
             now: 0,
         })
     }
 
-    /// Shows a frame for `ms` milliseconds; one that equals the frame before prolongs it.
-    fn add(&mut self, indices: &[u8], ms: u32) -> io::Result<()> {
-        if let Some(area) = palette::difference(&self.before, indices, self.width) {
-            let pixels = palette::patch(&self.before, indices, self.width, area, self.clear);
-            let next = patch(area, pixels, self.clear)?;
+    /// Shows a frame for `ms` milliseconds; one that brings nothing new prolongs the frame before.
+    fn add(&mut self, packet: Packet, ms: u32) -> io::Result<()> {
+        if let Packet::Patch(area, bytes) = packet {
+            let is_first = self.waiting.is_none();
+            let next = patch(area, bytes, (!is_first).then_some(self.clear))?;
             self.write_waiting()?;
-            self.waiting = next;
-            self.before.copy_from_slice(indices);
+            self.waiting = Some(next);
         }
         self.now += u64::from(ms);
         Ok(())
@@ -144,14 +169,19 @@ impl<W: Write> Animation<W> {
 
     /// Writes the waiting frame, as often as its time needs.
     fn write_waiting(&mut self) -> io::Result<()> {
+        let Some(mut frame) = self.waiting.take() else {
+            return Ok(());
+        };
         // Whole hundredths, rounded from the start, so that errors do not add up.
         let hundredths = |ms: u64| (ms + 5) / 10;
         let mut left = (hundredths(self.now) - hundredths(self.began)).max(SHORTEST);
         self.began = self.now;
         while left > 0 {
             let part = left.min(LONGEST);
-            self.waiting.delay = u16::try_from(part).unwrap_or(u16::MAX);
-            self.encoder.write_frame(&self.waiting).map_err(to_io)?;
+            frame.delay = u16::try_from(part).unwrap_or(u16::MAX);
+            self.encoder
+                .write_lzw_pre_encoded_frame(&frame)
+                .map_err(to_io)?;
             left -= part;
             if left > 0 {
                 let pixel = Area {
@@ -160,7 +190,7 @@ impl<W: Write> Animation<W> {
                     width: 1,
                     height: 1,
                 };
-                self.waiting = patch(pixel, vec![self.clear], self.clear)?;
+                frame = patch(pixel, compressed(vec![self.clear]), Some(self.clear))?;
             }
         }
         Ok(())
@@ -173,16 +203,16 @@ impl<W: Write> Animation<W> {
     }
 }
 
-/// A frame of some pixels, `clear` ones among them, on top of the one before.
-fn patch(area: Area, pixels: Vec<u8>, clear: u8) -> io::Result<gif::Frame<'static>> {
+/// A frame of compressed pixels, `clear` ones among them, on top of the one before.
+fn patch(area: Area, bytes: Vec<u8>, clear: Option<u8>) -> io::Result<gif::Frame<'static>> {
     let number = |n: usize| u16::try_from(n).map_err(io::Error::other);
     Ok(gif::Frame {
         left: number(area.x)?,
         top: number(area.y)?,
         width: number(area.width)?,
         height: number(area.height)?,
-        buffer: pixels.into(),
-        transparent: Some(clear),
+        buffer: bytes.into(),
+        transparent: clear,
         dispose: gif::DisposalMethod::Keep,
         ..gif::Frame::default()
     })
@@ -198,6 +228,7 @@ fn to_io(error: gif::EncodingError) -> io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::export::encoder::testing::packed;
 
     const SIZE: (u16, u16) = (40, 30);
 
@@ -214,9 +245,13 @@ mod tests {
 
     /// What a decoder makes of these frames: delays in hundredths and the colour of each pixel.
     fn played(frames: &[(Vec<u8>, u32)]) -> Vec<(u16, Vec<u8>)> {
-        let mut animation = Animation::new(Vec::new(), SIZE, &colours(), &frames[0].0).unwrap();
+        let palette = colours();
+        let mut animation = Animation::new(Vec::new(), SIZE, &palette).unwrap();
+        let mut before: &[u8] = &[];
         for (frame, ms) in frames {
-            animation.add(frame, *ms).unwrap();
+            let packet = packed(&palette, before, frame, SIZE, pack);
+            animation.add(packet, *ms).unwrap();
+            before = frame;
         }
         let bytes = animation.finish().unwrap();
         let mut decoder = gif::DecodeOptions::new().read_info(&bytes[..]).unwrap();

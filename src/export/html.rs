@@ -13,7 +13,7 @@ use crate::base::words::visible;
 use crate::draw::board::Overview;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
 use crate::draw::paint::svg;
-use crate::draw::paint::xml::escape;
+use crate::draw::paint::xml::Xml;
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
 use crate::draw::text;
@@ -27,7 +27,7 @@ const LOOK: &str = include_str!("../../styles/player.css");
 
 /// What a page is made of.
 #[derive(Clone, Copy, Debug)]
-pub struct Page<'a> {
+pub(crate) struct Page<'a> {
     /// The whole sequence.
     pub mission: &'a Mission,
     /// What is shown of it.
@@ -46,7 +46,7 @@ pub struct Page<'a> {
 
 impl Page<'_> {
     /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
-    pub fn write(&self) -> String {
+    pub(crate) fn write(&self) -> String {
         let runs = Runs::of(self.view, rate_label);
         let still = self.view.busiest();
         let fonts = fonts();
@@ -64,8 +64,12 @@ impl Page<'_> {
         } else {
             "normal"
         };
-        let mut title = String::new();
-        escape(&mut title, &visible(self.title));
+        let mut title = Xml::default();
+        title.text(&visible(self.title));
+        let title = title.finish();
+        let mut bars = Xml::default();
+        classes::bars(&mut bars, &runs);
+        let bars = bars.finish();
         fill(PAGE, |key| match key {
             "policy" => policy.clone(),
             "schemes" => schemes.to_owned(),
@@ -80,7 +84,7 @@ impl Page<'_> {
             "summary" => table::summary(self.view),
             "count" => self.view.frames.len().to_string(),
             "last" => self.view.frames.len().saturating_sub(1).to_string(),
-            "bars" => classes::bars(&runs),
+            "bars" => bars.clone(),
             "rows" => table::rows(self.view),
             "data_type" => data_type.to_owned(),
             "data" => data.clone(),
@@ -111,29 +115,30 @@ impl Page<'_> {
             is_fine: true,
             has_names: true,
         };
-        let stage = Classes::new(self.view, self.union, self.style, detail);
+        let graph = Classes::new(self.view, self.union, self.style, detail);
         let window = u32::try_from(still).unwrap_or(0);
         // A margin, and room around a small graph: three boxes as large as the screen are no pleasure.
         let size = self.union.size;
         let (w, h) = ((size.w + 24.0).max(860.0), (size.h + 24.0).max(480.0));
-        let mut out = format!(
-            "<svg id=\"graph\" viewBox=\"{:.0} {:.0} {w:.0} {h:.0}\" role=\"img\" aria-label=\"Graph; every element is in the search\">{}",
-            (size.w - w) / 2.0,
-            (size.h - h) / 2.0,
-            stage.signs()
-        );
-        stage.spaces(&mut out);
-        out.push_str("<g id=\"arrows\">");
+        let (x, y) = ((size.w - w) / 2.0, (size.h - h) / 2.0);
+        let mut xml = Xml::with_capacity(1 << 16);
+        xml.open("svg")
+            .attribute("id", "graph")
+            .attribute("viewBox", format_args!("{x:.0} {y:.0} {w:.0} {h:.0}"))
+            .attribute("role", "img")
+            .attribute("aria-label", "Graph; every element is in the search");
+        graph.signs(&mut xml);
+        graph.spaces(&mut xml);
+        xml.open("g").attribute("id", "arrows");
         for &arrow in &self.union.order {
             let life = &runs.arrows[arrow];
-            stage.arrow(&mut out, arrow, &Still { runs, life, window });
+            graph.arrow(&mut xml, arrow, &Still { runs, life, window });
         }
-        out.push_str("</g><g id=\"items\">");
+        xml.close().open("g").attribute("id", "items");
         for (item, life) in runs.items.iter().enumerate() {
-            stage.item(&mut out, item, &Still { runs, life, window });
+            graph.item(&mut xml, item, &Still { runs, life, window });
         }
-        out.push_str("</g></svg>");
-        out
+        xml.finish()
     }
 
     fn place(&self, still: usize) -> String {

@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 
 use crate::base::words;
 use crate::draw::style::Style;
-use crate::view::{ArrowKind, Frame, ItemKind, Mark, Shown, View};
+use crate::view::{Frame, ItemKind, Mark, Shown, View};
 
 /// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
-pub fn chart(view: &View, style: &Style, frame: &Frame) -> String {
+pub(crate) fn chart(view: &View, style: &Style, frame: &Frame) -> String {
     let mut out = String::from("flowchart LR\n");
     members(view, frame, &mut out, None, 1);
     let mut marked = String::new();
@@ -21,10 +21,8 @@ pub fn chart(view: &View, style: &Style, frame: &Frame) -> String {
             (_, Some(Mark::Removed)) => "-.->",
             _ => "-->",
         };
-        let topic = match &arrow.kind {
-            ArrowKind::Direct(topic) => escaped(topic),
-            _ => String::new(),
-        };
+        let topic = arrow.carries(shown);
+        let topic = topic.map_or_else(String::new, |topic| escaped(&topic));
         let label = match (topic, shown.hz.filter(|hz| *hz > 0.0)) {
             (topic, None) => topic,
             (topic, Some(hz)) => format!("{topic} {}", words::rate(hz))
@@ -121,7 +119,7 @@ fn mark(shown: &Shown) -> Option<&'static str> {
 }
 
 /// A name inside quotes: Mermaid's own entities for all that could end the text or begin markup.
-fn escaped(name: &str) -> String {
+pub(crate) fn escaped(name: &str) -> String {
     let mut out = String::new();
     for c in name.chars() {
         if c.is_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | ' ' | ':') {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// A colour: red, green, blue.
-pub type Rgb = [u8; 3];
+pub(crate) type Rgb = [u8; 3];
 
 /// How many of the most frequent colours are always in: more than a style has.
 const THEME: usize = 40;
@@ -13,44 +13,32 @@ const CANDIDATES: usize = 6000;
 /// Bits per channel of the cells that nearest colours are looked up in.
 const BITS: u32 = 4;
 
-/// A frame of opaque pixels as runs of equal ones: a drawing takes a fraction of its bytes.
-#[derive(Clone, Debug)]
-pub struct Packed(Vec<(Rgb, u32)>);
-
-impl Packed {
-    /// Packs RGBA bytes; transparency is not looked at.
-    pub fn new(rgba: &[u8]) -> Self {
-        Self(runs(rgba).collect())
-    }
-
-    /// The RGBA bytes again, opaque.
-    pub fn rgba(&self) -> Vec<u8> {
-        let length = |run: &(Rgb, u32)| run.1 as usize * 4;
-        let mut rgba = Vec::with_capacity(self.0.iter().map(length).sum());
-        for &([r, g, b], length) in &self.0 {
-            for _ in 0..length {
-                rgba.extend_from_slice(&[r, g, b, 255]);
-            }
-        }
-        rgba
-    }
-}
-
 /// Counts the colours of the frames that a palette is made from. Frames may come in any order.
 #[derive(Clone, Debug, Default)]
-pub struct Census(HashMap<Rgb, u64>);
+pub(crate) struct Census(HashMap<Rgb, u64>);
 
 impl Census {
-    /// Counts the pixels of one frame.
-    pub fn count(&mut self, frame: &Packed) {
-        for &(colour, length) in &frame.0 {
+    /// Counts the pixels of one frame as RGBA bytes; transparency is not looked at.
+    pub(crate) fn count(&mut self, rgba: &[u8]) {
+        for (colour, length) in runs(rgba) {
             *self.0.entry(colour).or_default() += u64::from(length);
         }
     }
 
+    /// Both counts together.
+    #[must_use]
+    pub(crate) fn and(mut self, other: Self) -> Self {
+        // Sums do not depend on the order of what is added.
+        #[expect(clippy::iter_over_hash_type, reason = "the order does not matter")]
+        for (colour, count) in other.0 {
+            *self.0.entry(colour).or_default() += count;
+        }
+        self
+    }
+
     /// At most `most` (2..=256) colours: exactly those counted if they are so few, otherwise the most frequent ones
     /// and then, again and again, the frequent one that is farthest from all chosen.
-    pub fn palette(self, most: usize) -> Palette {
+    pub(crate) fn palette(self, most: usize) -> Palette {
         let mut counted: Vec<(Rgb, u64)> = self.0.into_iter().collect();
         counted.sort_unstable_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
         let certain = if counted.len() <= most {
@@ -140,24 +128,54 @@ impl Palette {
         self.colours.concat()
     }
 
-    /// The place of the nearest colour for every pixel of RGBA bytes; the first of equals.
-    pub fn map(&self, rgba: &[u8]) -> Vec<u8> {
-        let mut indices = Vec::with_capacity(rgba.len() / 4);
-        let mut known: HashMap<Rgb, u8> = HashMap::new();
-        for (colour, length) in runs(rgba) {
-            let index = *known.entry(colour).or_insert_with(|| self.nearest(colour));
-            let end = indices.len() + length as usize;
-            indices.resize(end, index);
-        }
-        indices
-    }
-
     fn nearest(&self, colour: Rgb) -> u8 {
         let [r, g, b] = colour.map(|c| usize::from(c >> (8 - BITS)));
         let cell = (r << (2 * BITS)) | (g << BITS) | b;
         let near = self.cells[cell].get_or_init(|| candidates(&self.colours, cell));
         let by_distance = |i: &&u8| distance(self.colours[usize::from(**i)], colour);
         near.iter().min_by_key(by_distance).copied().unwrap_or(0)
+    }
+}
+
+/// How many colours a [`Matcher`] remembers: four times those of a frame.
+const MET: u32 = 4096;
+
+/// Finds the places of colours, and remembers those that it met.
+#[derive(Clone, Debug)]
+pub(crate) struct Matcher<'a> {
+    palette: &'a Palette,
+    met: Vec<Option<(Rgb, u8)>>,
+}
+
+impl<'a> Matcher<'a> {
+    /// One that has met none.
+    pub(crate) fn new(palette: &'a Palette) -> Self {
+        let met = vec![None; MET as usize];
+        Self { palette, met }
+    }
+
+    /// Writes the place of the nearest colour of every pixel of RGBA bytes, the first of equals, into `places`.
+    pub(crate) fn map(&mut self, rgba: &[u8], places: &mut [u8]) {
+        let mut left = places;
+        for (colour, length) in runs(rgba) {
+            let (run, rest) = left.split_at_mut((length as usize).min(left.len()));
+            run.fill(self.place(colour));
+            left = rest;
+        }
+    }
+
+    fn place(&mut self, colour: Rgb) -> u8 {
+        let [r, g, b] = colour.map(u32::from);
+        // Mixed by a large odd number, so that colours that look alike do not meet in one slot.
+        let slot = ((r << 16 | g << 8 | b).wrapping_mul(0x9e37_79b1) >> 16) % MET;
+        match self.met[slot as usize] {
+            Some((met, place)) if met == colour => place,
+            _ => {
+                let place = self.palette.nearest(colour);
+                self.met[slot as usize] = Some((colour, place));
+                place
+            }
+        }
     }
 }
 
@@ -204,19 +222,20 @@ pub struct Area {
 }
 
 /// The smallest area that holds every difference between two frames of `width` columns; `None` if they are equal.
-pub fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
+pub(crate) fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
     let rows = || before.chunks_exact(width).zip(after.chunks_exact(width));
     let top = rows().position(|(a, b)| a != b)?;
     let bottom = rows().rposition(|(a, b)| a != b)?;
     let (mut left, mut right) = (width, 0);
-    for (a, b) in rows().take(bottom + 1).skip(top) {
+    // Whole rows are compared at once: most are equal.
+    let differing = rows().take(bottom + 1).skip(top).filter(|(a, b)| a != b);
+    for (a, b) in differing {
         let mut differs = a.iter().zip(b).map(|(a, b)| a != b);
-        if let Some(first) = differs.clone().position(|d| d) {
-            left = left.min(first);
-        }
-        if let Some(last) = differs.rposition(|d| d) {
-            right = right.max(last);
-        }
+        left = differs
+            .clone()
+            .position(|d| d)
+            .map_or(left, |at| left.min(at));
+        right = differs.rposition(|d| d).map_or(right, |at| right.max(at));
     }
     Some(Area {
         x: left,
@@ -227,7 +246,7 @@ pub fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Area> {
 }
 
 /// The pixels of `area` in `after`, with `clear` where they equal `before`.
-pub fn patch(before: &[u8], after: &[u8], width: usize, area: Area, clear: u8) -> Vec<u8> {
+pub(crate) fn patch(before: &[u8], after: &[u8], width: usize, area: Area, clear: u8) -> Vec<u8> {
     let mut pixels = Vec::with_capacity(area.width * area.height);
     for row in area.y..area.y + area.height {
         let from = row * width + area.x;
@@ -261,8 +280,14 @@ mod tests {
 
     fn palette_of(rgba: &[u8], most: usize) -> Palette {
         let mut census = Census::default();
-        census.count(&Packed::new(rgba));
+        census.count(rgba);
         census.palette(most)
+    }
+
+    fn mapped(palette: &Palette, rgba: &[u8]) -> Vec<u8> {
+        let mut places = vec![0; rgba.len() / 4];
+        Matcher::new(palette).map(rgba, &mut places);
+        places
     }
 
     #[test]
@@ -270,13 +295,7 @@ mod tests {
         let rgba = frame([[1, 2, 3], [1, 2, 3], [200, 0, 9]]);
         let palette = palette_of(&rgba, 255);
         assert_eq!(palette.colours(), [[1, 2, 3], [200, 0, 9]]);
-        assert_eq!(palette.map(&rgba), [0, 0, 1]);
-    }
-
-    #[test]
-    fn packing_loses_nothing() {
-        let rgba = [frame([[7, 7, 7]; 500]), ramp()].concat();
-        assert_eq!(Packed::new(&rgba).rgba(), rgba);
+        assert_eq!(mapped(&palette, &rgba), [0, 0, 1]);
     }
 
     #[test]
@@ -284,7 +303,7 @@ mod tests {
         let rgba = ramp();
         let palette = palette_of(&rgba, 255);
         assert_eq!(palette.colours().len(), 255);
-        for (pixel, index) in rgba.chunks_exact(4).zip(palette.map(&rgba)) {
+        for (pixel, index) in rgba.chunks_exact(4).zip(mapped(&palette, &rgba)) {
             let colour = [pixel[0], pixel[1], pixel[2]];
             let all = palette.colours().iter().map(|c| distance(*c, colour));
             let found = distance(palette.colours()[usize::from(index)], colour);
@@ -295,14 +314,13 @@ mod tests {
     #[test]
     fn the_order_of_frames_does_not_matter() {
         let (a, b) = (ramp(), frame([[9, 9, 9]; 300]));
-        let counted = |frames: [&[u8]; 2]| {
+        let counted = |frame: &[u8]| {
             let mut census = Census::default();
-            for frame in frames {
-                census.count(&Packed::new(frame));
-            }
-            census.palette(255).bytes()
+            census.count(frame);
+            census
         };
-        assert_eq!(counted([&a, &b]), counted([&b, &a]));
+        let both = |a, b| counted(a).and(counted(b)).palette(255).bytes();
+        assert_eq!(both(&a, &b), both(&b, &a));
     }
 
     #[test]

@@ -4,12 +4,12 @@ use std::io::Write as _;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::base::words;
 use crate::draw::paint::pdf::{self, Sheet};
 use crate::draw::scene::Scene;
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::Sink;
 use crate::export::target::Target;
 
@@ -55,8 +55,7 @@ impl Book<'_> {
         }
     }
 
-    fn add(&self, scene: &Scene, entry: String) -> Result<()> {
-        let scene = scene.clone();
+    fn add(&self, scene: Scene, entry: String) -> Result<()> {
         let sent = self.sheets.send(Sheet { scene, entry });
         sent.map_err(|_| self.failed("the document broke off".to_owned()))
     }
@@ -80,13 +79,20 @@ impl Encoder for Book<'_> {
         }
     }
 
-    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
-        self.add(frame.scene, self.entry(frame.frame_time.window))
+    fn pack(&self) -> Pack {
+        |frame| Ok(Packet::Drawing(Box::new(frame.scene.clone())))
+    }
+
+    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
+        match packet {
+            Packet::Drawing(scene) => self.add(*scene, self.entry(frame_time.window)),
+            _ => Ok(()),
+        }
     }
 
     fn finish(self: Box<Self>) -> Result<Written> {
         if let Some(scene) = self.strip {
-            self.add(scene, scene.title.clone())?;
+            self.add(scene.clone(), scene.title.clone())?;
         }
         let refused = self.failed("the document is not sound".to_owned());
         let Self {

@@ -1,16 +1,16 @@
 //! Images as PNG and WebP: one per window, or the strip.
 
-use std::io::Write;
+use std::io::Write as _;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
-use image::{ExtendedColorType, ImageEncoder as _, ImageError};
+use image::{ExtendedColorType, ImageEncoder as _};
 
-use super::{Encoder, Frame, Needs, Single, Written, single};
+use super::{Encoder, Frame, Needs, Pack, Packet, Single, Written, single};
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::Sink;
 use crate::export::target::Target;
 
@@ -99,9 +99,9 @@ fn start<'a>(
 }
 
 impl Images<'_> {
-    fn write(&mut self, pixels: &Pixels, target: &Target) -> Result<()> {
+    fn write(&mut self, bytes: &[u8], target: &Target) -> Result<()> {
         let mut sink = Sink::create(target, None)?;
-        write(self.kind, pixels, &mut sink).map_err(|e| failed(e, &sink))?;
+        sink.write_all(bytes).map_err(sink.error())?;
         self.written.add(sink.commit()?);
         Ok(())
     }
@@ -115,12 +115,23 @@ impl Encoder for Images<'_> {
         }
     }
 
-    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
-        if self.is_poster && self.written.files > 0 {
-            return Ok(());
+    fn pack(&self) -> Pack {
+        match (self.kind, self.is_poster) {
+            (_, true) => |frame| match frame.time.window {
+                0 => packed(Kind::Png, frame),
+                _ => Ok(Packet::Nothing),
+            },
+            (Kind::Png, _) => |frame| packed(Kind::Png, frame),
+            (Kind::WebP, _) => |frame| packed(Kind::WebP, frame),
         }
-        let target = self.target.numbered(frame.index, self.windows);
-        self.write(frame.pixels, &target)
+    }
+
+    fn take(&mut self, index: usize, _: FrameTime, packet: Packet) -> Result<()> {
+        let Packet::Bytes(bytes) = packet else {
+            return Ok(());
+        };
+        let target = self.target.numbered(index, self.windows);
+        self.write(&bytes, &target)
     }
 
     fn finish(mut self: Box<Self>) -> Result<Written> {
@@ -129,39 +140,37 @@ impl Encoder for Images<'_> {
             let scale = self.sequence.options.scale * paper;
             let pixels = self.sequence.painter.paint(scene, scale)?;
             let target = self.target.clone();
-            self.write(&pixels, &target)?;
+            self.write(&encoded(self.kind, &pixels)?, &target)?;
         }
         Ok(self.written)
     }
 }
 
-/// Writes an image; without its transparency, as pictures have a background.
-fn write(kind: Kind, pixels: &Pixels, out: &mut impl Write) -> Result<(), ImageError> {
-    let rgb: Vec<u8> = pixels
-        .rgba
-        .chunks_exact(4)
-        .flat_map(|p| [p[0], p[1], p[2]])
-        .collect();
-    let (width, height) = (pixels.width, pixels.height);
-    match kind {
-        // Ten times as fast as the default for a quarter more bytes.
-        Kind::Png => PngEncoder::new_with_quality(out, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(&rgb, width, height, ExtendedColorType::Rgb8),
-        Kind::WebP => {
-            WebPEncoder::new_lossless(out).write_image(&rgb, width, height, ExtendedColorType::Rgb8)
-        }
-    }
+fn packed(kind: Kind, frame: &Frame<'_>) -> Result<Packet> {
+    encoded(kind, frame.pixels).map(Packet::Bytes)
 }
 
-fn failed(error: ImageError, sink: &Sink) -> Error {
-    match error {
-        ImageError::IoError(error) => sink.error()(error),
-        other => Error::Output {
-            path: sink.path().to_owned(),
-            reason: other.to_string(),
-            hint: "try a smaller `--size`".to_owned(),
-        },
+/// An image; without its transparency, as pictures have a background.
+fn encoded(kind: Kind, pixels: &Pixels) -> Result<Vec<u8>> {
+    let mut rgb = Vec::with_capacity(pixels.rgba.len() / 4 * 3);
+    for pixel in pixels.rgba.chunks_exact(4) {
+        rgb.extend_from_slice(&pixel[..3]);
     }
+    let (width, height, color) = (pixels.width, pixels.height, ExtendedColorType::Rgb8);
+    let mut out = Vec::new();
+    match kind {
+        // Ten times as fast as the default for a quarter more bytes.
+        Kind::Png => {
+            PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
+                .write_image(&rgb, width, height, color)
+        }
+        Kind::WebP => WebPEncoder::new_lossless(&mut out).write_image(&rgb, width, height, color),
+    }
+    .map_err(|error| {
+        let what = format!("an image of {width} x {height} pixels cannot be written: {error}");
+        Error::usage(what, "try a smaller `--size`")
+    })?;
+    Ok(out)
 }
 
 #[cfg(test)]
@@ -182,8 +191,7 @@ mod tests {
             rgba,
         };
         for kind in [Kind::Png, Kind::WebP] {
-            let mut bytes = Vec::new();
-            write(kind, &pixels, &mut bytes).unwrap();
+            let bytes = encoded(kind, &pixels).unwrap();
             let read = image::load_from_memory(&bytes).unwrap().to_rgba8();
             assert_eq!(read.dimensions(), (70, 50));
             assert_eq!(read.into_raw(), pixels.rgba);

@@ -1,7 +1,7 @@
 //! A report in Markdown for a pull request or a job summary: what changed, when, drawn and in tables.
 
 pub(crate) mod encoder;
-mod escape;
+pub(crate) mod escape;
 mod graph;
 mod tables;
 
@@ -25,7 +25,7 @@ const MOST_PHRASES: usize = 12;
 const MOST_CHART: usize = 45_000;
 
 /// The report.
-pub fn report(sequence: &Sequence<'_>) -> String {
+pub(crate) fn report(sequence: &Sequence<'_>) -> String {
     let (mission, view) = (sequence.mission, sequence.view);
     let mut out = headline(sequence, view) + "\n\n";
     let links = sequence.options.links.iter();

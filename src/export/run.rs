@@ -2,23 +2,27 @@
 
 mod raster_pool;
 mod size_limit;
+mod steps;
 
 use std::io;
 use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use self::raster_pool::{Drawn, RasterPool};
+use self::raster_pool::{Packed, RasterPool, Want};
+use self::steps::Step;
+pub use self::steps::Steps;
 use crate::base::error::{Error, Result};
 use crate::export::check;
 use crate::export::palette::Palette;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::{Encoder, Frame, Needs, Output, Written};
+use crate::export::{Encoder, Needs, Output, Packet, Written};
 
 /// Told after every batch of frames: how many are done, of how many. May break off the run.
 pub type Progress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
 
-/// Writes every output, in the order given, and tells what was written. Each file appears when it is whole.
+/// Writes every output, in the order given, and tells what was written. Each file appears when it is whole. `steps`
+/// counts where the time goes.
 ///
 /// A closed pipe ends that output and is no error.
 ///
@@ -28,16 +32,17 @@ pub type Progress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
 pub fn run(
     sequence: &Sequence<'_>,
     outputs: &[Output],
+    steps: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Written>> {
     for output in outputs {
         check::make_folder(&output.target)?;
     }
-    let outcomes = pass(sequence, outputs, progress)?;
+    let outcomes = pass(sequence, outputs, steps, progress)?;
     let each = outputs.iter().zip(outcomes);
     each.map(|(output, outcome)| match outcome {
         Some(written) => Ok(written),
-        None => size_limit::fit(sequence, output, progress),
+        None => size_limit::fit(sequence, output, steps, progress),
     })
     .collect()
 }
@@ -46,13 +51,14 @@ pub fn run(
 pub(crate) fn pass(
     sequence: &Sequence<'_>,
     outputs: &[Output],
+    steps: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Option<Written>>> {
     let start = |output| OutputJob::start(sequence, output);
     let mut jobs: Vec<OutputJob<'_>> = outputs.iter().map(start).collect::<Result<_>>()?;
     let needs = jobs.iter().map(OutputJob::needs).max();
     if needs > Some(Needs::Nothing) {
-        play(sequence, &mut jobs, progress)?;
+        play(sequence, &mut jobs, steps, progress)?;
     }
     jobs.into_iter().map(OutputJob::finish).collect()
 }
@@ -61,6 +67,7 @@ pub(crate) fn pass(
 struct OutputJob<'a> {
     output: &'a Output,
     encoder: Option<Box<dyn Encoder + 'a>>,
+    has_begun: bool,
     /// Why it ended early.
     ended: Option<Error>,
 }
@@ -70,6 +77,7 @@ impl<'a> OutputJob<'a> {
         Ok(Self {
             output,
             encoder: Some((output.format.start)(sequence, &output.target)?),
+            has_begun: false,
             ended: None,
         })
     }
@@ -83,35 +91,38 @@ impl<'a> OutputJob<'a> {
         self.encoder.as_ref().is_some_and(|e| e.plays())
     }
 
-    /// Takes frames, unless it has ended.
-    fn take(&mut self, frames: &[Drawn], palette: &Palette, sequence: &Sequence<'_>) {
-        let Some(encoder) = &mut self.encoder else {
+    /// What it wants of every frame; nothing once it has ended.
+    fn want(&self) -> Want {
+        let encoder = self.encoder.as_ref();
+        Want {
+            needs: self.needs(),
+            plays: self.plays(),
+            pack: encoder.map_or(|_| Ok(Packet::Nothing), |e| e.pack()),
+            density: encoder.map_or(0.0, |e| e.packet_density()),
+        }
+    }
+
+    /// Takes packets, unless it has ended.
+    fn take(&mut self, size: (u32, u32), palette: &Palette, packets: Vec<Waiting>) {
+        let Some(mut encoder) = self.encoder.take() else {
             return;
         };
-        if encoder.needs() == Needs::Nothing {
-            return;
-        }
-        let wanted = frames
-            .iter()
-            .filter(|f| f.frame_time.is_settled() || encoder.plays());
-        let wanted: Vec<_> = wanted.collect();
-        let result = wanted.iter().try_for_each(|drawn| {
-            encoder.frame(&Frame {
-                index: sequence
-                    .view
-                    .frames
-                    .get(drawn.frame_time.window)
-                    .map_or(0, |f| f.index),
-                frame_time: drawn.frame_time,
-                scene: &drawn.scene,
-                pixels: &drawn.pixels,
-                palette,
-                indices: &drawn.indices,
-            })
-        });
-        if let Err(error) = result {
-            self.encoder = None;
-            self.ended = Some(error);
+        let needs = encoder.needs();
+        let take = || -> Result<()> {
+            if needs > Needs::Nothing && !self.has_begun {
+                encoder.begin(size, palette)?;
+                self.has_begun = true;
+            }
+            for Waiting(index, frame_time, packet) in packets {
+                if needs > Needs::Nothing && (frame_time.is_settled() || encoder.plays()) {
+                    encoder.take(index, frame_time, packet)?;
+                }
+            }
+            Ok(())
+        };
+        match take() {
+            Ok(()) => self.encoder = Some(encoder),
+            Err(error) => self.ended = Some(error),
         }
     }
 
@@ -160,43 +171,52 @@ fn kind(error: &Error) -> Option<io::ErrorKind> {
     }
 }
 
-/// Draws all frames and hands them out: while the encoders take one batch, the next is drawn.
+/// A packet with the index of its window and the time of its frame.
+struct Waiting(usize, FrameTime, Packet);
+
+/// Draws all frames and hands them out, in order, while the next ones are drawn.
 fn play(
     sequence: &Sequence<'_>,
     jobs: &mut [OutputJob<'_>],
+    steps: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<()> {
     let mut frame_times = sequence.frame_times();
     if !jobs.iter().any(OutputJob::plays) {
         frame_times.retain(FrameTime::is_settled);
     }
-    let needs = jobs
-        .iter()
-        .map(OutputJob::needs)
-        .max()
-        .unwrap_or(Needs::Nothing);
-    let mut artists = RasterPool::new(sequence, needs, &frame_times)?;
-    let palette = artists.palette();
-    let (mut done, mut ready) = (0, Vec::new());
-    // The empty batch at the end lets the last one be taken.
-    for batch in frame_times
-        .chunks(artists.batch(&frame_times))
-        .chain([&[][..]])
-    {
-        let take = || {
-            jobs.par_iter_mut()
-                .for_each(|w| w.take(&ready, &palette, sequence));
-        };
-        let (next, ()) = rayon::join(|| artists.draw(batch), take);
+    let wants: Vec<Want> = jobs.iter().map(OutputJob::want).collect();
+    let pool = RasterPool::new(sequence, &frame_times, &wants, steps)?;
+    let mut done = 0;
+    pool.run(|row| {
+        done += row.len();
+        let size = row.first().map_or((0, 0), |packed| packed.size);
+        let queues = by_output(sequence, row, jobs.len());
+        steps.time(Step::Write, || {
+            let each = jobs.par_iter_mut().zip(queues);
+            each.for_each(|(job, packets)| job.take(size, pool.palette(), packets));
+        });
         jobs.iter_mut().try_for_each(OutputJob::failure)?;
-        done += ready.len();
         if progress(done, frame_times.len()).is_break() {
             return Err(Error::Interrupted);
         }
-        if jobs.iter().all(|w| w.encoder.is_none()) {
-            break;
+        Ok(if jobs.iter().all(|job| job.encoder.is_none()) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
+    })
+}
+
+/// The packets of each output.
+fn by_output(sequence: &Sequence<'_>, row: Vec<Packed>, outputs: usize) -> Vec<Vec<Waiting>> {
+    let mut queues: Vec<Vec<Waiting>> = (0..outputs).map(|_| Vec::new()).collect();
+    for packed in row {
+        let window = sequence.view.frames.get(packed.frame_time.window);
+        let index = window.map_or(0, |frame| frame.index);
+        for (queue, packet) in queues.iter_mut().zip(packed.packets) {
+            queue.push(Waiting(index, packed.frame_time, packet));
         }
-        ready = next?;
     }
-    Ok(())
+    queues
 }

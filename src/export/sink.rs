@@ -12,7 +12,7 @@ use crate::base::leftovers::Leftover;
 
 /// A file (or standard output) being written. Dropped without [`Sink::commit`], a file leaves no trace.
 #[derive(Debug)]
-pub struct Sink {
+pub(crate) struct Sink {
     /// As it was asked for.
     path: PathBuf,
     /// What is replaced: for a symbolic link, what it points to.
@@ -42,7 +42,7 @@ impl Sink {
     ///
     /// # Errors
     /// Where the system refuses; the error names the final file.
-    pub fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
+    pub(crate) fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
         let way = match target {
             Target::Stdout if limit.is_some() => Ok(Way::Memory(Vec::new())),
             // An output that the user asked for on standard output is no message of the library's.
@@ -66,20 +66,21 @@ impl Sink {
     }
 
     /// The path as it was asked for, for messages; `-` for standard output.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// What turns an I/O error of this file into ours.
-    pub fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
+    pub(crate) fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
         Error::io("write", &self.path)
     }
 
+    #[cfg(feature = "video")]
     /// A handle that a child process can write to as its standard output; `None` where the bytes stay with us.
     ///
     /// # Errors
     /// Where the system refuses.
-    pub fn handle(&mut self) -> Result<Option<File>> {
+    pub(crate) fn handle(&mut self) -> Result<Option<File>> {
         let handle = match self.to.get_ref() {
             #[cfg(target_os = "linux")]
             Way::Nameless(file) => Some(file.try_clone()),
@@ -94,7 +95,7 @@ impl Sink {
     ///
     /// # Errors
     /// Where the last bytes do not fit or the name cannot be taken; then nothing is left behind.
-    pub fn commit(mut self) -> Result<u64> {
+    pub(crate) fn commit(mut self) -> Result<u64> {
         self.to.flush().map_err(self.error())?;
         let Self {
             path,

@@ -2,11 +2,11 @@
 
 use std::io::Write as _;
 
-use super::{Encoder, Frame, Needs, Single, Written, single};
+use super::{Encoder, Needs, Pack, Packet, Single, Written, single};
 use crate::base::error::Result;
 use crate::draw::paint::svg;
 use crate::draw::scene::Scene;
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::Sink;
 use crate::export::target::Target;
 
@@ -46,23 +46,30 @@ impl Encoder for Drawings<'_> {
         }
     }
 
-    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
-        let target = self.target.numbered(frame.index, self.windows);
-        self.written.add(write(frame.scene, &target)?);
+    fn pack(&self) -> Pack {
+        |frame| Ok(Packet::Bytes(svg::write(frame.scene).into_bytes()))
+    }
+
+    fn take(&mut self, index: usize, _: FrameTime, packet: Packet) -> Result<()> {
+        let Packet::Bytes(bytes) = packet else {
+            return Ok(());
+        };
+        let target = self.target.numbered(index, self.windows);
+        self.written.add(write(&bytes, &target)?);
         Ok(())
     }
 
     fn finish(mut self: Box<Self>) -> Result<Written> {
         if let Some(scene) = self.strip {
-            self.written.add(write(scene, &self.target)?);
+            let text = svg::write(scene);
+            self.written.add(write(text.as_bytes(), &self.target)?);
         }
         Ok(self.written)
     }
 }
 
-fn write(scene: &Scene, target: &Target) -> Result<u64> {
+fn write(text: &[u8], target: &Target) -> Result<u64> {
     let mut sink = Sink::create(target, None)?;
-    let text = svg::write(scene);
-    sink.write_all(text.as_bytes()).map_err(sink.error())?;
+    sink.write_all(text).map_err(sink.error())?;
     sink.commit()
 }

@@ -14,7 +14,7 @@ use crate::export::sink::Sink;
 use crate::export::target::{Target, is_special};
 use crate::mission::Mission;
 use mission::{TABLES, Table};
-pub use writer::TableFormat;
+pub(crate) use writer::TableFormat;
 use writer::Writer;
 
 struct Tables<'a> {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use std::process::{Child, ChildStderr, ChildStdin, Command, Stdio};
 use std::thread::{self, JoinHandle};
 
-use super::{Encoder, Frame, Needs, Written};
+use super::{Encoder, Needs, Pack, Packet, Written};
 use crate::base::budget;
 use crate::base::error::{Error, Result};
-use crate::draw::paint::raster::Pixels;
+use crate::export::palette::Palette;
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::Sink;
 use crate::export::target::Target;
@@ -73,6 +73,7 @@ struct Video<'a> {
     sequence: &'a Sequence<'a>,
     kind: &'static Kind,
     target: Target,
+    size: (u32, u32),
     work: Option<Work>,
 }
 
@@ -133,6 +134,7 @@ fn start<'a>(
         sequence,
         kind,
         target: target.clone(),
+        size: (0, 0),
         work: None,
     }))
 }
@@ -146,17 +148,17 @@ impl Video<'_> {
         }
     }
 
-    fn begin(&self, pixels: &Pixels) -> Result<Work> {
+    fn start(&self, first: &[u8]) -> Result<Work> {
         let mut sink = Sink::create(&self.target, None)?;
         let step = step(&self.sequence.frame_times());
         let rate = 1000.0 / f64::from(step);
         let mut command = Command::new("ffmpeg");
         command.args(["-hide_banner", "-loglevel", "error", "-y"]);
         command.args(["-f", "rawvideo", "-pix_fmt", "rgba"]);
-        command.args(["-s", &format!("{}x{}", pixels.width, pixels.height)]);
+        command.args(["-s", &format!("{}x{}", self.size.0, self.size.1)]);
         command.args(["-framerate", &rate.to_string(), "-i", "pipe:0", "-an"]);
         // Most players want even sides: the picture goes on in the colour of its corner.
-        let [r, g, b] = pixels.rgba.first_chunk().copied().unwrap_or([255; 3]);
+        let [r, g, b] = first.first_chunk().copied().unwrap_or([255; 3]);
         let pad = format!("pad=ceil(iw/2)*2:ceil(ih/2)*2:color=0x{r:02x}{g:02x}{b:02x}");
         // The filter, unlike `-r`, shows the last frame as long as the others.
         let fps = rate.max(FEWEST_PER_SECOND);
@@ -220,12 +222,28 @@ impl Encoder for Video<'_> {
         true
     }
 
-    fn frame(&mut self, frame: &Frame<'_>) -> Result<()> {
+    fn pack(&self) -> Pack {
+        |frame| Ok(Packet::Bytes(frame.pixels.rgba.clone()))
+    }
+
+    fn packet_density(&self) -> f64 {
+        4.0
+    }
+
+    fn begin(&mut self, size: (u32, u32), _: &Palette) -> Result<()> {
+        self.size = size;
+        Ok(())
+    }
+
+    fn take(&mut self, _: usize, frame_time: FrameTime, packet: Packet) -> Result<()> {
+        let Packet::Bytes(rgba) = packet else {
+            return Ok(());
+        };
         let mut work = match self.work.take() {
             Some(work) => work,
-            None => self.begin(frame.pixels)?,
+            None => self.start(&rgba)?,
         };
-        if work.show(&frame.pixels.rgba, frame.frame_time.ms).is_err() {
+        if work.show(&rgba, frame_time.ms).is_err() {
             return Err(self.complaint(&mut work));
         }
         self.work = Some(work);

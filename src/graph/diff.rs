@@ -12,6 +12,7 @@ use crate::graph::{EdgeState, Element, Graph, NodeId, NodeState, TopicId, TopicS
 
 /// One reconfiguration, as JSON and the log of events tell it.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Change {
     /// It was not in the window before.
     Added {

@@ -137,7 +137,7 @@ const OFTEN: usize = 4;
 
 /// When a sender with a rhythm was silent while it lived (`lives`, half-open): from its last message to the next, or
 /// to no other. What comes in bursts is never silent.
-pub fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found = Vec::new();
     for life in lives {
         let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
@@ -163,7 +163,7 @@ pub fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Option<Sta
 }
 
 /// When all of several senders are silent, of whom at least one has a rhythm that broke.
-pub fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found: Vec<(Stamp, Option<Stamp>)> = Vec::new();
     for sender in senders {
         found.extend(silences(sender, lives));

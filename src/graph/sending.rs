@@ -30,7 +30,7 @@ pub struct Sending {
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub fn sending(collected: &mut Collected, elements: &Elements) -> Result<Sending> {
+pub(crate) fn sending(collected: &mut Collected, elements: &Elements) -> Result<Sending> {
     let mut all = Sending {
         publishes: vec![Vec::new(); elements.publishes.len()],
         topics: vec![Vec::new(); elements.topics.len()],

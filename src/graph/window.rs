@@ -155,7 +155,7 @@ fn count(nanos: i64, period: i64) -> i64 {
 /// Divides `span` (see [`range`]) into windows.
 ///
 /// # Errors
-/// [`Error::Usage`] for a step longer than the period and for more than [`budget::WINDOWS`] windows.
+/// [`Error::Usage`] for a step longer than the period and for more than `budget::WINDOWS` windows.
 pub fn divide(division: &Division, span: Span) -> Result<Windows> {
     let nanos = span.nanos().max(1);
     let period = match division.length {

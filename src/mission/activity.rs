@@ -8,7 +8,7 @@ use crate::graph::{Graph, Node};
 use crate::mission::Mission;
 
 /// The most cells of the grid: more is finer than print, and phases cost their square.
-pub const MOST_CELLS: i64 = 200;
+pub(crate) const MOST_CELLS: i64 = 200;
 
 const SECOND: i64 = 1_000_000_000;
 /// The lengths that a cell may have up to a day; then whole days.
@@ -43,14 +43,14 @@ pub struct Cell {
 /// The mission as a finely divided sequence; ids are those of the mission's elements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Activity {
-    /// In order, 1 to [`MOST_CELLS`]; none where nothing was read.
+    /// In order, 1 to `MOST_CELLS`; none where nothing was read.
     pub cells: Vec<Cell>,
     /// When messages came, to the nanosecond; empty lists where only windows are known.
     pub sending: Sending,
 }
 
 /// The cells that divide `span`: as short as 1 s, as long as it takes for at most [`MOST_CELLS`].
-pub fn grid(span: Span) -> Vec<Span> {
+pub(crate) fn grid(span: Span) -> Vec<Span> {
     let nanos = span.nanos().max(1);
     let fits = |step: &i64| nanos / step < MOST_CELLS;
     let day = STEPS[STEPS.len() - 1];
@@ -100,13 +100,13 @@ impl Activity {
 }
 
 /// Whether a node is a recorder or player, by its name or by what it logs.
-pub fn records(node: &Node) -> bool {
+pub(crate) fn records(node: &Node) -> bool {
     let name = node.name.as_str();
     is_recorder(name) || is_player(name) || node.evidence.words().any(|word| word == "recorder")
 }
 
 /// Whether phases and figures leave out this node: housekeeping, recorders, players.
-pub fn is_hidden_node(node: &Node) -> bool {
+pub(crate) fn is_hidden_node(node: &Node) -> bool {
     records(node) || is_quiet(node.name.as_str())
 }
 

@@ -26,6 +26,7 @@ pub type EntryId = u32;
 
 /// Everything that happened, and the phases in which it did.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Ledger {
     /// Sorted by time, then kind, then name: the log never runs backwards.
     pub entries: Vec<Entry>,
@@ -97,6 +98,7 @@ impl Kind {
 
 /// What an entry says beside its kind and its time.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Detail {
     /// Nothing more.
     #[default]
@@ -126,6 +128,7 @@ pub enum Detail {
 
 /// One thing that happened.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Entry {
     /// What kind of thing.
     pub kind: Kind,
@@ -162,6 +165,7 @@ impl Entry {
 
 /// A stretch of the mission that one graph describes.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Phase {
     /// From when to when, half-open.
     pub span: Span,

@@ -1,6 +1,6 @@
 //! From the evolution to the picture: choose what is shown, and make it readable on its page.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Purpose, Stage, Watch};
@@ -13,11 +13,11 @@ use crate::draw::text::Fonts;
 use crate::layout::{Engine, Layout, extend, lay_out};
 use crate::mission::phases::knows_publishers;
 use crate::mission::{Mission, Place, Places};
-use crate::view::{View, ViewOptions, outline, view};
+use crate::view::{Mode, View, ViewOptions, outline, view};
 
 /// What the picture of a mission is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Body {
+pub(crate) enum Body {
     /// A graph; a board where of most messages nobody knows the publisher.
     #[default]
     Auto,
@@ -40,9 +40,10 @@ impl Body {
 
 /// What to draw and how.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Drawing {
     /// Graph or board.
-    pub body: Body,
+    pub(crate) body: Body,
     /// What is shown.
     pub view: ViewOptions,
     /// Colours, strokes and fonts.
@@ -54,7 +55,7 @@ pub struct Drawing {
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
     /// Where it will be seen, if that decides the page.
-    pub purpose: Option<Purpose>,
+    pub(crate) purpose: Option<Purpose>,
     /// Whether to grow the page and collapse namespaces until the text can be read.
     pub is_fitted: bool,
     /// What lays out.
@@ -106,9 +107,9 @@ pub(super) struct Composed {
     pub(super) notices: Notices,
 }
 
-/// Chooses what is shown and lays it out. With `--fit auto` the page grows, then the largest innermost namespaces are
-/// collapsed, until the smallest text is at least 9 pixels high or nothing is left to collapse; then those that turn
-/// out to fit are opened again.
+/// Chooses what is shown and lays it out. With `--fit auto` the page grows, then those namespaces are collapsed in which
+/// least changes, until the smallest text is at least 9 pixels high or nothing is left to collapse; then topics are
+/// bundled, if need be, and namespaces that turn out to fit are opened again.
 pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
     let mut page = drawing.page.clone();
@@ -136,6 +137,9 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
             best = Attempt::new(mission, drawing, &options, &page);
         }
         collapse(mission, drawing, &page, &mut options, &mut best);
+        if !best.is_readable(drawing) {
+            bundle(mission, drawing, &page, &mut options, &mut best);
+        }
         open_again(mission, drawing, &page, (&mut options, asked), &mut best);
     }
     let Attempt {
@@ -144,9 +148,17 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
         layout,
         text,
     } = best;
-    if drawing.is_fitted {
+    if drawing.is_fitted || drawing.purpose.is_some() {
         let collapsed = &options.collapse[asked..];
         notices.extend(told(drawing, collapsed, &page, text).iter());
+        if options.mode != drawing.view.mode {
+            let text = format!(
+                "one arrow for all topics between two boxes{}; `--mode {}` draws each",
+                so_that(text >= drawing.readable()),
+                drawing.view.mode.word()
+            );
+            notices.add(Notice::new(NoticeKind::Hidden, text));
+        }
     }
     notices.extend(picture::unshown(&view, &drawing.fonts));
     let remarks = layout.remarks.iter();
@@ -236,6 +248,39 @@ fn collapse(
         options.collapse.extend(fresh.into_iter().take(many));
         *best = Attempt::new(mission, drawing, options, page);
     }
+}
+
+/// The last resort: outermost namespaces as one box each, and one arrow for all topics between two boxes; if that can
+/// be read better.
+fn bundle(
+    mission: &Mission,
+    drawing: &Drawing,
+    page: &PageOptions,
+    options: &mut ViewOptions,
+    best: &mut Attempt,
+) {
+    if options.mode.is_direct() {
+        return;
+    }
+    let mut bundled = options.clone();
+    bundled.mode = Mode::Bundles;
+    bundled.collapse.clone_from(&drawing.view.collapse);
+    let nodes = mission.elements.nodes.iter().map(|n| n.name.as_str());
+    let outermost: BTreeSet<&str> = nodes.filter_map(outermost).collect();
+    bundled
+        .collapse
+        .extend(outermost.into_iter().map(Arc::from));
+    let attempt = Attempt::new(mission, drawing, &bundled, page);
+    let says_something = attempt.view.items.len() > 1;
+    if says_something && attempt.text > best.text {
+        (*options, *best) = (bundled, attempt);
+    }
+}
+
+/// The first part of a name that has more than one: `/robot1` of `/robot1/nav/planner`.
+fn outermost(name: &str) -> Option<&str> {
+    let end = name.get(1..)?.find('/')? + 1;
+    name.get(..end)
 }
 
 /// How many namespaces are tried to be opened again.

@@ -23,6 +23,7 @@ use crate::view::{View, ViewOptions, filtered};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Render {
     /// What to read.
     pub reading: Reading,
@@ -63,6 +64,7 @@ impl Render {
 
 /// What came of it.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Rendered {
     /// The mission, with where it was drawn and everything worth saying.
     pub mission: Mission,
@@ -74,7 +76,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// Where an output cannot be written, no input can be read, or an option makes no sense.
-pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
     check(job)?;
     let mission = read(&job.reading, watch)?;
     show(job, mission, watch)
@@ -84,7 +86,7 @@ pub fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 ///
 /// # Errors
 /// As [`export::check`].
-pub fn check(job: &Render) -> Result<()> {
+pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
@@ -114,7 +116,7 @@ fn check_figure(job: &Render) -> Result<()> {
 ///
 /// # Errors
 /// As [`render`].
-pub fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+pub(crate) fn show(job: &Render, mut mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
     if let Some(from) = &job.captions {
         drawing.page.phases = captions::phases(&mission, &job.reading.inputs, from)?;
@@ -192,7 +194,10 @@ fn write(
             ControlFlow::Continue(())
         }
     };
-    run::run(sequence, outputs, &mut progress)
+    let steps = run::Steps::default();
+    let written = run::run(sequence, outputs, &steps, &mut progress)?;
+    watch.shares(&steps.shares());
+    Ok(written)
 }
 
 /// So many life lines fit below a frame.

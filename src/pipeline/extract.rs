@@ -18,6 +18,7 @@ use crate::view::NameFilter;
 
 /// The whole job of `bagreel extract`.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Extract {
     /// Bags, whose messages become one table, or one set of tables.
     pub inputs: Vec<Input>,
@@ -37,6 +38,7 @@ pub struct Extract {
 
 /// What came of it.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Extracted {
     /// How many tables were written.
     pub tables: usize,

@@ -23,6 +23,7 @@ use crate::mission::{Mission, Window, read_json};
 
 /// What to read and how.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Reading {
     /// Bags of one mission, or one evolution.
     pub inputs: Vec<Input>,
@@ -54,6 +55,17 @@ impl Default for Reading {
             graph: graph::Options::default(),
             code: None,
             rate_change: RATE_CHANGE,
+        }
+    }
+}
+
+impl Reading {
+    /// Bags of one mission by their paths, or one mission's own JSON, with every option as the command line has it.
+    pub fn of<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
+        let inputs = paths.into_iter().map(|path| Input::Path(path.into()));
+        Self {
+            inputs: inputs.collect(),
+            ..Self::default()
         }
     }
 }
@@ -96,15 +108,6 @@ pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
 pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec<EvidenceLine>)> {
     watch.stage(Stage::Read);
     if let Some(path) = mission_file(&reading.inputs)? {
-        if reading.code.is_some() {
-            return Err(Error::usage(
-                format!(
-                    "`--source` adds to bags, and `{}` is an evolution",
-                    path.display()
-                ),
-                "give the bag itself",
-            ));
-        }
         return Ok((reread(path, reading)?, Vec::new()));
     }
     let mut recorded = Recorded::read(reading, false, watch)?;
@@ -113,7 +116,10 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
 }
 
 /// The path of the evolution that is the only input; `None` for bags.
-fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
+///
+/// # Errors
+/// Where it cannot be read.
+pub(crate) fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     let is_json = |input: &Input| -> Result<bool> { Ok(matches!(bag::sniff(input)?, Kind::Json)) };
     match inputs {
         [Input::Path(path)] if is_json(&inputs[0])? => Ok(Some(path)),
@@ -137,6 +143,12 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     }
     if !mission.knows_lives() {
         mission.find_changes(reading.rate_change, &[]);
+    } else if (reading.rate_change - RATE_CHANGE).abs() > f64::EPSILON {
+        let what = format!(
+            "`--rate-change` compares windows, and `{}` holds its changes already",
+            path.display()
+        );
+        return Err(Error::usage(what, "give the bag itself"));
     }
     mission.activity = Activity::of_windows(&mission);
     if mission.ledger.phases.is_empty() {

@@ -4,18 +4,21 @@ use super::items::Viewed;
 use super::state::{shows_node, shows_topic};
 use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
-use crate::graph::{Edge, EdgeState, Element, Elements, Graph};
-use crate::mission::{Activity, Mission, Window};
+use crate::graph::{Edge, EdgeState, Element, Elements, Graph, NodeId};
+use crate::mission::ledger::{Detail, Entry};
+use crate::mission::{Activity, EntryId, Ledger, Mission, Window};
 
 /// The evolution without what the view leaves out. Topics in groups and what is inside collapsed namespaces are seen,
 /// so they stay, under their own names; so do changes, as they were found in the whole graph.
-pub fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
+pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let viewed = Viewed::new(&mission.elements, options);
-    let keep = Keep::new(&mission.elements, options, &viewed);
+    let mut keep = Keep::new(&mission.elements, options, &viewed);
+    let ledger = keep.ledger(&mission.ledger);
     let windows = mission.windows.iter();
     Mission {
         elements: keep.elements(&mission.elements),
         windows: windows.map(|w| keep.window(w, options, &viewed)).collect(),
+        ledger,
         // By ids of elements that are others here.
         activity: Activity::default(),
         ..mission.clone()
@@ -28,6 +31,8 @@ struct Keep {
     topics: Vec<Option<u32>>,
     publishes: Vec<Option<u32>>,
     subscribes: Vec<Option<u32>>,
+    /// Per entry of the ledger its new place, if it stays.
+    entries: Vec<Option<EntryId>>,
 }
 
 impl Keep {
@@ -37,6 +42,9 @@ impl Keep {
             .zip(&viewed.topic)
             .map(|(id, item)| match options.mode {
                 Mode::Nodes => viewed.carriers.contains_key(&Element::Topic(id)),
+                Mode::Bundles => {
+                    item.is_some() || viewed.carriers.contains_key(&Element::Topic(id))
+                }
                 _ => item.is_some(),
             });
         let topics = numbered(topics);
@@ -47,7 +55,44 @@ impl Keep {
             subscribes: numbered(elements.subscribes.iter().map(stays)),
             nodes,
             topics,
+            entries: Vec::new(),
         }
+    }
+
+    /// The entries about what stays. What is told with something that does not stay is told by itself.
+    fn ledger(&mut self, all: &Ledger) -> Ledger {
+        let stays = |entry: &Entry| self.element(entry.what).is_some();
+        self.entries = numbered(all.entries.iter().map(stays));
+        let entries = all.entries.iter().filter_map(|entry| {
+            Some(Entry {
+                what: self.element(entry.what)?,
+                part_of: entry.part_of.and_then(|whole| new_id(&self.entries, whole)),
+                detail: match &entry.detail {
+                    Detail::Senders { from, to } => Detail::Senders {
+                        from: self.kept_nodes(from),
+                        to: self.kept_nodes(to),
+                    },
+                    other => other.clone(),
+                },
+                ..entry.clone()
+            })
+        });
+        let mut entries: Vec<Entry> = entries.collect();
+        let parts = entries.iter().filter_map(|entry| entry.part_of);
+        let mut weights = vec![1; entries.len()];
+        parts.for_each(|whole| weights[whole as usize] += 1);
+        for (entry, weight) in entries.iter_mut().zip(weights) {
+            entry.weight = weight.min(entry.weight);
+        }
+        Ledger {
+            entries,
+            phases: all.phases.clone(),
+        }
+    }
+
+    fn kept_nodes(&self, nodes: &[NodeId]) -> Vec<NodeId> {
+        let new = nodes.iter().filter_map(|id| new_id(&self.nodes, *id));
+        new.collect()
     }
 
     fn elements(&self, all: &Elements) -> Elements {
@@ -69,13 +114,15 @@ impl Keep {
     }
 
     fn window(&self, window: &Window, options: &ViewOptions, viewed: &Viewed) -> Window {
+        let told = window.changes.iter().zip(&window.entries);
+        let kept = told.filter_map(|(change, entry)| {
+            Some((self.change(change)?, new_id(&self.entries, *entry)?))
+        });
+        let (changes, entries) = kept.unzip();
         Window {
             graph: self.graph(&window.graph, options, viewed),
-            changes: window
-                .changes
-                .iter()
-                .filter_map(|c| self.change(c))
-                .collect(),
+            changes,
+            entries,
             ..window.clone()
         }
     }
@@ -119,11 +166,6 @@ impl Keep {
 
     fn change(&self, change: &Change) -> Option<Change> {
         let mut change = change.clone();
-        let all = |ids: &[u32]| {
-            ids.iter()
-                .filter_map(|id| new_id(&self.nodes, *id))
-                .collect()
-        };
         match &mut change {
             Change::Added { what, .. }
             | Change::Removed { what, .. }
@@ -131,7 +173,7 @@ impl Keep {
             | Change::Value { what, .. } => *what = self.element(*what)?,
             Change::HandedOver { topic, from, to } => {
                 *topic = new_id(&self.topics, *topic)?;
-                (*from, *to) = (all(from), all(to));
+                (*from, *to) = (self.kept_nodes(from), self.kept_nodes(to));
             }
             Change::Restarted { node, .. } => *node = new_id(&self.nodes, *node)?,
         }

@@ -6,7 +6,7 @@ use super::lives::Lives;
 use super::marks::{News, Told};
 use super::settle::settle;
 use super::state::{Presence, States, present};
-use super::{Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
+use super::{ArrowKind, Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
 use crate::mission::Mission;
 
 /// The windows one after the other.
@@ -87,12 +87,18 @@ impl Turn {
                 .any(|end| end.mark == Some(Mark::Restarted));
             let there = (self.before.arrows[at], self.after.arrows[at] || is_back);
             let told = told.or_else(|| with_ends(there, [from, to]));
-            arrows.extend(marked(shown, there, told.as_ref()));
+            let shown = marked(shown, there, told.as_ref()).map(|shown| Shown {
+                inside: (arrow.kind == ArrowKind::Bundle)
+                    .then(|| self.inside(&shown))
+                    .flatten(),
+                ..shown
+            });
+            arrows.extend(shown);
         }
         arrows
     }
 
-    /// What the headlines that are told on a folded namespace count.
+    /// What the headlines that are told on a folded namespace or a bundle count.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
         let told = self.news.headlines.iter();
         let counts = Counts::of(told.filter(|h| shown.entries.binary_search(&h.entry).is_ok()));

@@ -9,7 +9,7 @@ use super::names::is_debug_label;
 use super::roles;
 use super::select::{Selection, finish, select};
 use super::{Arrow, ArrowKind, Item, ItemKind, Mode, ViewOptions};
-use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, TopicId};
+use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, Topic, TopicId};
 
 /// Where an edge of the graph went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl Viewed {
     pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
         let mut selection = select(elements, options);
         let grouping = match options.mode {
-            Mode::Nodes => super::Grouping::NONE,
+            mode if mode.is_direct() => super::Grouping::NONE,
             _ => options.group,
         };
         let seen: Vec<bool> = selection.topics.iter().map(Option::is_none).collect();
@@ -81,7 +81,7 @@ impl Viewed {
             ..Self::default()
         };
         viewed.set_items(elements, options, &groups);
-        if options.mode == Mode::Nodes {
+        if options.mode.is_direct() {
             viewed.set_direct(elements, options);
         } else {
             viewed.set_arrows(elements);
@@ -108,7 +108,9 @@ impl Viewed {
             })
             .collect();
         let mut topics: Vec<Option<Key>> = vec![None; elements.topics.len()];
-        if options.mode != Mode::Nodes {
+        if options.mode == Mode::Bundles {
+            topics = inside(elements, &collapse, &nodes, &self.selection);
+        } else if options.mode != Mode::Nodes {
             for (at, topic) in elements.topics.iter().enumerate() {
                 if seen(&self.selection.topics, at) {
                     topics[at] = Some((ItemKind::Topic, topic.name.shared()));
@@ -210,6 +212,9 @@ impl Viewed {
         }
         let mut arrows: BTreeMap<Ends, Vec<(EdgeId, EdgeId)>> = BTreeMap::new();
         let mut pairs = 0;
+        let is_bundled = options.mode == Mode::Bundles;
+        self.publish = vec![Place::Hidden; elements.publishes.len()];
+        self.subscribe = vec![Place::Hidden; elements.subscribes.len()];
         for (edge, publish) in elements.publishes.iter().zip(0..) {
             let at = edge.topic as usize;
             let (Some(from), Some(topic)) = (self.item_of_node(edge.node), elements.topics.get(at))
@@ -218,23 +223,29 @@ impl Viewed {
             };
             let name = topic.name.as_str();
             if self.selection.topics.get(at) != Some(&None)
-                || options.hide.debug && is_debug_label(name)
+                || options.mode == Mode::Nodes && options.hide.debug && is_debug_label(name)
             {
                 continue;
             }
             for (subscribe, to) in subscribers.get(at).into_iter().flatten() {
-                let inside = from == *to && self.is_namespace(from);
-                pairs += usize::from(!inside);
-                if inside || pairs > MOST_PAIRS {
+                if from == *to && self.is_namespace(from) {
+                    self.publish[publish as usize] = Place::Inside(from);
+                    self.subscribe[*subscribe as usize] = Place::Inside(from);
                     continue;
                 }
-                let ends = (from, *to, ArrowKind::Direct(topic.name.shared()));
+                pairs += 1;
+                if pairs > MOST_PAIRS || is_bundled && from == *to {
+                    continue;
+                }
+                let kind = match options.mode {
+                    Mode::Bundles => ArrowKind::Bundle,
+                    _ => ArrowKind::Direct(topic.name.shared()),
+                };
+                let ends = (from, *to, kind);
                 arrows.entry(ends).or_default().push((publish, *subscribe));
             }
         }
         self.dropped = pairs.saturating_sub(MOST_PAIRS);
-        self.publish = vec![Place::Hidden; elements.publishes.len()];
-        self.subscribe = vec![Place::Hidden; elements.subscribes.len()];
         for (ends, pairs) in arrows {
             let publishes = pairs.iter().map(|(p, _)| Element::Publish(*p));
             let others = pairs.iter().map(|(_, s)| Element::Subscribe(*s));
@@ -295,6 +306,36 @@ fn arrow((from, to, kind): Ends, members: Vec<Element>) -> Arrow {
         kind,
         members,
     }
+}
+
+/// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their name.
+/// What several boxes publish is told by the arrows alone.
+fn inside(
+    elements: &Elements,
+    collapse: &Collapse<'_>,
+    nodes: &[Option<Key>],
+    selection: &Selection,
+) -> Vec<Option<Key>> {
+    let mut homes: Vec<BTreeSet<Option<&Key>>> = vec![BTreeSet::new(); elements.topics.len()];
+    for edge in &elements.publishes {
+        let node = nodes.get(edge.node as usize).and_then(Option::as_ref);
+        if let (Some(homes), Some(node)) = (homes.get_mut(edge.topic as usize), node) {
+            homes.insert((node.0 == ItemKind::Namespace).then_some(node));
+        }
+    }
+    let topics = elements.topics.iter().zip(&homes).zip(&selection.topics);
+    let home = |((topic, homes), hidden): ((&Topic, &BTreeSet<Option<&Key>>), &Option<_>)| {
+        let mut homes = homes.iter();
+        match (hidden, homes.next(), homes.next()) {
+            (None, Some(home), None) => home.cloned(),
+            (None, None, _) => {
+                let space = collapse.of(topic.name.as_str())?;
+                Some((ItemKind::Namespace, space.into()))
+            }
+            _ => None,
+        }
+    };
+    topics.map(home).collect()
 }
 
 /// Puts the topics of each group into its box, whose name is made unlike that of every topic.

@@ -10,6 +10,9 @@ use crate::base::error::{Error, Result};
 pub enum Mode {
     /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
     Nodes,
+    /// Nodes and collapsed namespaces only, one arrow from each to each for all topics between them: what is left of a
+    /// graph that no page can hold.
+    Bundles,
     /// Nodes and topics, in each window only what carries messages in it.
     Active,
     /// Nodes and topics, all that is known.
@@ -19,11 +22,23 @@ pub enum Mode {
 
 impl Mode {
     /// The modes by the words of the command line.
-    pub const ALL: [(&'static str, Self); 3] = [
+    pub const ALL: [(&'static str, Self); 4] = [
         ("nodes", Self::Nodes),
+        ("bundles", Self::Bundles),
         ("active", Self::Active),
         ("all", Self::All),
     ];
+
+    /// Its word on the command line.
+    pub fn word(self) -> &'static str {
+        let found = Self::ALL.iter().find(|(_, mode)| *mode == self);
+        found.map_or("", |(word, _)| word)
+    }
+
+    /// Whether arrows run from node to node, over topics that are not drawn.
+    pub(crate) fn is_direct(self) -> bool {
+        matches!(self, Self::Nodes | Self::Bundles)
+    }
 
     /// The mode of this word.
     ///
@@ -33,7 +48,7 @@ impl Mode {
         let found = Self::ALL.iter().find(|(name, _)| *name == word);
         found
             .map(|(_, mode)| *mode)
-            .ok_or_else(|| unknown("mode", word, "nodes, active, all"))
+            .ok_or_else(|| unknown("mode", word, "nodes, bundles, active, all"))
     }
 }
 
@@ -177,6 +192,7 @@ impl Default for Grouping {
 
 /// What the picture shows of the graph.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct ViewOptions {
     /// Boxes and arrows.
     pub mode: Mode,

@@ -11,7 +11,7 @@ use crate::view::{Frame, Mark, Shown, View};
 
 /// From this window on, this value of a table, until the next run of the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Run {
+pub(crate) struct Run {
     /// A place in [`View::frames`].
     pub from: u32,
     /// A place in the table.
@@ -20,7 +20,7 @@ pub struct Run {
 
 /// What becomes of one item or arrow. Lists are sorted by window; before its first run a list has value 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ElementRuns {
+pub(crate) struct ElementRuns {
     /// Its class words: places in [`Runs::classes`].
     pub classes: Vec<Run>,
     /// Its rate: places in [`Runs::labels`]. While it is not there, the last value stays.
@@ -31,7 +31,7 @@ pub struct ElementRuns {
 
 /// The whole sequence of a view as runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Runs {
+pub(crate) struct Runs {
     /// Class words separated by blanks, such as `active`, `active stated added w3`; the first is `off`: not there.
     pub classes: Vec<String>,
     /// Rates and lifecycle states as they are written; the first is empty: not known.
@@ -43,14 +43,14 @@ pub struct Runs {
 }
 
 /// The value of a list in a window, 0 before its first run.
-pub fn at(list: &[Run], window: u32) -> u32 {
+pub(crate) fn at(list: &[Run], window: u32) -> u32 {
     let after = list.partition_point(|run| run.from <= window);
     after.checked_sub(1).map_or(0, |last| list[last].value)
 }
 
 impl Runs {
     /// The runs of a view. `label` writes the rate of an element in a window, empty for none.
-    pub fn of(view: &View, label: impl Fn(&Shown) -> String) -> Self {
+    pub(crate) fn of(view: &View, label: impl Fn(&Shown) -> String) -> Self {
         let mut classes = Table::starting_with(None);
         let mut labels = Table::starting_with(String::new());
         let mut runs = |count, shown: fn(&Frame) -> &[Shown], are_arrows| {
@@ -93,7 +93,7 @@ impl Runs {
 
 impl Runs {
     /// All class words that occur.
-    pub fn words(&self) -> BTreeSet<&str> {
+    pub(crate) fn words(&self) -> BTreeSet<&str> {
         self.classes
             .iter()
             .flat_map(|class| class.split(' '))
@@ -101,7 +101,7 @@ impl Runs {
     }
 
     /// How many elements have a mark of this class in each window in which there are any.
-    pub fn counts(&self, class: &str) -> BTreeMap<u32, usize> {
+    pub(crate) fn counts(&self, class: &str) -> BTreeMap<u32, usize> {
         let has = |words: &String| words.split(' ').any(|word| word == class);
         let marked: Vec<bool> = self.classes.iter().map(has).collect();
         let mut counts = BTreeMap::new();
@@ -160,7 +160,7 @@ impl Class {
 }
 
 /// The class word that tells a mark from all others: the class of its badge.
-pub fn word(mark: Mark) -> &'static str {
+pub(crate) fn word(mark: Mark) -> &'static str {
     match mark {
         Mark::Added => "added",
         Mark::Removed => "removed",
@@ -175,7 +175,7 @@ pub fn word(mark: Mark) -> &'static str {
 }
 
 /// The thickest arrow's step.
-pub const STEPS: u8 = 6;
+pub(crate) const STEPS: u8 = 6;
 
 /// The thickness of an arrow of this rate: a step per half a decade of 1 + Hz, 0..=[`STEPS`].
 fn width_step(hz: Option<f64>) -> u8 {
@@ -190,7 +190,7 @@ fn width_step(hz: Option<f64>) -> u8 {
 }
 
 /// The width of a step's middle, in decades of 1 + Hz.
-pub fn decades(step: u8) -> f64 {
+pub(crate) fn decades(step: u8) -> f64 {
     f64::from(step) / 2.0
 }
 
@@ -295,7 +295,7 @@ fn push(list: &mut Vec<Run>, window: u32, value: u32) {
 }
 
 /// A list as flat numbers: windows since the run before, value, windows since, value, …
-pub fn flat(list: &[Run]) -> Vec<u32> {
+pub(crate) fn flat(list: &[Run]) -> Vec<u32> {
     let mut before = 0;
     let mut out = Vec::with_capacity(list.len() * 2);
     for run in list {

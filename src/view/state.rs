@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::items::{Place, Viewed};
 use super::lives::Alive;
-use super::{Item, ItemKind, Mode, Shown, ViewOptions};
+use super::{ArrowKind, Item, ItemKind, Mode, Shown, ViewOptions};
 use crate::evidence::Degree;
 use crate::graph::{EdgeState, Element, Graph, State, TopicState};
 
@@ -142,7 +142,7 @@ pub(crate) fn present(
 ) -> (States, States) {
     let items = present_items(graph, options, viewed, lives);
     let mut arrows = match options.mode {
-        Mode::Nodes => present_direct(graph, viewed, lives),
+        Mode::Nodes | Mode::Bundles => present_direct(graph, viewed, lives),
         _ => present_arrows(graph, options, viewed, lives),
     };
     for (slot, arrow) in arrows.iter_mut().zip(&viewed.arrows) {
@@ -283,12 +283,21 @@ fn present_direct(graph: &Graph, viewed: &Viewed, lives: (&Alive, &Alive)) -> St
     let topics: BTreeMap<u32, One> = topics(graph, lives).collect();
     let mut arrows = Gather::new(viewed.arrows.len());
     for (pairs, id) in viewed.pairs.iter().zip(0..) {
+        let is_bundle = viewed.arrows.get(id as usize).map(|a| &a.kind) == Some(&ArrowKind::Bundle);
+        let (mut last, mut carried) = (None, BTreeSet::new());
         for (publish, subscribe) in pairs {
             let (Some(p), Some(s)) = (publishes.get(publish), subscribes.get(subscribe)) else {
                 continue;
             };
-            let topic = viewed.subscribed.get(*subscribe as usize);
-            let topic = topic.and_then(|(_, topic)| topics.get(topic));
+            // What several nodes of a box hear comes once.
+            if is_bundle && last.replace(publish) == Some(publish) {
+                continue;
+            }
+            let topic = viewed.subscribed.get(*subscribe as usize).map(|s| s.1);
+            let is_new = topic.is_some_and(|topic| carried.insert(topic));
+            // The rate of the whole topic counts once, however many publish it.
+            let topic = topic.filter(|_| is_new || !is_bundle);
+            let topic = topic.and_then(|topic| topics.get(&topic));
             let joined = One {
                 state: p.state.max(s.state),
                 degree: p.degree.max(s.degree),
@@ -297,6 +306,9 @@ fn present_direct(graph: &Graph, viewed: &Viewed, lives: (&Alive, &Alive)) -> St
                 is_paused: p.is_paused,
             };
             arrows.add(id, &joined);
+        }
+        if let Some(Some(shown)) = arrows.0.get_mut(id as usize).filter(|_| is_bundle) {
+            shown.topics = carried.len();
         }
     }
     arrows.0

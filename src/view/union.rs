@@ -5,7 +5,7 @@ use crate::view::{Counts, Frame, Shown, View};
 
 /// The whole sequence as one window without marks: everything that was ever there, in its liveliest state, with rates
 /// averaged over the whole time and messages summed. `None` for a view without windows.
-pub fn union(view: &View) -> Option<Frame> {
+pub(crate) fn union(view: &View) -> Option<Frame> {
     let (first, last) = (view.frames.first()?, view.frames.last()?);
     let mut items = vec![None; view.items.len()];
     let mut arrows = vec![None; view.arrows.len()];

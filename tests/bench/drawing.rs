@@ -13,13 +13,13 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use bagreel::draw::paint::raster::{Canvas, Painter, Pixels};
-use bagreel::draw::picture::{Measured, PageOptions, Picture};
-use bagreel::draw::scene::Scene;
-use bagreel::draw::style::Style;
-use bagreel::draw::text::Fonts;
-use bagreel::view::{View, ViewOptions, view};
-use bagreel::{layout, mission};
+use bagreel::internals::draw::paint::raster::{Canvas, Painter, Pixels};
+use bagreel::internals::draw::picture::{Measured, PageOptions, Picture};
+use bagreel::internals::draw::scene::Scene;
+use bagreel::internals::draw::style::Style;
+use bagreel::internals::draw::text::Fonts;
+use bagreel::internals::view::{View, ViewOptions, view};
+use bagreel::internals::{layout, mission};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
 use rayon::prelude::*;
@@ -103,7 +103,7 @@ fn run(picture: &Picture<'_>, painter: &Painter, frames: &[usize], threads: usiz
         let mut canvas = Canvas::new(painter, 1.0);
         chunk
             .iter()
-            .map(|k| png(&canvas.draw(&picture.scene(*k)).unwrap()))
+            .map(|k| png(canvas.draw(picture.scene(*k)).unwrap()))
             .sum()
     };
     pool.install(|| frames.par_chunks(30).map(chunk).sum())
@@ -128,14 +128,14 @@ fn over_the_last(picture: &Picture<'_>, painter: &Painter, view: &View) {
     let mut canvas = Canvas::new(painter, 1.0);
     let (mut time, mut drawing, mut count) = (Duration::ZERO, Duration::ZERO, 0);
     let mut last = picture.scene(0);
-    canvas.draw(&last).unwrap();
+    canvas.draw(last.clone()).unwrap();
     for k in 1..picture.len() {
         let start = Instant::now();
         let scene = picture.scene(k);
         let between = Instant::now();
-        let pixels = canvas.draw(&scene).unwrap();
+        let pixels = canvas.draw(scene.clone()).unwrap();
         let end = Instant::now();
-        assert!(pixels == painter.paint(&scene, 1.0).unwrap(), "window {k}");
+        assert!(*pixels == painter.paint(&scene, 1.0).unwrap(), "window {k}");
         if differing(&last, &scene) * 10 < few {
             time += end - start;
             drawing += end - between;
@@ -171,7 +171,7 @@ fn tweens(picture: &Picture<'_>, painter: &Painter) {
         .collect();
     let time = timed(|| {
         for (k, phase) in &steps {
-            canvas.draw(&picture.between(*k, *phase)).unwrap();
+            canvas.draw(picture.between(*k, *phase)).unwrap();
         }
     });
     row("tween, five a window", steps.len(), time);

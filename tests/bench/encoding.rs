@@ -16,17 +16,17 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use bagreel::draw::paint::raster::Painter;
-use bagreel::draw::picture;
-use bagreel::draw::strip::{Source, strip};
-use bagreel::draw::style::Style;
-use bagreel::draw::text::Fonts;
-use bagreel::export::Output;
-use bagreel::export::options::{Choice, Options};
-use bagreel::export::run;
-use bagreel::export::sequence::Sequence;
-use bagreel::view::{ViewOptions, view};
-use bagreel::{layout, mission};
+use bagreel::internals::draw::paint::raster::Painter;
+use bagreel::internals::draw::picture;
+use bagreel::internals::draw::strip::{Source, strip};
+use bagreel::internals::draw::style::Style;
+use bagreel::internals::draw::text::Fonts;
+use bagreel::internals::export::Output;
+use bagreel::internals::export::options::{Choice, Options};
+use bagreel::internals::export::run;
+use bagreel::internals::export::sequence::Sequence;
+use bagreel::internals::view::{ViewOptions, view};
+use bagreel::internals::{layout, mission};
 
 fn main() {
     let mut words = std::env::args().skip(1).filter(|a| a != "--bench");
@@ -93,7 +93,9 @@ fn main() {
         let output = |n: &&str| Output::parse(&folder.join(n).to_string_lossy(), None).unwrap();
         let outputs: Vec<Output> = names.iter().map(output).collect();
         let begin = Instant::now();
-        let written = run::run(&sequence, &outputs, &mut |_, _| ControlFlow::Continue(())).unwrap();
+        let steps = run::Steps::default();
+        let go_on = &mut |_, _| ControlFlow::Continue(());
+        let written = run::run(&sequence, &outputs, &steps, go_on).unwrap();
         (written, begin.elapsed().as_secs_f64() * 1e3)
     };
     if !outputs.is_empty() {

@@ -22,8 +22,8 @@ mod svg;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use bagreel::base::geometry::Size;
-use bagreel::layout::{self, Layout, Orientation};
+use bagreel::internals::base::geometry::Size;
+use bagreel::internals::layout::{self, Layout, Orientation};
 
 use graph::Graph;
 

@@ -20,8 +20,8 @@ use std::process::Command;
 use std::time::Instant;
 
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
-use bagreel::base::notice::Notice;
-use bagreel::base::time::{Span, Stamp};
+use bagreel::internals::base::notice::Notice;
+use bagreel::internals::base::time::{Span, Stamp};
 
 /// What one robot sends: topic, type, messages per second, bytes of each.
 type Stream = (&'static str, &'static str, u32, usize);

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
-use bagreel::base::notice::Notice;
-use bagreel::base::time::Stamp;
-use bagreel::pipeline::{Reading, Unwatched, read};
+use bagreel::internals::base::notice::Notice;
+use bagreel::internals::base::time::Stamp;
+use bagreel::internals::pipeline::{Reading, Unwatched, read};
 
 /// Calls `with` with a file of this name that holds `bytes`, in memory where the system has such a folder.
 pub fn as_file(name: &str, bytes: &[u8], with: impl FnOnce(&Path)) {

@@ -6,10 +6,11 @@ use super::rows::Row;
 use super::source::Source;
 use super::tracks::{Bar, Life};
 use crate::base::time::{Span, Stamp};
+use crate::graph::NodeId;
 
 /// Who lived when, in rows from top to bottom, and the phases.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Course {
+pub(crate) struct Course {
     /// The phases, none if there is only one.
     pub(crate) phases: Vec<Span>,
     pub(crate) rows: Vec<CourseRow>,
@@ -30,6 +31,12 @@ impl Course {
     pub(crate) fn new(source: &Source<'_>, most: usize) -> Self {
         let by_topics = !source.knows_publishers();
         let mut lives = Lives::new(source, by_topics);
+        // By nodes, for a group has another name.
+        let node = |at: usize| lives.tracks.get(at)?.nodes.first().copied();
+        let handed = lives.handovers.iter();
+        let handed: Vec<(Stamp, NodeId, NodeId)> = handed
+            .filter_map(|h| Some((h.at, node(h.from)?, node(h.to)?)))
+            .collect();
         if rows(&lives).len() > most && !by_topics {
             lives = Lives::of(source, groups::tracks(source, &lives.tracks));
         }
@@ -42,12 +49,15 @@ impl Course {
             let mut at = 0..;
             chosen.retain(|_| at.next().is_some_and(|at| kept.contains(&at)));
         }
-        let place = |track: usize| chosen.iter().position(|(all, _)| all.contains(&track));
-        let handovers = lives.handovers.iter();
+        let holds =
+            |all: &[usize], node| all.iter().any(|at| lives.tracks[*at].nodes.contains(&node));
+        let place = |node| chosen.iter().position(|(all, _)| holds(all, node));
         Self {
             phases: source.phases.iter().map(|p| p.span).collect(),
-            handovers: handovers
-                .filter_map(|h| Some((h.at, place(h.from)?, place(h.to)?)))
+            handovers: handed
+                .into_iter()
+                .filter_map(|(at, from, to)| Some((at, place(from)?, place(to)?)))
+                .filter(|(_, from, to)| from != to)
                 .collect(),
             rows: chosen.into_iter().map(|(_, row)| row).collect(),
         }

@@ -3,13 +3,13 @@
 
 mod css;
 
-pub use css::{base, rules, states, variables};
+pub(crate) use css::{base, rules, states, variables};
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use crate::base::geometry::Point;
-use crate::draw::paint::xml::{escape, units};
+use crate::draw::paint::xml::{Xml, units};
 use crate::draw::picture::{Part, Union};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
@@ -19,7 +19,7 @@ use crate::view::{Mark, View};
 
 /// How much is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Detail {
+pub(crate) struct Detail {
     /// Coordinates to a tenth of a pixel, not whole pixels.
     pub is_fine: bool,
     /// Names, as attributes and for hovering.
@@ -28,7 +28,7 @@ pub struct Detail {
 
 /// A graph in SVG.
 #[derive(Debug)]
-pub struct Classes<'a> {
+pub(crate) struct Classes<'a> {
     view: &'a View,
     union: &'a Union,
     style: &'a Style,
@@ -36,20 +36,18 @@ pub struct Classes<'a> {
 }
 
 /// What stands inside the group of an element before and after its drawing.
-pub trait ElementLook {
+pub(crate) trait ElementLook {
     /// The words of its class attribute, after `node`, `topic` or `edge`.
     fn class(&self) -> String;
     /// What its live text says.
     fn text(&self) -> String;
-    /// More elements inside it, such as animations.
-    fn more(&self) -> String {
-        String::new()
-    }
+    /// Writes more elements inside it, such as animations.
+    fn more(&self, _xml: &mut Xml) {}
 }
 
 impl<'a> Classes<'a> {
-    /// The stage of a view whose union is `union`.
-    pub fn new(view: &'a View, union: &'a Union, style: &'a Style, detail: Detail) -> Self {
+    /// The graph of a view whose union is `union`.
+    pub(crate) fn new(view: &'a View, union: &'a Union, style: &'a Style, detail: Detail) -> Self {
         Self {
             view,
             union,
@@ -59,12 +57,12 @@ impl<'a> Classes<'a> {
     }
 
     /// The definitions of the badges that occur, `<symbol>`s without colours of their own.
-    pub fn signs(&self) -> String {
+    pub(crate) fn signs(&self, xml: &mut Xml) {
         let parts = self.union.items.iter().chain(&self.union.arrows);
         let marks: BTreeSet<Mark> = parts.flat_map(|p| p.marks.iter().copied()).collect();
-        let mut out = String::from("<defs>");
+        xml.open("defs");
         for mark in marks {
-            let _ = write!(out, "<g id=\"{}\">", word(mark));
+            xml.open("g").attribute("id", word(mark));
             for (at, piece) in crate::draw::picture::sign(self.style, mark)
                 .pieces
                 .iter()
@@ -73,52 +71,51 @@ impl<'a> Classes<'a> {
                 let Piece::Shape(shape) = piece else { continue };
                 let pen = if shape.stroke.width > 0.0 { "p" } else { "f" };
                 let class = if at == 0 { "b" } else { pen };
-                fine(&mut out, &shape.form, class);
+                fine(xml, &shape.form, class);
             }
-            out.push_str("</g>");
+            xml.close();
         }
-        out.push_str("</defs>");
-        out
+        xml.close();
     }
 
     /// The boxes around namespaces.
-    pub fn spaces(&self, out: &mut String) {
+    pub(crate) fn spaces(&self, xml: &mut Xml) {
         for space in &self.union.spaces {
-            out.push_str("<g class=\"namespace\">");
-            self.pieces(out, space, None);
-            out.push_str("</g>\n");
+            xml.open("g").attribute("class", "namespace");
+            self.pieces(xml, space, None);
+            xml.close().raw("\n");
         }
     }
 
     /// The arrow at this place of the view.
-    pub fn arrow(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
+    pub(crate) fn arrow(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, arrow) = (&self.union.arrows[at], &self.view.arrows[at]);
         let name = |id: u32| &*self.view.items[id as usize].name;
         let ends = [("from", name(arrow.from)), ("to", name(arrow.to))];
         let what = format!("edge {}", arrow.kind.word());
-        self.element(out, part, &what, &ends, dress, 0.8);
+        self.element(xml, part, &what, &ends, look, 0.8);
     }
 
     /// The item at this place of the view.
-    pub fn item(&self, out: &mut String, at: usize, dress: &dyn ElementLook) {
+    pub(crate) fn item(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, item) = (&self.union.items[at], &self.view.items[at]);
         self.element(
-            out,
+            xml,
             part,
             item.kind.word(),
             &[("name", &item.name)],
-            dress,
+            look,
             1.0,
         );
     }
 
     fn element(
         &self,
-        out: &mut String,
+        xml: &mut Xml,
         part: &Part,
         what: &str,
         data: &[(&str, &str)],
-        dress: &dyn ElementLook,
+        look: &dyn ElementLook,
         scale: f64,
     ) {
         let what = if self.detail.has_names {
@@ -126,40 +123,37 @@ impl<'a> Classes<'a> {
         } else {
             what.split(' ').next().unwrap_or(what)
         };
-        let class = format!("{what} {}", dress.class());
-        let _ = write!(out, "<g class=\"{}\"", class.trim_end());
+        let class = format!("{what} {}", look.class());
+        xml.open("g").attribute("class", class.trim_end());
         if self.detail.has_names {
             for (key, value) in data {
-                let _ = write!(out, " data-{key}=\"");
-                escape(out, value);
-                out.push('"');
+                xml.attribute(format_args!("data-{key}"), value);
             }
         }
-        out.push('>');
-        out.push_str(&dress.more());
-        let text = dress.text();
+        look.more(xml);
+        let text = look.text();
         let class = if part.tells_changes { "r c" } else { "r" };
-        self.pieces(out, &part.group, part.is_live.then_some((class, &text)));
+        self.pieces(xml, &part.group, part.is_live.then_some((class, &text)));
         for mark in &part.marks {
             let word = word(*mark);
             let Point { x, y } = part.badge;
-            let _ = write!(out, "<use href=\"#{word}\" class=\"{word}\" ");
+            xml.open("use")
+                .attribute("href", format_args!("#{word}"))
+                .attribute("class", word);
+            let (x, y) = (whole(x), whole(y));
             if scale < 1.0 {
-                let _ = write!(
-                    out,
-                    "transform=\"translate({} {}) scale({scale})\"/>",
-                    whole(x),
-                    whole(y)
-                );
+                let place = format_args!("translate({x} {y}) scale({scale})");
+                xml.attribute("transform", place);
             } else {
-                let _ = write!(out, "x=\"{}\" y=\"{}\"/>", whole(x), whole(y));
+                xml.attribute("x", x).attribute("y", y);
             }
+            xml.close_empty();
         }
-        out.push_str("</g>\n");
+        xml.close().raw("\n");
     }
 
     /// Shapes and texts. `live` is what the last text says in place of its own words.
-    fn pieces(&self, out: &mut String, group: &Group, live: Option<(&str, &String)>) {
+    fn pieces(&self, xml: &mut Xml, group: &Group, live: Option<(&str, &String)>) {
         let texts = group
             .pieces
             .iter()
@@ -168,25 +162,29 @@ impl<'a> Classes<'a> {
         let mut seen = 0;
         for piece in &group.pieces {
             match piece {
-                Piece::Shape(shape) => self.form(out, &shape.form),
+                Piece::Shape(shape) => self.form(xml, &shape.form),
                 Piece::Text(text) => {
                     seen += 1;
                     let live = live.filter(|_| seen == texts);
                     let class = match (live, seen) {
-                        (Some((class, _)), _) => format!(" class=\"{class}\""),
-                        (None, 2..) => " class=\"m\"".to_owned(),
-                        _ => String::new(),
+                        (Some((class, _)), _) => Some(class),
+                        (None, 2..) => Some("m"),
+                        _ => None,
                     };
-                    let Point { x, y } = text.at;
-                    let _ = write!(out, "<text{class} x=\"{}\" y=\"{}\">", whole(x), whole(y));
-                    escape(out, live.map_or(&text.text, |(_, words)| words));
-                    out.push_str("</text>");
+                    xml.open("text");
+                    if let Some(class) = class {
+                        xml.attribute("class", class);
+                    }
+                    xml.attribute("x", whole(text.at.x))
+                        .attribute("y", whole(text.at.y))
+                        .text(live.map_or(&text.text, |(_, words)| words))
+                        .close();
                 }
             }
         }
     }
 
-    fn form(&self, out: &mut String, form: &Form) {
+    fn form(&self, xml: &mut Xml, form: &Form) {
         let n = |v: f64| {
             if self.detail.is_fine {
                 tenth(v)
@@ -194,32 +192,25 @@ impl<'a> Classes<'a> {
                 whole(v).to_string()
             }
         };
-        let _ = match form {
+        match form {
             Form::Rect(r, radius) => {
                 // Edges are rounded, not lengths, so that what touches goes on touching.
-                let (w, h) = (n(r.right() - r.x), n(r.bottom() - r.y));
-                let radius = if *radius > 0.0 {
-                    format!(" rx=\"{}\"", tenth(*radius))
-                } else {
-                    String::new()
-                };
-                write!(
-                    out,
-                    "<rect x=\"{}\" y=\"{}\" width=\"{w}\" height=\"{h}\"{radius}/>",
-                    n(r.x),
-                    n(r.y)
-                )
+                xml.open("rect")
+                    .attribute("x", n(r.x))
+                    .attribute("y", n(r.y))
+                    .attribute("width", n(r.right() - r.x))
+                    .attribute("height", n(r.bottom() - r.y));
+                if *radius > 0.0 {
+                    xml.attribute("rx", tenth(*radius));
+                }
             }
             Form::Ellipse(r) => {
                 let c = r.centre();
-                write!(
-                    out,
-                    "<ellipse cx=\"{}\" cy=\"{}\" rx=\"{}\" ry=\"{}\"/>",
-                    n(c.x),
-                    n(c.y),
-                    n(r.w / 2.0),
-                    n(r.h / 2.0)
-                )
+                xml.open("ellipse")
+                    .attribute("cx", n(c.x))
+                    .attribute("cy", n(c.y))
+                    .attribute("rx", n(r.w / 2.0))
+                    .attribute("ry", n(r.h / 2.0));
             }
             Form::Path(steps) => {
                 let is_head = matches!(steps.last(), Some(Step::Close));
@@ -228,24 +219,32 @@ impl<'a> Classes<'a> {
                 } else {
                     1
                 };
-                write!(out, "<path d=\"{}\"/>", path(steps, parts))
+                xml.open("path").attribute("d", path(steps, parts));
             }
-        };
+        }
+        xml.close_empty();
     }
 }
 
-fn fine(out: &mut String, form: &Form, class: &str) {
-    let _ = match form {
-        Form::Ellipse(r) => write!(
-            out,
-            "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
-            tenth(r.centre().x),
-            tenth(r.centre().y),
-            tenth(r.w / 2.0)
-        ),
-        Form::Path(steps) => write!(out, "<path class=\"{class}\" d=\"{}\"/>", path(steps, 10)),
-        Form::Rect(..) => Ok(()),
-    };
+/// A badge's shape, to a tenth of a pixel.
+fn fine(xml: &mut Xml, form: &Form, class: &str) {
+    match form {
+        Form::Ellipse(r) => {
+            xml.open("circle")
+                .attribute("class", class)
+                .attribute("cx", tenth(r.centre().x))
+                .attribute("cy", tenth(r.centre().y))
+                .attribute("r", tenth(r.w / 2.0))
+                .close_empty();
+        }
+        Form::Path(steps) => {
+            xml.open("path")
+                .attribute("class", class)
+                .attribute("d", path(steps, 10))
+                .close_empty();
+        }
+        Form::Rect(..) => {}
+    }
 }
 
 /// Rounds to whole pixels; what is no number becomes 0.
@@ -378,8 +377,7 @@ impl Pen {
 
 /// How much changed, window by window, as paths in a box 60 high and a window wide for each: what was added above the
 /// line in the middle, what was removed below it, what changed on the ground.
-pub(crate) fn bars(runs: &Runs) -> String {
-    let mut out = String::new();
+pub(crate) fn bars(xml: &mut Xml, runs: &Runs) {
     for (kind, base, up) in [
         ("added", 30.0, -1.0),
         ("removed", 30.0, 1.0),
@@ -387,16 +385,18 @@ pub(crate) fn bars(runs: &Runs) -> String {
     ] {
         let counts = runs.counts(kind);
         let most = counts.values().max().copied().unwrap_or(1) as f64;
-        let _ = write!(out, "<path class=\"{kind}\" d=\"");
+        let mut bars = String::new();
         for (window, count) in counts {
             // Logarithms, so that one change is seen beside a hundred.
             let part = libm::log(count as f64) / libm::log(most.max(9.0));
             let height = up * libm::round(6.0 + 20.0 * part);
-            let _ = write!(out, "M{window} {base}h1v{height}h-1z");
+            let _ = write!(bars, "M{window} {base}h1v{height}h-1z");
         }
-        out.push_str("\"/>");
+        xml.open("path")
+            .attribute("class", kind)
+            .attribute("d", bars)
+            .close_empty();
     }
-    out
 }
 
 #[cfg(test)]

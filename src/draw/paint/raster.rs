@@ -6,8 +6,8 @@ mod tiles;
 use std::collections::HashMap;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use resvg::tiny_skia::{self, Pixmap, Transform};
 use resvg::usvg::{self, Tree, fontdb};
+use tiny_skia::{PixmapMut, Transform};
 
 pub use self::canvas::Canvas;
 use self::tiles::Tiles;
@@ -32,8 +32,9 @@ pub struct Pixels {
 const MOST_SIDE: f64 = 65_535.0;
 /// The most pixels in a picture: 256 MB of memory.
 const MOST_PIXELS: f64 = 64e6;
-/// How many drawn groups are kept, so that the next frame need not read their SVG again.
-const MOST_KEPT: usize = 20_000;
+/// How many drawn groups are kept twice over, so that a later frame need not read their SVG again: more than a page
+/// holds, few enough for 20 MB.
+const MOST_KEPT: usize = 1000;
 
 /// A group, read once: its tree and the tiles of the page that it may touch.
 struct Drawn {
@@ -45,7 +46,27 @@ struct Drawn {
 pub struct Painter {
     options: usvg::Options<'static>,
     fonts: Fonts,
-    kept: RwLock<HashMap<String, Arc<Drawn>>>,
+    kept: RwLock<Kept>,
+}
+
+/// Drawn groups by their SVG: those of late, and those that were of late before them.
+#[derive(Default)]
+struct Kept {
+    new: HashMap<String, Arc<Drawn>>,
+    old: HashMap<String, Arc<Drawn>>,
+}
+
+impl Kept {
+    fn get(&self, text: &str) -> Option<Arc<Drawn>> {
+        self.new.get(text).or_else(|| self.old.get(text)).cloned()
+    }
+
+    fn insert(&mut self, text: String, drawn: Arc<Drawn>) {
+        if self.new.len() >= MOST_KEPT {
+            self.old = std::mem::take(&mut self.new);
+        }
+        self.new.insert(text, drawn);
+    }
 }
 
 impl Painter {
@@ -76,7 +97,7 @@ impl Painter {
     pub fn paint(&self, scene: &Scene, scale: f64) -> Result<Pixels> {
         let read = |group| self.read(scene, group);
         let drawn: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
-        Ok(Sheet::covered(scene, &drawn, scale)?.into_pixels())
+        Ok(Sheet::covered(scene, &drawn, scale)?.pixels)
     }
 
     /// The group's tree, from memory where it was drawn before.
@@ -84,7 +105,7 @@ impl Painter {
         let text = svg::write_alone(scene, group);
         let known = self.kept.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(drawn) = known.get(&text) {
-            return Ok(Arc::clone(drawn));
+            return Ok(drawn);
         }
         drop(known);
         let tree = Tree::from_str(&text, &self.options).map_err(|e| {
@@ -98,9 +119,6 @@ impl Painter {
         let tiles = Tiles::under(group, scene.size, &self.fonts);
         let drawn = Arc::new(Drawn { tree, tiles });
         let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
-        if kept.len() >= MOST_KEPT {
-            kept.clear();
-        }
         kept.insert(text, Arc::clone(&drawn));
         Ok(drawn)
     }
@@ -108,7 +126,8 @@ impl Painter {
 
 /// A sheet of pixels to draw on.
 struct Sheet {
-    map: Pixmap,
+    /// All of them opaque, so that what tiny-skia calls premultiplied is plain.
+    pixels: Pixels,
     scale: f64,
 }
 
@@ -119,20 +138,27 @@ impl Sheet {
             libm::round(scene.size.w * scale),
             libm::round(scene.size.h * scale),
         );
-        let fits = w >= 1.0 && h >= 1.0 && w <= MOST_SIDE && h <= MOST_SIDE && w * h <= MOST_PIXELS;
+        if !(w >= 1.0 && h >= 1.0 && w <= MOST_SIDE && h <= MOST_SIDE && w * h <= MOST_PIXELS) {
+            let hint =
+                "give `--size` at most 65535 a side and 64 million pixels, such as `1920x1080`";
+            return Err(Error::usage(
+                format!("cannot draw a picture of {w} x {h} pixels"),
+                hint,
+            ));
+        }
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "at most 65,535, checked above"
         )]
-        let map = fits.then(|| Pixmap::new(w as u32, h as u32)).flatten();
-        let mut map = map.ok_or_else(|| {
-            let hint =
-                "give `--size` at most 65535 a side and 64 million pixels, such as `1920x1080`";
-            Error::usage(format!("cannot draw a picture of {w} x {h} pixels"), hint)
-        })?;
-        map.fill(opaque(scene.background));
-        Ok(Self { map, scale })
+        let (width, height) = (w as u32, h as u32);
+        let rgba = opaque(scene.background).repeat(width as usize * height as usize);
+        let pixels = Pixels {
+            width,
+            height,
+            rgba,
+        };
+        Ok(Self { pixels, scale })
     }
 
     /// A sheet with the whole scene on it.
@@ -144,27 +170,36 @@ impl Sheet {
         Ok(sheet)
     }
 
+    /// Draws the whole scene over what was there.
+    fn cover(&mut self, scene: &Scene, drawn: &[Arc<Drawn>]) {
+        let background = opaque(scene.background);
+        for pixel in self.pixels.rgba.chunks_exact_mut(4) {
+            pixel.copy_from_slice(&background);
+        }
+        for group in drawn {
+            self.draw(group);
+        }
+    }
+
     fn draw(&mut self, drawn: &Drawn) {
         #[expect(clippy::cast_possible_truncation, reason = "a scale near 1")]
         let scale = self.scale as f32;
         let transform = Transform::from_scale(scale, scale);
-        resvg::render(&drawn.tree, transform, &mut self.map.as_mut());
-    }
-
-    /// Every pixel is opaque, so what tiny-skia calls premultiplied is plain.
-    fn into_pixels(self) -> Pixels {
-        Pixels {
-            width: self.map.width(),
-            height: self.map.height(),
-            rgba: self.map.take(),
+        let Pixels {
+            width,
+            height,
+            rgba,
+        } = &mut self.pixels;
+        if let Some(mut map) = PixmapMut::from_bytes(rgba, *width, *height) {
+            resvg::render(&drawn.tree, transform, &mut map);
         }
     }
 }
 
-/// The colour as a background: white where it is none.
-fn opaque(color: Color) -> tiny_skia::Color {
+/// The colour as a background pixel: white where it is none.
+fn opaque(color: Color) -> [u8; 4] {
     let [r, g, b] = color.rgb().unwrap_or([255; 3]);
-    tiny_skia::Color::from_rgba8(r, g, b, 255)
+    [r, g, b, 255]
 }
 
 #[cfg(test)]

@@ -1,44 +1,18 @@
 //! A scene as SVG text: the only painter for screens.
 
-use std::fmt::{self, Display, Write as _};
+use std::fmt::{self, Display};
 
 use super::xml::{Xml, hundredth, tenth};
-use crate::base::digest::base64;
 use crate::draw::scene::{Anchor, Form, Group, Piece, Scene, Shape, Step, Stroke, Text};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
 
 /// The scene as one SVG document: UTF-8, a line per group, coordinates rounded to a tenth of a pixel, names escaped.
-pub fn write(scene: &Scene) -> String {
-    document(scene, "")
-}
-
-/// The same with the bundled font inside, so that it looks the same where Inter is not installed (125 KB more).
-pub fn write_with_fonts(scene: &Scene) -> String {
-    let mut css = String::new();
-    for (weight, data) in [
-        (400, crate::draw::text::REGULAR),
-        (600, crate::draw::text::SEMIBOLD),
-    ] {
-        let _ = write!(
-            css,
-            "@font-face{{font-family:{};font-weight:{weight};src:url(data:font/ttf;base64,",
-            Fonts::FAMILY
-        );
-        base64(&mut css, data);
-        css.push_str(")}");
-    }
-    document(scene, &css)
-}
-
-fn document(scene: &Scene, css: &str) -> String {
-    let mut xml = Xml::with_capacity(4096 + css.len() + scene.groups.len() * 512);
+pub(crate) fn write(scene: &Scene) -> String {
+    let mut xml = Xml::with_capacity(4096 + scene.groups.len() * 512);
     open(&mut xml, scene);
     if !scene.title.is_empty() {
         xml.leaf("title", &scene.title).raw("\n");
-    }
-    if !css.is_empty() {
-        xml.open("style").raw(css).close().raw("\n");
     }
     if scene.background != Color::NONE {
         xml.open("rect")
@@ -283,20 +257,6 @@ mod tests {
         assert!(
             write(&scene).contains("width=\"88mm\" height=\"52.9mm\" viewBox=\"0 0 332.6 200\"")
         );
-    }
-
-    #[test]
-    fn the_font_can_travel_with_the_picture() {
-        let scene = Scene {
-            size: Size::new(1.0, 1.0),
-            width_mm: None,
-            background: Color::NONE,
-            title: String::new(),
-            groups: Vec::new(),
-        };
-        assert!(write_with_fonts(&scene).contains(
-            "@font-face{font-family:Inter;font-weight:600;src:url(data:font/ttf;base64,AAEAAA"
-        ));
     }
 
     #[test]

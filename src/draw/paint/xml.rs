@@ -116,7 +116,7 @@ impl fmt::Write for Escaped<'_> {
 
 /// `text` for use between tags and in attributes; what XML cannot hold is spelled out, and what would hide or turn round
 /// the page's own text is written as a number.
-pub(crate) fn escape(out: &mut String, text: &str) {
+fn escape(out: &mut String, text: &str) {
     for c in text.chars() {
         match c {
             '&' => out.push_str("&amp;"),

@@ -63,6 +63,19 @@ pub(crate) fn inside(counts: &Counts) -> String {
     told.collect::<Vec<_>>().join(", ")
 }
 
+/// What happened on a bundle, in few characters: `+4 −3 ±2`, what came, went and changed.
+pub(crate) fn came_and_went(counts: &Counts) -> String {
+    let parts = [
+        ('+', counts.came()),
+        ('−', counts.went()),
+        ('±', counts.changed()),
+    ];
+    let told = parts.into_iter().filter(|(_, n)| *n > 0);
+    told.map(|(sign, n)| format!("{sign}{n}"))
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
 /// The rate in a window with no more digits than its messages allow; `None` for none.
 pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
     let hz = shown.hz.filter(|hz| *hz > 0.0)?;

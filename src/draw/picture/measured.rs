@@ -285,10 +285,13 @@ pub(crate) fn arrow_label(
     if shown.mark == Some(Mark::Removed) {
         return None;
     }
-    let topic = match &arrow.kind {
-        ArrowKind::Direct(topic) => format!("{topic} "),
-        _ => String::new(),
-    };
+    let topic = arrow.carries(shown).map_or_else(String::new, |t| t + " ");
+    if arrow.kind == ArrowKind::Bundle {
+        let inside = shown.inside.as_deref().map(chips::came_and_went);
+        let parts = [chips::rate_in(shown), inside];
+        let text = topic + &parts.map(Option::unwrap_or_default).join(" ");
+        return Some((text.trim_end().to_owned(), shown.mark.is_some()));
+    }
     if let Some((before, now)) = shown.rates {
         return Some((topic + &words::rate_change(before, now), true));
     }
@@ -301,7 +304,7 @@ pub(crate) fn arrow_label(
             let differs = (hz - of_topic).abs() > OWN_RATE * of_topic.max(hz);
             rate.filter(|_| differs).map(|rate| (rate, false))
         }
-        ArrowKind::Direct(_) => {
+        ArrowKind::Direct(_) | ArrowKind::Bundle => {
             let rate = rate.unwrap_or_default();
             Some(((topic + &rate).trim_end().to_owned(), false))
         }

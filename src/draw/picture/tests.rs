@@ -194,7 +194,7 @@ fn frames_drawn_one_over_the_other_equal_frames_drawn_anew() {
         for (k, phase) in steps {
             let scene = p.between(k, phase);
             assert!(
-                canvas.draw(&scene).unwrap() == painter.paint(&scene, 1.0).unwrap(),
+                *canvas.draw(scene.clone()).unwrap() == painter.paint(&scene, 1.0).unwrap(),
                 "{k} {phase}"
             );
         }

@@ -10,7 +10,7 @@ use crate::base::time::Stamp;
 
 /// A payload that does not hold what was asked of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Malformed {
+pub(crate) struct Malformed {
     /// Where, in bytes from the payload's start.
     pub at: usize,
     /// What should stand there.
@@ -24,11 +24,11 @@ impl fmt::Display for Malformed {
 }
 
 /// What every reading function returns.
-pub type Result<T> = std::result::Result<T, Malformed>;
+pub(crate) type Result<T> = std::result::Result<T, Malformed>;
 
 /// A place in a payload.
 #[derive(Clone, Debug)]
-pub struct Cursor<'a> {
+pub(crate) struct Cursor<'a> {
     data: &'a [u8],
     at: usize,
     /// Where alignment counts from; `None` where nothing is aligned (ROS 1).
@@ -41,7 +41,7 @@ impl<'a> Cursor<'a> {
     ///
     /// # Errors
     /// For an encoding that is neither ROS 1 nor plain CDR (XCDR1).
-    pub fn new(encoding: &Encoding, data: &'a [u8]) -> Result<Self> {
+    pub(crate) fn new(encoding: &Encoding, data: &'a [u8]) -> Result<Self> {
         match encoding {
             Encoding::Ros1 => Ok(Self::ros1(data)),
             Encoding::Cdr => Self::cdr(data),
@@ -53,7 +53,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A cursor over a ROS 1 payload.
-    pub fn ros1(data: &'a [u8]) -> Self {
+    pub(crate) fn ros1(data: &'a [u8]) -> Self {
         Self {
             data,
             at: 0,
@@ -66,7 +66,7 @@ impl<'a> Cursor<'a> {
     ///
     /// # Errors
     /// Unless the header says plain CDR of either byte order.
-    pub fn cdr(data: &'a [u8]) -> Result<Self> {
+    pub(crate) fn cdr(data: &'a [u8]) -> Result<Self> {
         match data {
             [0, kind @ (0 | 1), _, _, ..] => Ok(Self {
                 data,
@@ -82,12 +82,12 @@ impl<'a> Cursor<'a> {
     }
 
     /// Whether this is CDR.
-    pub fn is_cdr(&self) -> bool {
+    pub(crate) fn is_cdr(&self) -> bool {
         self.origin.is_some()
     }
 
     /// Bytes left.
-    pub fn remaining(&self) -> usize {
+    pub(crate) fn remaining(&self) -> usize {
         self.data.len() - self.at
     }
 
@@ -95,7 +95,7 @@ impl<'a> Cursor<'a> {
     ///
     /// # Errors
     /// If more is left.
-    pub fn finish(&self) -> Result<()> {
+    pub(crate) fn finish(&self) -> Result<()> {
         let allowed = if self.is_cdr() { 3 } else { 0 };
         if self.remaining() > allowed {
             return Err(self.wrong("the end"));
@@ -104,7 +104,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The error for `expected` here.
-    pub fn wrong(&self, expected: &'static str) -> Malformed {
+    pub(crate) fn wrong(&self, expected: &'static str) -> Malformed {
         Malformed {
             at: self.at,
             expected,
@@ -112,7 +112,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next `len` bytes.
-    pub fn bytes(&mut self, len: usize) -> Result<&'a [u8]> {
+    pub(crate) fn bytes(&mut self, len: usize) -> Result<&'a [u8]> {
         let end = self.at.checked_add(len);
         let part = end.and_then(|end| self.data.get(self.at..end));
         let part = part.ok_or(self.wrong("more bytes"))?;
@@ -137,52 +137,42 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next byte.
-    pub fn u8(&mut self) -> Result<u8> {
+    pub(crate) fn u8(&mut self) -> Result<u8> {
         self.number().map(u8::from_le_bytes)
     }
 
-    /// The next byte as a truth value.
-    pub fn bool(&mut self) -> Result<bool> {
-        Ok(self.u8()? != 0)
-    }
-
     /// The next 16 bits.
-    pub fn u16(&mut self) -> Result<u16> {
+    pub(crate) fn u16(&mut self) -> Result<u16> {
         self.number().map(u16::from_le_bytes)
     }
 
     /// The next 32 bits.
-    pub fn u32(&mut self) -> Result<u32> {
+    pub(crate) fn u32(&mut self) -> Result<u32> {
         self.number().map(u32::from_le_bytes)
     }
 
     /// The next 32 bits, signed.
-    pub fn i32(&mut self) -> Result<i32> {
+    pub(crate) fn i32(&mut self) -> Result<i32> {
         self.number().map(i32::from_le_bytes)
     }
 
     /// The next 64 bits.
-    pub fn u64(&mut self) -> Result<u64> {
+    pub(crate) fn u64(&mut self) -> Result<u64> {
         self.number().map(u64::from_le_bytes)
     }
 
     /// The next 64 bits, signed.
-    pub fn i64(&mut self) -> Result<i64> {
+    pub(crate) fn i64(&mut self) -> Result<i64> {
         self.number().map(i64::from_le_bytes)
     }
 
-    /// The next 32 bits as a floating point number.
-    pub fn f32(&mut self) -> Result<f32> {
-        self.number().map(f32::from_le_bytes)
-    }
-
     /// The next 64 bits as a floating point number.
-    pub fn f64(&mut self) -> Result<f64> {
+    pub(crate) fn f64(&mut self) -> Result<f64> {
         self.number().map(f64::from_le_bytes)
     }
 
     /// The next time: seconds and nanoseconds of 32 bits each.
-    pub fn time(&mut self) -> Result<Stamp> {
+    pub(crate) fn time(&mut self) -> Result<Stamp> {
         Ok(Stamp::from_ros(self.u32()?, self.u32()?))
     }
 
@@ -203,7 +193,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next string; bytes that are no UTF-8 are an error.
-    pub fn string(&mut self) -> Result<&'a str> {
+    pub(crate) fn string(&mut self) -> Result<&'a str> {
         let text = self.text()?;
         std::str::from_utf8(text).map_err(|_| self.wrong("text in UTF-8"))
     }
@@ -222,13 +212,13 @@ impl<'a> Cursor<'a> {
     }
 
     /// Like [`Cursor::string`], stepping over it without a look at its bytes.
-    pub fn skip_string(&mut self) -> Result<()> {
+    pub(crate) fn skip_string(&mut self) -> Result<()> {
         let len = self.u32()? as usize;
         self.bytes(len).map(drop)
     }
 
     /// The length of the next sequence, whose elements take `least` bytes or more each.
-    pub fn length(&mut self, least: usize) -> Result<usize> {
+    pub(crate) fn length(&mut self, least: usize) -> Result<usize> {
         let count = self.u32()? as usize;
         if count.saturating_mul(least.max(1)) > self.remaining() {
             return Err(self.wrong("as many elements as the sequence announces"));
@@ -237,7 +227,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Steps over a `std_msgs/Header`; the sequence number in ROS 1, 0 in ROS 2.
-    pub fn header(&mut self) -> Result<u32> {
+    pub(crate) fn header(&mut self) -> Result<u32> {
         let seq = if self.is_cdr() { 0 } else { self.u32()? };
         self.time()?;
         self.skip_string()?;

@@ -9,7 +9,7 @@ use crate::base::time::Stamp;
 
 /// One time out of several sequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timed {
+pub(crate) struct Timed {
     /// When.
     pub time: Stamp,
     /// The place of its sequence among those asked for.
@@ -31,7 +31,11 @@ impl Stamps {
     ///
     /// # Errors
     /// If the unnamed file cannot be read.
-    pub fn merge(&mut self, ids: &[SeriesId], mut each: impl FnMut(Timed)) -> io::Result<()> {
+    pub(crate) fn merge(
+        &mut self,
+        ids: &[SeriesId],
+        mut each: impl FnMut(Timed),
+    ) -> io::Result<()> {
         let mut waiting = self.blocks(ids);
         let mut open: BinaryHeap<Reverse<Open>> = BinaryHeap::new();
         loop {

@@ -1,10 +1,8 @@
 //! What changed as a table of HTML, for readers without scripts, for paper, and for links into the mission.
 
-use std::fmt::Write as _;
-
 use crate::base::words;
 use crate::base::words::visible;
-use crate::draw::paint::xml::escape;
+use crate::draw::paint::xml::Xml;
 use crate::view::{Frame, View};
 
 /// More windows with changes than this are counted.
@@ -29,21 +27,22 @@ pub(super) fn summary(view: &View) -> String {
 
 /// A row per window with changes: its time as a link, and what changed in words.
 pub(super) fn rows(view: &View) -> String {
-    let mut out = String::new();
+    let mut xml = Xml::default();
     let Some(start) = view.frames.first().map(|f| f.span.start) else {
-        return out;
+        return String::new();
     };
     for frame in view.frames.iter().filter(|f| is_told(f)).take(MOST_ROWS) {
-        let at = frame.span.start.since(start);
-        let millis = at / 1_000_000;
+        let millis = frame.span.start.since(start) / 1_000_000;
         let secs = millis as f64 / 1e3;
-        let _ = write!(
-            out,
-            "<tr><th><a href=\"#t={secs}\">{}</a><td>",
-            words::offset(millis * 1_000_000)
-        );
-        escape(&mut out, &visible(&frame.words(MOST_PHRASES)));
-        out.push('\n');
+        xml.open("tr").open("th").open("a");
+        xml.attribute("href", format_args!("#t={secs}"));
+        xml.text(&words::offset(millis * 1_000_000)).close().close();
+        let what = frame.words(MOST_PHRASES);
+        xml.open("td")
+            .text(&visible(&what))
+            .close()
+            .close()
+            .raw("\n");
     }
-    out
+    xml.finish()
 }

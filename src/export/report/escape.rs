@@ -8,7 +8,7 @@ use crate::base::words::visible;
 const LONGEST: usize = 600;
 
 /// `text` as it is, in one line of Markdown or a cell of a table.
-pub(super) fn plain(text: &str) -> String {
+pub(crate) fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 16);
     let shown = visible(text);
     let mut chars = shown.chars().take(LONGEST).peekable();
@@ -38,7 +38,7 @@ pub(super) fn plain(text: &str) -> String {
 }
 
 /// A name in a cell of a table: as code where it is made of harmless characters.
-pub(super) fn code(name: &str) -> String {
+pub(crate) fn code(name: &str) -> String {
     let harmless = |c: char| c.is_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | '~' | ':');
     let is_name = !name.is_empty() && name.len() <= LONGEST && name.chars().all(harmless);
     if is_name {
@@ -49,7 +49,7 @@ pub(super) fn code(name: &str) -> String {
 }
 
 /// An address inside `<…>`.
-pub(super) fn address(url: &str) -> String {
+pub(crate) fn address(url: &str) -> String {
     let mut out = String::new();
     for c in visible(url).chars() {
         match c {

@@ -1,170 +1,269 @@
-//! Those who draw: a canvas per core, and one palette from a few frames, which are kept so that none is drawn twice.
+//! Those who draw: each core draws rows of frames that follow each other and makes packets of them at once, so that
+//! only frames in flight take memory, however many windows there are.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::ops::{ControlFlow, Range};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread;
 
 use rayon::prelude::*;
 
+use super::steps::{Step, Steps};
 use crate::base::error::Result;
 use crate::draw::paint::raster::{Canvas, Pixels};
 use crate::draw::scene::Scene;
-use crate::export::Needs;
-use crate::export::palette::{Census, Packed, Palette};
+use crate::export::palette::{Census, Matcher, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
+use crate::export::{Frame, Needs, Pack, Packet};
 
-/// At most this many bytes of frames are held at a time.
-const MOST_BYTES: f64 = 256e6;
-/// At most this many frames per core are drawn in a row before the encoders get them.
+/// At most this many bytes of packets wait to be written.
+const MOST_BYTES: f64 = 48e6;
+/// At most this many frames are drawn in a row: enough that little is drawn twice where rows meet, few enough that
+/// progress is seen.
 const MOST_IN_A_ROW: usize = 8;
+/// Rows per core that are not written yet: one in the making, one that waits.
+const ROWS_AHEAD: usize = 2;
 /// How many frames a palette is made from, at most: some of those with a change, some of all.
-const SAMPLES: usize = 24;
+const SAMPLES: usize = 12;
 
-/// A frame, drawn.
-pub(crate) struct Drawn {
+/// What an output wants of every frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Want {
+    pub(crate) needs: Needs,
+    /// Whether it wants staged frames too.
+    pub(crate) plays: bool,
+    pub(crate) pack: Pack,
+    /// Bytes of a packet per pixel, at most.
+    pub(crate) density: f64,
+}
+
+/// A frame, drawn and packed.
+pub(crate) struct Packed {
     pub(crate) frame_time: FrameTime,
-    pub(crate) scene: Scene,
-    /// Empty unless they are needed.
-    pub(crate) pixels: Pixels,
-    /// Empty unless they are needed.
-    pub(crate) indices: Vec<u8>,
+    /// Its size in pixels; 0 where nobody needs pixels.
+    pub(crate) size: (u32, u32),
+    /// A packet per output.
+    pub(crate) packets: Vec<Packet>,
 }
 
 pub(crate) struct RasterPool<'a> {
     sequence: &'a Sequence<'a>,
+    frame_times: &'a [FrameTime],
+    wants: &'a [Want],
     needs: Needs,
-    palette: Arc<Palette>,
-    canvases: Vec<Canvas<'a>>,
-    /// The frames that the palette was made from, by window and phase.
-    kept: BTreeMap<(usize, u64), (u32, u32, Packed)>,
+    palette: Palette,
+    steps: &'a Steps,
 }
 
 impl<'a> RasterPool<'a> {
     /// Ready to draw these frames.
     pub(crate) fn new(
         sequence: &'a Sequence<'a>,
-        needs: Needs,
-        frame_times: &[FrameTime],
+        frame_times: &'a [FrameTime],
+        wants: &'a [Want],
+        steps: &'a Steps,
     ) -> Result<Self> {
-        let canvas = |_| Canvas::new(sequence.painter, sequence.options.scale);
-        let mut artists = Self {
+        let needs = wants.iter().map(|want| want.needs).max();
+        let mut pool = Self {
             sequence,
-            needs,
-            palette: Arc::new(Palette::new(Vec::new())),
-            canvases: (0..rayon::current_num_threads()).map(canvas).collect(),
-            kept: BTreeMap::new(),
+            frame_times,
+            wants,
+            needs: needs.unwrap_or(Needs::Nothing),
+            palette: Palette::new(Vec::new()),
+            steps,
         };
-        if needs >= Needs::Indices {
-            artists.survey(frame_times)?;
+        if pool.needs >= Needs::Indices {
+            pool.palette = pool.survey()?;
         }
-        Ok(artists)
+        Ok(pool)
     }
 
     /// The palette of the whole sequence; one black unless indices are needed.
-    pub(crate) fn palette(&self) -> Arc<Palette> {
-        Arc::clone(&self.palette)
+    pub(crate) fn palette(&self) -> &Palette {
+        &self.palette
     }
 
-    /// How many frames to draw at a time.
-    pub(crate) fn batch(&self, frame_times: &[FrameTime]) -> usize {
-        let scene = |s: &FrameTime| self.sequence.picture.scene(s.window, s.phase);
-        let page = frame_times
-            .first()
-            .map(|s| scene(s).size)
-            .unwrap_or_default();
+    /// Draws all frames and gives them to `take`, row by row in order, until it breaks off.
+    ///
+    /// # Errors
+    /// Where a frame cannot be drawn or packed, and what `take` says.
+    pub(crate) fn run(
+        &self,
+        mut take: impl FnMut(Vec<Packed>) -> Result<ControlFlow<()>>,
+    ) -> Result<()> {
+        let rows = self.rows();
+        let cores = rayon::current_num_threads().min(rows.len());
+        thread::scope(|scope| {
+            // Dropping the receivers, however this ends, ends those who draw.
+            let drawn: Vec<Receiver<Result<Vec<Packed>>>> = (0..cores)
+                .map(|core| {
+                    let (send, receive) = sync_channel(ROWS_AHEAD - 1);
+                    let own = rows.iter().skip(core).step_by(cores);
+                    scope.spawn(move || {
+                        let mut artist = Artist::new(self);
+                        for row in own {
+                            if send.send(artist.row(row.clone())).is_err() {
+                                return;
+                            }
+                        }
+                    });
+                    receive
+                })
+                .collect();
+            for at in 0..rows.len() {
+                // A core that gave up has told why before.
+                let Ok(row) = drawn[at % cores].recv() else {
+                    break;
+                };
+                if take(row?)?.is_break() {
+                    break;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// The frames in rows of about equal length, as long as memory allows.
+    fn rows(&self) -> Vec<Range<usize>> {
+        let count = self.frame_times.len();
+        let cores = rayon::current_num_threads();
+        let page = self.frame_times.first().map(|f| self.scene(*f).size);
         let scale = self.sequence.options.scale;
-        // Five bytes a pixel; one batch is drawn while the one before is written.
-        let bytes = (page.w * scale * page.h * scale * 10.0).max(1.0);
-        let cores = self.canvases.len();
-        let fits = |each: &usize| (cores * each) as f64 * bytes <= MOST_BYTES;
-        cores * (1..=MOST_IN_A_ROW).rev().find(fits).unwrap_or(1)
+        let pixels = page.map_or(1.0, |page| page.w * page.h * scale * scale);
+        let density: f64 = self.wants.iter().map(|want| want.density).sum();
+        let fits =
+            |each: &usize| (ROWS_AHEAD * cores * each) as f64 * pixels * density <= MOST_BYTES;
+        let most = (1..=MOST_IN_A_ROW).rev().find(fits).unwrap_or(1);
+        // As many rows for each core, so that none waits for the last.
+        let rows = count.div_ceil(most * cores).max(1) * cores;
+        let each = count.div_ceil(rows).max(1);
+        let starts = (0..count).step_by(each);
+        starts.map(|at| at..(at + each).min(count)).collect()
     }
 
-    /// Draws frames that follow each other.
-    pub(crate) fn draw(&mut self, frame_times: &[FrameTime]) -> Result<Vec<Drawn>> {
-        let (sequence, needs) = (self.sequence, self.needs);
-        let (palette, kept) = (&self.palette, &self.kept);
-        share(&mut self.canvases, frame_times, |canvas, frame_time| {
-            let scene = sequence.picture.scene(frame_time.window, frame_time.phase);
-            let pixels = match kept.get(&key(frame_time)) {
-                _ if needs < Needs::Pixels => nothing(),
-                Some((width, height, packed)) => Pixels {
-                    width: *width,
-                    height: *height,
-                    rgba: packed.rgba(),
-                },
-                None => canvas.draw(&scene)?,
-            };
-            let indices = match needs {
-                Needs::Indices => palette.map(&pixels.rgba),
-                _ => Vec::new(),
-            };
-            Ok(Drawn {
-                frame_time,
-                scene,
-                pixels,
-                indices,
-            })
-        })
+    fn scene(&self, frame_time: FrameTime) -> Scene {
+        let picture = self.sequence.picture;
+        picture.scene(frame_time.window, frame_time.phase)
     }
 
-    /// Makes the palette from a few frames and keeps them.
-    fn survey(&mut self, frame_times: &[FrameTime]) -> Result<()> {
-        let changed: Vec<usize> = (0..frame_times.len())
-            .filter(|i| self.sequence.view.is_changed(frame_times[*i].window))
-            .collect();
-        let all: Vec<usize> = (0..frame_times.len()).collect();
-        let mut places = spread(&changed, SAMPLES / 2);
-        places.extend(spread(&all, SAMPLES / 2));
-        places.sort_unstable();
-        places.dedup();
-        let sample: Vec<FrameTime> = places.into_iter().map(|i| frame_times[i]).collect();
-        let sequence = self.sequence;
-        let drawn = share(&mut self.canvases, &sample, |canvas, frame_time| {
-            let pixels =
-                canvas.draw(&sequence.picture.scene(frame_time.window, frame_time.phase))?;
-            let packed = Packed::new(&pixels.rgba);
-            Ok((key(frame_time), (pixels.width, pixels.height, packed)))
-        })?;
-        self.kept = drawn.into_iter().collect();
-        let mut census = Census::default();
-        for (_, _, packed) in self.kept.values() {
-            census.count(packed);
+    /// A palette from a few frames.
+    fn survey(&self) -> Result<Palette> {
+        let is_changed = |at: &usize| {
+            let window = self.frame_times[*at].window;
+            self.sequence.view.is_changed(window)
+        };
+        let all: Vec<usize> = (0..self.frame_times.len()).collect();
+        let changed: Vec<usize> = all.iter().copied().filter(is_changed).collect();
+        let mut sample = spread(&changed, SAMPLES / 2);
+        sample.extend(spread(&all, SAMPLES / 2));
+        sample.sort_unstable();
+        sample.dedup();
+        let each = sample.len().div_ceil(rayon::current_num_threads()).max(1);
+        let count = |places: &[usize]| -> Result<Census> {
+            let mut canvas = Canvas::new(self.sequence.painter, self.sequence.options.scale);
+            let mut census = Census::default();
+            for at in places {
+                let scene = self.scene(self.frame_times[*at]);
+                let pixels = self.steps.time(Step::Paint, || canvas.draw(scene))?;
+                self.steps
+                    .time(Step::Colours, || census.count(&pixels.rgba));
+            }
+            Ok(census)
+        };
+        let counted = sample.par_chunks(each).map(count);
+        let census = counted.try_reduce(Census::default, |a, b| Ok(a.and(b)))?;
+        Ok(self.steps.time(Step::Colours, || census.palette(255)))
+    }
+}
+
+/// One core at work.
+struct Artist<'a> {
+    pool: &'a RasterPool<'a>,
+    canvas: Canvas<'a>,
+    matcher: Matcher<'a>,
+    /// The frame on the canvas.
+    at: Option<usize>,
+    indices: Vec<u8>,
+    before: Vec<u8>,
+}
+
+impl<'a> Artist<'a> {
+    fn new(pool: &'a RasterPool<'a>) -> Self {
+        Self {
+            pool,
+            canvas: Canvas::new(pool.sequence.painter, pool.sequence.options.scale),
+            matcher: Matcher::new(&pool.palette),
+            at: None,
+            indices: Vec::new(),
+            before: Vec::new(),
         }
-        self.palette = Arc::new(census.palette(255));
-        Ok(())
     }
-}
 
-/// Draws with all canvases at once, each taking frames that follow each other; gives what came of them in order.
-fn share<'a, T: Send>(
-    canvases: &mut [Canvas<'a>],
-    frame_times: &[FrameTime],
-    draw: impl Fn(&mut Canvas<'a>, FrameTime) -> Result<T> + Sync,
-) -> Result<Vec<T>> {
-    let in_a_row = frame_times.len().div_ceil(canvases.len().max(1)).max(1);
-    let rows: Vec<Vec<T>> = frame_times
-        .par_chunks(in_a_row)
-        .zip(canvases)
-        .map(|(row, canvas)| {
-            row.iter()
-                .map(|frame_time| draw(canvas, *frame_time))
-                .collect()
+    /// Draws frames that follow each other, and the one before them where another core did and it is needed.
+    fn row(&mut self, row: Range<usize>) -> Result<Vec<Packed>> {
+        if let Some(before) = row.start.checked_sub(1)
+            && self.at != Some(before)
+            && self.pool.needs >= Needs::Indices
+        {
+            self.frame(before, &[])?;
+        }
+        row.map(|at| self.frame(at, self.pool.wants)).collect()
+    }
+
+    fn frame(&mut self, at: usize, wants: &[Want]) -> Result<Packed> {
+        let (steps, needs) = (self.pool.steps, self.pool.needs);
+        let frame_time = self.pool.frame_times[at];
+        let scene = steps.time(Step::Compose, || self.pool.scene(frame_time));
+        let nothing = NOTHING;
+        let pixels = if needs >= Needs::Pixels {
+            let scene = scene.clone();
+            steps.time(Step::Paint, || self.canvas.draw(scene))?;
+            self.canvas.pixels().unwrap_or(&nothing)
+        } else {
+            &nothing
+        };
+        if needs >= Needs::Indices {
+            std::mem::swap(&mut self.before, &mut self.indices);
+            self.indices.clone_from(&self.before);
+            self.indices.resize(pixels.rgba.len() / 4, 0);
+            steps.time(Step::Colours, || {
+                for bytes in self.canvas.changed() {
+                    let places = bytes.start / 4..bytes.end / 4;
+                    self.matcher
+                        .map(&pixels.rgba[bytes], &mut self.indices[places]);
+                }
+            });
+        }
+        self.at = Some(at);
+        let frame = Frame {
+            time: frame_time,
+            scene: &scene,
+            pixels,
+            palette: &self.pool.palette,
+            indices: &self.indices,
+            before: if at == 0 { &[] } else { &self.before },
+        };
+        let pack = |want: &Want| {
+            let is_wanted = frame_time.is_settled() || want.plays;
+            match want.needs {
+                Needs::Nothing => Ok(Packet::Nothing),
+                _ if !is_wanted => Ok(Packet::Nothing),
+                _ => (want.pack)(&frame),
+            }
+        };
+        let packets = || wants.iter().map(pack).collect::<Result<_>>();
+        Ok(Packed {
+            frame_time,
+            size: (pixels.width, pixels.height),
+            packets: steps.time(Step::Compress, packets)?,
         })
-        .collect::<Result<_>>()?;
-    Ok(rows.into_iter().flatten().collect())
-}
-
-fn key(frame_time: FrameTime) -> (usize, u64) {
-    (frame_time.window, frame_time.phase.to_bits())
-}
-
-fn nothing() -> Pixels {
-    Pixels {
-        width: 0,
-        height: 0,
-        rgba: Vec::new(),
     }
 }
+
+const NOTHING: Pixels = Pixels {
+    width: 0,
+    height: 0,
+    rgba: Vec::new(),
+};
 
 /// At most `most` of `all`, evenly spread, the first and the last among them.
 fn spread(all: &[usize], most: usize) -> Vec<usize> {

@@ -1,6 +1,6 @@
 //! `--max-bytes`: gives up staged frames, then size, then windows, until an animation is small enough.
 
-use super::{Progress, pass};
+use super::{Progress, Steps, pass};
 use crate::base::error::{Error, Result};
 use crate::export::sequence::{Options, Sequence};
 use crate::export::{Output, Written};
@@ -19,12 +19,13 @@ const LAST_SCALES: [f64; 4] = [0.5, 0.35, 0.25, 0.15];
 pub(crate) fn fit(
     sequence: &Sequence<'_>,
     output: &Output,
+    times: &Steps,
     progress: &mut Progress<'_>,
 ) -> Result<Written> {
     for options in steps(&sequence.options) {
         let mut smaller = sequence.clone();
         smaller.options = options;
-        let outcome = pass(&smaller, std::slice::from_ref(output), progress)?;
+        let outcome = pass(&smaller, std::slice::from_ref(output), times, progress)?;
         if let Some(Some(mut written)) = outcome.into_iter().next() {
             written
                 .remarks

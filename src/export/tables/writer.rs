@@ -110,6 +110,13 @@ impl<W: Write + Send> Writer<W> {
     }
 
     /// Writes the rows that it holds in memory.
+    #[cfg_attr(
+        not(feature = "parquet"),
+        expect(
+            clippy::unnecessary_wraps,
+            reason = "a CSV table holds nothing that could fail"
+        )
+    )]
     pub(crate) fn unload(&mut self) -> io::Result<()> {
         match self {
             Self::Csv(_) => Ok(()),

@@ -12,7 +12,7 @@ use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
 const NAMED: usize = 6;
 
 /// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`.
-pub(super) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String {
+pub(crate) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String {
     let elements = &mission.elements;
     let name = name(elements, entry);
     let lasted = entry

@@ -37,7 +37,7 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
     let roles: BTreeSet<&str> = shown.map(|n| &*n.role).collect();
     let topics = elements.topics.iter();
     let topics = topics.filter(|t| !is_quiet(t.name.as_str())).count();
-    let told = if knows_publishers(elements, &mission.activity) && !roles.is_empty() {
+    let lives = if knows_publishers(elements, &mission.activity) && !roles.is_empty() {
         format!("what was alive when: {}", words::count(roles.len(), "node"))
     } else {
         let topics = words::count(topics, "topic");
@@ -47,7 +47,7 @@ fn lives(mission: &Mission) -> Option<FigureInfo> {
     };
     (topics > 0).then_some(FigureInfo {
         figure: "lives",
-        shows: told,
+        shows: lives,
     })
 }
 

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use bagreel::base::geometry::{Point, Rect, Size};
-use bagreel::layout::{Layout, Orientation, Plan, Route};
+use bagreel::internals::base::geometry::{Point, Rect, Size};
+use bagreel::internals::layout::{Layout, Orientation, Plan, Route};
 
 /// What `dot` makes of a plan; `None` if it is not installed or takes longer than `seconds`.
 pub(crate) fn lay_out(

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use bagreel::base::geometry::Size;
-use bagreel::layout::{Cluster, Link, Outline, Plan, Vertex};
+use bagreel::internals::base::geometry::Size;
+use bagreel::internals::layout::{Cluster, Link, Outline, Plan, Vertex};
 
 /// A graph with its names.
 pub(crate) struct Graph {

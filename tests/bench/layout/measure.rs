@@ -6,8 +6,8 @@
     reason = "formulas of analytic geometry"
 )]
 
-use bagreel::base::geometry::{Point, Rect};
-use bagreel::layout::{Layout, Outline, Plan, Route};
+use bagreel::internals::base::geometry::{Point, Rect};
+use bagreel::internals::layout::{Layout, Outline, Plan, Route};
 
 /// The numbers of one layout.
 #[derive(Default)]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use bagreel::layout::Layout;
+use bagreel::internals::layout::Layout;
 
 use crate::graph::Graph;
 

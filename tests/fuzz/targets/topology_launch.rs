@@ -2,5 +2,5 @@
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    bagreel_fuzz::as_file("x.launch", bytes, |path| drop(bagreel::evidence::topology::read(path)));
+    bagreel_fuzz::as_file("x.launch", bytes, |path| drop(bagreel::internals::evidence::topology::read(path)));
 });

@@ -8,12 +8,12 @@ use crate::draw::style::{Body, Change, Color, Quiet, Style};
 use crate::view::runs::{STEPS, decades};
 
 /// The rules of the graph in every window: [`base`], then [`states`].
-pub fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
+pub(crate) fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
     base(style) + &states(style, words)
 }
 
 /// How elements look that are active and did not change.
-pub fn base(style: &Style) -> String {
+pub(crate) fn base(style: &Style) -> String {
     let mut out = String::from("text{text-anchor:middle}use,.c{visibility:hidden}");
     let cluster = &style.cluster;
     let _ = write!(
@@ -32,7 +32,7 @@ pub fn base(style: &Style) -> String {
 
 /// What classes change of that: how fast, how well known, how alive, what changed; a later rule counts more. Only
 /// these class words have rules.
-pub fn states(style: &Style, words: &BTreeSet<&str>) -> String {
+pub(crate) fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     // What is silent has no rate worth a place.
     let mut out = String::from(
         ".off,:is(.edge,.topic):is(.silent,.latched,.declared,.removed):not(.changed)>.r{visibility:hidden}",
@@ -198,7 +198,7 @@ fn short(value: f64) -> String {
 }
 
 /// The style's colours for the page around the graph, as custom properties of CSS.
-pub fn variables(style: &Style) -> String {
+pub(crate) fn variables(style: &Style) -> String {
     let all = [
         ("page", style.page.background),
         ("text", style.page.text),

@@ -1,10 +1,11 @@
 //! One frame after another: only what changed is drawn again, to the same pixels as all of it would be.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::tiles::{SIDE, Tiles};
-use super::{Drawn, Painter, Pixels, Sheet};
+use super::{Drawn, Painter, Pixels, Sheet, opaque};
 use crate::base::error::Result;
 use crate::draw::scene::{Group, Scene};
 
@@ -23,6 +24,8 @@ struct Last {
     drawn: Vec<Arc<Drawn>>,
     sheet: Sheet,
     scratch: Sheet,
+    /// What differs from the scene before; `None` for all of it.
+    dirty: Option<Tiles>,
 }
 
 impl<'a> Canvas<'a> {
@@ -39,87 +42,112 @@ impl<'a> Canvas<'a> {
     ///
     /// # Errors
     /// As [`Painter::paint`].
-    pub fn draw(&mut self, scene: &Scene) -> Result<Pixels> {
-        let read = |group| self.painter.read(scene, group);
-        let drawn: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
-        let kept = match self.last.take() {
-            Some(mut last) => last
-                .update(scene, &drawn)
-                .then_some((last.sheet, last.scratch)),
-            None => None,
+    pub fn draw(&mut self, scene: Scene) -> Result<&Pixels> {
+        let last = match self.last.take() {
+            Some(last) => last.followed_by(scene, self.painter)?,
+            None => Last::first(scene, self.painter, self.scale)?,
         };
-        let (sheet, scratch) = match kept {
-            Some(sheets) => sheets,
-            None => (
-                Sheet::covered(scene, &drawn, self.scale)?,
-                Sheet::of(scene, self.scale)?,
-            ),
-        };
-        let pixels = sheet.pixels();
-        self.last = Some(Last {
-            scene: scene.clone(),
-            drawn,
-            sheet,
-            scratch,
+        Ok(&self.last.insert(last).sheet.pixels)
+    }
+
+    /// The last drawing; `None` before the first.
+    pub fn pixels(&self) -> Option<&Pixels> {
+        self.last.as_ref().map(|last| &last.sheet.pixels)
+    }
+
+    /// The bytes of the pixels that the last drawing may have changed, from top to bottom.
+    pub fn changed(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let all = self.last.as_ref().filter(|last| last.dirty.is_none());
+        let all = all.map(|last| 0..last.sheet.pixels.rgba.len());
+        let rows = self.last.as_ref().and_then(|last| {
+            let dirty = last.dirty.as_ref()?;
+            Some(last.sheet.rows(dirty))
         });
-        Ok(pixels)
+        all.into_iter().chain(rows.into_iter().flatten())
     }
 }
 
 impl Last {
-    /// Draws what differs between the scene before and `scene` again; false, and nothing done, where that is too much.
-    fn update(&mut self, scene: &Scene, drawn: &[Arc<Drawn>]) -> bool {
-        let same_page = scene.size == self.scene.size && scene.background == self.scene.background;
-        let Some(dirty) = same_page.then(|| self.changed(scene, drawn)).flatten() else {
-            return false;
-        };
-        self.scratch.clear(&dirty, scene);
-        for group in drawn.iter().filter(|d| d.tiles.meets(&dirty)) {
+    fn first(scene: Scene, painter: &Painter, scale: f64) -> Result<Self> {
+        let read = |group| painter.read(&scene, group);
+        let drawn: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
+        Ok(Self {
+            sheet: Sheet::covered(&scene, &drawn, scale)?,
+            scratch: Sheet::of(&scene, scale)?,
+            scene,
+            drawn,
+            dirty: None,
+        })
+    }
+
+    /// Draws what differs again, or all of it where that is too much.
+    fn followed_by(mut self, scene: Scene, painter: &Painter) -> Result<Self> {
+        if scene.size != self.scene.size || scene.background != self.scene.background {
+            return Self::first(scene, painter, self.sheet.scale);
+        }
+        let stays = self.stays(&scene);
+        let groups = scene.groups.iter().zip(&stays);
+        let drawn = groups.map(|(group, stays)| match stays {
+            Some(at) => Ok(Arc::clone(&self.drawn[*at])),
+            None => painter.read(&scene, group),
+        });
+        let drawn: Vec<_> = drawn.collect::<Result<_>>()?;
+        let dirty = self.dirty(&scene, &drawn, &stays);
+        match &dirty {
+            Some(dirty) => self.mend(&scene, &drawn, dirty),
+            None => self.sheet.cover(&scene, &drawn),
+        }
+        Ok(Self {
+            scene,
+            drawn,
+            dirty,
+            ..self
+        })
+    }
+
+    /// Draws what meets these tiles, and copies the tiles alone.
+    fn mend(&mut self, scene: &Scene, drawn: &[Arc<Drawn>], dirty: &Tiles) {
+        self.scratch.clear(dirty, scene);
+        for group in drawn.iter().filter(|d| d.tiles.meets(dirty)) {
             self.scratch.draw(group);
         }
-        self.sheet.copy(&dirty, &self.scratch);
-        true
+        self.sheet.copy(dirty, &self.scratch);
+    }
+
+    /// The place in the scene before of each group that is the same there.
+    fn stays(&self, scene: &Scene) -> Vec<Option<usize>> {
+        let ids = self.scene.groups.iter().map(|group| group.id.as_str());
+        let before: HashMap<&str, usize> = ids.zip(0..).collect();
+        let same = |group: &Group| {
+            let at = before.get(group.id.as_str()).copied();
+            at.filter(|at| self.scene.groups[*at] == *group)
+        };
+        scene.groups.iter().map(same).collect()
     }
 
     /// The tiles under everything that differs; `None` where all has to be drawn anew.
-    fn changed(&self, scene: &Scene, drawn: &[Arc<Drawn>]) -> Option<Tiles> {
-        let id = |group: &'_ Group| group.id.clone();
-        let before: HashMap<String, usize> = self.scene.groups.iter().map(id).zip(0..).collect();
-        let mut stays = vec![false; self.drawn.len()];
-        let mut dirty = Tiles::none(scene.size);
-        let mut order = 0;
-        for (group, drawn) in scene.groups.iter().zip(drawn) {
-            match before.get(&group.id) {
-                Some(&at) if self.scene.groups[at] == *group => {
-                    // What stays must stay in order, or what lies above what would differ.
-                    if at < order {
-                        return None;
-                    }
-                    order = at;
-                    stays[at] = true;
-                }
-                _ => dirty.extend(&drawn.tiles),
-            }
+    fn dirty(&self, scene: &Scene, drawn: &[Arc<Drawn>], stays: &[Option<usize>]) -> Option<Tiles> {
+        // What stays must stay in order, or what lies above what would differ.
+        if !stays.iter().flatten().is_sorted() {
+            return None;
         }
-        let gone = self.drawn.iter().zip(&stays).filter(|(_, stays)| !**stays);
+        let mut dirty = Tiles::none(scene.size);
+        let new = drawn.iter().zip(stays).filter(|(_, stays)| stays.is_none());
+        new.for_each(|(drawn, _)| dirty.extend(&drawn.tiles));
+        let mut is_gone = vec![true; self.drawn.len()];
+        stays.iter().flatten().for_each(|at| is_gone[*at] = false);
+        let gone = self.drawn.iter().zip(&is_gone).filter(|(_, gone)| **gone);
         gone.for_each(|(drawn, _)| dirty.extend(&drawn.tiles));
         (dirty.share() <= MOST_SHARE).then_some(dirty)
     }
 }
 
 impl Sheet {
-    fn pixels(&self) -> Pixels {
-        Pixels {
-            width: self.map.width(),
-            height: self.map.height(),
-            rgba: self.map.data().to_vec(),
-        }
-    }
-
-    /// The bytes of each row of pixels inside each tile, by their place.
-    fn rows(&self, tiles: &Tiles) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
-        let (width, height) = (self.map.width() as usize, self.map.height() as usize);
-        let edge = |tile: usize, most: usize, scale: f64| {
+    /// The bytes of each row of pixels inside the tiles, by their place.
+    fn rows(&self, tiles: &Tiles) -> impl Iterator<Item = Range<usize>> + use<> {
+        let (width, height) = (self.pixels.width as usize, self.pixels.height as usize);
+        let scale = self.scale;
+        let edge = move |tile: usize, most: usize| {
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -128,27 +156,25 @@ impl Sheet {
             let pixel = libm::floor(tile as f64 * SIDE * scale).min(most as f64) as usize;
             pixel
         };
-        let scale = self.scale;
-        let tiles: Vec<_> = tiles.iter().collect();
-        tiles.into_iter().flat_map(move |(column, row)| {
-            let (left, right) = (edge(column, width, scale), edge(column + 1, width, scale));
-            let lines = edge(row, height, scale)..edge(row + 1, height, scale);
+        tiles.spans().into_iter().flat_map(move |(columns, row)| {
+            let (left, right) = (edge(columns.start, width), edge(columns.end, width));
+            let lines = edge(row, height)..edge(row + 1, height);
             lines.map(move |y| (y * width + left) * 4..(y * width + right) * 4)
         })
     }
 
     fn clear(&mut self, tiles: &Tiles, scene: &Scene) {
-        let [r, g, b] = scene.background.rgb().unwrap_or([255; 3]);
+        let background = opaque(scene.background);
         for row in self.rows(tiles) {
-            for pixel in self.map.data_mut()[row].chunks_exact_mut(4) {
-                pixel.copy_from_slice(&[r, g, b, 255]);
+            for pixel in self.pixels.rgba[row].chunks_exact_mut(4) {
+                pixel.copy_from_slice(&background);
             }
         }
     }
 
     fn copy(&mut self, tiles: &Tiles, from: &Self) {
         for row in self.rows(tiles) {
-            self.map.data_mut()[row.clone()].copy_from_slice(&from.map.data()[row]);
+            self.pixels.rgba[row.clone()].copy_from_slice(&from.pixels.rgba[row]);
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Which parts of the page a group may touch: a bit per square of the page, never one too few.
 
+use std::ops::Range;
+
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Anchor, Form, Group, Piece, Shape, Step, Text};
 use crate::draw::style::Color;
@@ -58,8 +60,20 @@ impl Tiles {
         f64::from(set) / (self.columns * self.rows) as f64
     }
 
+    /// The tiles in it, row by row: the columns of those side by side, and their row.
+    pub(super) fn spans(&self) -> Vec<(Range<usize>, usize)> {
+        let mut spans: Vec<(Range<usize>, usize)> = Vec::new();
+        for (column, row) in self.iter() {
+            match spans.last_mut() {
+                Some((columns, at)) if *at == row && columns.end == column => columns.end += 1,
+                _ => spans.push((column..column + 1, row)),
+            }
+        }
+        spans
+    }
+
     /// The tiles in it as (column, row), row by row.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    fn iter(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let all = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (column, row)));
         all.filter(|(column, row)| {
             let at = row * self.columns + column;

@@ -6,7 +6,7 @@ use super::names::quoted;
 use super::{Drawing, line, pen_width, rate};
 use crate::draw::style::Body;
 use crate::graph::State;
-use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, Shown};
+use crate::view::{Arrow, Frame, Item, ItemKind, Shown};
 
 const FONTS: &str = "Helvetica,Arial,sans-serif";
 
@@ -119,10 +119,9 @@ fn edge(drawing: &Drawing<'_>, out: &mut String, arrow: &Arrow, shown: &Shown) {
         line(shown),
         pen_width(shown)
     );
-    let label = match (&arrow.kind, rate(shown)) {
-        (ArrowKind::Direct(topic), None) => topic.to_string(),
-        (ArrowKind::Direct(topic), Some(rate)) => format!("{topic}\n{rate}"),
-        (_, rate) => rate.unwrap_or_default(),
+    let label = match (arrow.carries(shown), rate(shown)) {
+        (Some(topic), Some(rate)) => format!("{topic}\n{rate}"),
+        (topic, rate) => topic.or(rate).unwrap_or_default(),
     };
     if !label.is_empty() {
         let _ = write!(out, ", label={}", quoted(&label));

@@ -21,11 +21,9 @@ const POINTS_PER_INCH: f64 = 72.0;
 
 /// The label of an arrow in a window, lines parted by a newline: the topic between two nodes, and the rate.
 pub(super) fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
-    let rate = rate(shown);
-    match (&arrow.kind, rate) {
-        (ArrowKind::Direct(topic), Some(rate)) => Some(format!("{topic}\n{rate}")),
-        (ArrowKind::Direct(topic), None) => Some(topic.to_string()),
-        (ArrowKind::Publish | ArrowKind::Subscribe, rate) => rate,
+    match (arrow.carries(shown), rate(shown)) {
+        (Some(topic), Some(rate)) => Some(format!("{topic}\n{rate}")),
+        (topic, rate) => topic.or(rate),
     }
 }
 
@@ -197,6 +195,10 @@ impl Writer<'_> {
                     "Publisher\nnode_name: {from}\ntopic_name: {}\nsubscriber: {to}",
                     rich(topic)
                 )
+            }
+            ArrowKind::Bundle => {
+                let topics = arrow.carries(shown).unwrap_or_default();
+                format!("Publisher\nnode_name: {from}\n{topics}\nsubscriber: {to}")
             }
         };
         if let Some(qos) = self.qos(&arrow.members) {

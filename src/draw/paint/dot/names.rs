@@ -11,7 +11,7 @@ const LONGEST_ID: usize = 1000;
 
 /// A name as part of a DOT id, as `PydotFactory.escape_name` makes it: percent-encoded, then `/` as `__`, `%` and
 /// `-` as `_`. Different names may become equal.
-pub fn escape_name(name: &str) -> String {
+pub(crate) fn escape_name(name: &str) -> String {
     let mut out = String::new();
     for byte in name.trim().bytes() {
         match byte {

@@ -1,0 +1,249 @@
+//! Options that say nothing to what was asked for: refused with a hint, never ignored.
+
+use std::collections::BTreeSet;
+
+use clap::ArgMatches;
+use clap::parser::ValueSource;
+
+use super::args::RenderArgs;
+use crate::base::error::{Error, Result};
+use crate::export::{OneDrawing, Output};
+use crate::graph::window::Length;
+use crate::pipeline::{Reading, mission_file};
+
+/// The names of the options that were typed, without defaults: `style`, `layout-from`.
+pub(super) struct Given(BTreeSet<String>);
+
+impl Given {
+    /// Those of the command that was typed.
+    pub(super) fn of(matches: &ArgMatches) -> Self {
+        let typed = matches.subcommand().map(|(_, typed)| typed);
+        let is_given =
+            |typed: &ArgMatches, id: &str| typed.value_source(id) == Some(ValueSource::CommandLine);
+        let names = typed.into_iter().flat_map(|typed| {
+            let ids = typed.ids().filter(|id| is_given(typed, id.as_str()));
+            ids.map(|id| id.as_str().replace('_', "-"))
+        });
+        Self(names.collect())
+    }
+
+    /// The first of `options` that was typed.
+    fn any(&self, options: &[&'static str]) -> Option<&'static str> {
+        options.iter().copied().find(|name| self.0.contains(*name))
+    }
+}
+
+/// Options that only say something to some outputs.
+struct Rule {
+    options: &'static [&'static str],
+    /// Whether they say something to this output.
+    takes: fn(&Asked<'_>, &Output) -> bool,
+    /// What does, for the hint.
+    what: &'static str,
+}
+
+/// What else decides whether an output takes an option.
+struct Asked<'a> {
+    args: &'a RenderArgs,
+}
+
+impl Asked<'_> {
+    /// Whether the output shows one window at a time, each with its own furniture.
+    fn is_window(&self, output: &Output) -> bool {
+        let is_one = output.target.is_numbered() || self.args.time.period == Some(Length::All);
+        match output.format.word {
+            "html" | "md" | "tex" => false,
+            "svg" | "png" | "webp" => is_one,
+            _ => is_picture(output),
+        }
+    }
+}
+
+/// Whether the output is a figure.
+pub(super) fn is_figure(args: &RenderArgs, output: &Output) -> bool {
+    args.figure.figure.is_some() && output.format.whole != OneDrawing::Never
+}
+
+/// Whether the output is drawn; a report is written, around a chart of its own.
+fn is_picture(output: &Output) -> bool {
+    output.format.is_drawn && output.format.word != "md"
+}
+
+/// Whether the output holds the graph itself, all of it unless `--filtered` says otherwise.
+fn is_data(output: &Output) -> bool {
+    ["json", "csv", "parquet", "gexf", "graphml"].contains(&output.format.word)
+}
+
+/// Whether the output plays from frame to frame.
+fn plays(output: &Output) -> bool {
+    ["gif", "apng", "mp4", "webm"].contains(&output.format.word)
+}
+
+const RULES: &[Rule] = &[
+    Rule {
+        options: &[
+            "style",
+            "view",
+            "for",
+            "size",
+            "width",
+            "fit",
+            "expand",
+            "orientation",
+            "layout",
+            "layout-from",
+            "font",
+        ],
+        takes: |_, output| is_picture(output),
+        what: "pictures take it, such as `x.gif`",
+    },
+    Rule {
+        options: &["title"],
+        takes: |asked, output| {
+            let is_plain =
+                output.format.word == "dot" && asked.args.sequence.dot_profile == "plain";
+            output.format.is_drawn || is_plain
+        },
+        what: "pictures, reports and `--dot-profile plain` take it, such as `x.gif`",
+    },
+    Rule {
+        options: &["bare"],
+        takes: |asked, output| asked.is_window(output) || is_figure(asked.args, output),
+        what: "animations, pages, figures and single windows take it: `x.gif`, `x.pdf`, `x{n}.svg`",
+    },
+    Rule {
+        options: &["captions"],
+        takes: |asked, output| asked.is_window(output) && !is_figure(asked.args, output),
+        what: "animations, pages and single windows take them: `x.gif`, `x.pdf`, `x{n}.svg`",
+    },
+    Rule {
+        options: &[
+            "mode",
+            "ns-filter",
+            "topic-filter",
+            "hide",
+            "group",
+            "collapse",
+            "show-recorder",
+            "rqt-defaults",
+        ],
+        takes: |asked, output| !is_data(output) || asked.args.view.filtered,
+        what: "data holds the whole graph; `--filtered` writes what a picture would show",
+    },
+    Rule {
+        options: &["filtered"],
+        takes: |_, output| is_data(output),
+        what: "data takes it: json, csv, parquet, gexf, graphml; what is drawn is filtered already",
+    },
+    Rule {
+        options: &["frame-ms"],
+        takes: |asked, output| {
+            let is_animated = output.format.word == "svg" && !asked.is_window(output);
+            plays(output) || is_animated && !is_figure(asked.args, output)
+        },
+        what: "animations take it: `x.gif`, `x.apng`, `x.svg`, `x.mp4`",
+    },
+    Rule {
+        options: &["tween", "hold-changes"],
+        takes: |_, output| plays(output),
+        what: "animations take it: `x.gif`, `x.apng`, `x.mp4`, `x.webm`",
+    },
+    Rule {
+        options: &["strip"],
+        takes: |_, output| output.format.whole != OneDrawing::Never && !output.target.is_numbered(),
+        what: "pictures of the whole take it: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
+    },
+    Rule {
+        options: &["max-bytes"],
+        takes: |_, output| output.format.is_limited,
+        what: "`x.gif` and `x.apng` take it",
+    },
+    Rule {
+        options: &["dot-profile"],
+        takes: |_, output| output.format.word == "dot",
+        what: "`x.dot` takes it",
+    },
+    Rule {
+        options: &["bytes"],
+        takes: |_, output| ["json", "csv", "parquet"].contains(&output.format.word),
+        what: "data holds sizes: `x.json`, `x.csv`",
+    },
+    Rule {
+        options: &["link"],
+        takes: |_, output| output.format.word == "md",
+        what: "reports take it: `x.md`",
+    },
+    Rule {
+        options: &["phases"],
+        takes: |asked, output| {
+            is_figure(asked.args, output)
+                || ["json", "csv", "parquet"].contains(&output.format.word)
+        },
+        what: "figures and data take them: `--figure lives -o x.pdf`, `x.json`, `x.csv`",
+    },
+];
+
+/// Refuses options that say nothing to any of the outputs.
+pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]) -> Result<()> {
+    let asked = Asked { args };
+    for rule in RULES {
+        let is_taken = || outputs.iter().any(|output| (rule.takes)(&asked, output));
+        if let Some(option) = given.any(rule.options)
+            && !is_taken()
+        {
+            let names = outputs
+                .iter()
+                .map(|o| format!("`{}`", o.target.path().display()));
+            let names: Vec<String> = names.collect();
+            let what = format!("`--{option}` says nothing to {}", names.join(", "));
+            return Err(Error::usage(what, rule.what));
+        }
+    }
+    Ok(())
+}
+
+/// Options that say how bags are read and windows cut: an evolution holds windows already.
+const OF_BAGS: &[&str] = &[
+    "verify",
+    "period",
+    "step",
+    "start",
+    "end",
+    "align",
+    "skip-unchanged",
+    "grace",
+    "roles",
+    "topology",
+    "source",
+    "infer",
+    "bytes",
+];
+
+/// Refuses options about bags where the input is an evolution.
+pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
+    let Some(option) = given.any(OF_BAGS) else {
+        return Ok(());
+    };
+    match mission_file(&reading.inputs)? {
+        None => Ok(()),
+        Some(path) => {
+            let what = format!(
+                "`--{option}` is for bags, and `{}` is an evolution",
+                path.display()
+            );
+            Err(Error::usage(what, "give the bag itself"))
+        }
+    }
+}
+
+/// Options that say how time is cut into windows.
+const OF_WINDOWS: &[&str] = &["period", "step", "align", "skip-unchanged", "grace"];
+
+/// What is to be said where somebody cuts windows for what is told in continuous time. That is no mistake: scripts ask
+/// for the log and for pictures with the same options.
+pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
+    let option = given.any(OF_WINDOWS)?;
+    Some(format!(
+        "`--{option}` is about windows; {what} tells lives in continuous time and is the same for all"
+    ))
+}

@@ -1,0 +1,179 @@
+//! The viewed graph as DOT text: laid out, as `rqt_graph` saves and loads it, or plain, for Graphviz to lay out.
+//!
+//! Names, shapes and attributes are those of `rqt_graph`'s `dotcode.py` and `qt_dotgraph`'s `pydotfactory.py`; what
+//! `dot_to_qt.py` cannot load is never written.
+
+mod names;
+mod plain;
+mod rqt;
+
+use crate::base::geometry::Size;
+use crate::base::words;
+use crate::draw::style::Style;
+use crate::draw::text::{Fonts, Weight};
+use crate::evidence::Evidence;
+use crate::graph::{Element, Elements, State};
+use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
+use crate::mission::Mission;
+use crate::view::{Frame, ItemKind, Mark, Shown, View};
+
+/// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
+const FONT: f64 = 11.0;
+/// It draws with the system's sans, which may run wider than ours.
+const SLACK: f64 = 1.15;
+/// The height of nodes and topics, Graphviz's half inch.
+const HEIGHT: f64 = 36.0;
+/// The height of a line of text.
+const LINE: f64 = 15.0;
+
+/// A view with what every DOT file of it shares: unique ids and, for the profile `rqt`, one layout.
+#[derive(Clone, Debug)]
+pub(crate) struct Drawing<'a> {
+    elements: &'a Elements,
+    view: &'a View,
+    style: Style,
+    ids: names::Ids,
+    /// Sizes, with full names as labels.
+    plan: Plan,
+    layout: Option<Layout>,
+}
+
+impl<'a> Drawing<'a> {
+    /// Prepares a view; its colours for changes come from `style`.
+    pub(crate) fn new(mission: &'a Mission, view: &'a View, style: Style) -> Self {
+        Self {
+            elements: &mission.elements,
+            view,
+            style,
+            ids: names::Ids::new(view),
+            plan: Plan::default(),
+            layout: None,
+        }
+    }
+
+    /// Gives everything its place, with sizes by full names as `qt_dotgraph` writes them.
+    #[must_use]
+    pub(crate) fn laid_out(mut self, fonts: &Fonts) -> Self {
+        self.plan = plan(self.view, fonts);
+        let options = layout::Options {
+            page: Size::new(1600.0, 900.0),
+            orientation: Some(Orientation::LeftRight),
+        };
+        self.layout = Some(layout::lay_out(&self.plan, &options, layout::ENGINES[0].1));
+        self
+    }
+
+    /// One window, or the [`union`] of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
+    /// Only the latter shows the `title`.
+    pub(crate) fn write(&self, frame: &Frame, title: &str) -> String {
+        match &self.layout {
+            Some(layout) => rqt::write(self, layout, frame),
+            None => plain::write(self, frame, title),
+        }
+    }
+
+    /// What proves an item or arrow.
+    fn evidence(&self, members: &[Element]) -> String {
+        let all = self.elements;
+        let of = |element: &Element| match element {
+            Element::Node(id) => all.nodes.get(*id as usize).map(|n| n.evidence),
+            Element::Topic(id) => all.topics.get(*id as usize).map(|t| t.evidence),
+            Element::Publish(id) => all.publishes.get(*id as usize).map(|e| e.evidence),
+            Element::Subscribe(id) => all.subscribes.get(*id as usize).map(|e| e.evidence),
+        };
+        let known = members.iter().filter_map(of);
+        let words: Vec<&str> = known.fold(Evidence::NONE, Evidence::and).words().collect();
+        words.join(" ")
+    }
+
+    /// The namespaces that hold an item of this frame, by place.
+    fn inhabited(&self, frame: &Frame) -> Vec<bool> {
+        let mut inhabited = vec![false; self.view.namespaces.len()];
+        for shown in &frame.items {
+            let item = self.view.items.get(shown.id as usize);
+            let mut at = item.and_then(|item| item.cluster);
+            while let Some(space) = at.filter(|at| inhabited.get(*at) == Some(&false)) {
+                inhabited[space] = true;
+                at = self.view.namespaces.get(space).and_then(|n| n.parent);
+            }
+        }
+        inhabited
+    }
+
+    /// The colour of a change; `None` for what stayed as it was.
+    fn colour(&self, shown: &Shown) -> Option<String> {
+        let change = match shown.mark? {
+            Mark::Added => &self.style.added,
+            Mark::Removed => &self.style.removed,
+            _ => &self.style.changed,
+        };
+        Some(change.color.to_string().to_lowercase())
+    }
+}
+
+/// The line of an arrow: solid for what is known, dashed for what is inferred or gone, dotted for what is silent.
+fn line(shown: &Shown) -> &'static str {
+    use crate::evidence::Degree;
+    match (shown.mark, shown.degree, shown.state) {
+        (Some(Mark::Removed), ..) | (_, Degree::Inferred, _) => "dashed",
+        (_, Degree::Declared, _) | (.., State::Silent | State::Declared) => "dotted",
+        _ => "solid",
+    }
+}
+
+/// A rate as `rqt_graph` writes it; `None` where nothing flows.
+fn rate(shown: &Shown) -> Option<String> {
+    let hz = shown.hz.filter(|hz| *hz > 0.0 && hz.is_finite())?;
+    (shown.mark != Some(Mark::Removed)).then(|| words::rate(hz))
+}
+
+/// The width of a line in whole points, 1 to 5, a step per factor of ten from 1 Hz on.
+fn pen_width(shown: &Shown) -> u8 {
+    match shown.hz.unwrap_or(0.0) {
+        hz if hz >= 1000.0 => 5,
+        hz if hz >= 100.0 => 4,
+        hz if hz >= 10.0 => 3,
+        hz if hz >= 1.0 => 2,
+        _ => 1,
+    }
+}
+
+fn plan(view: &View, fonts: &Fonts) -> Plan {
+    let width = |text: &str| fonts.width(text, FONT, Weight::Regular) * SLACK;
+    let vertices = view.items.iter().map(|item| {
+        let text = width(&item.name);
+        let (outline, width) = match item.kind {
+            ItemKind::Node | ItemKind::Namespace => (Outline::Ellipse, text * 1.2 + 20.0),
+            ItemKind::Topic => (Outline::Box, text + 16.0),
+            ItemKind::Group => (Outline::Box, text + 24.0),
+        };
+        Vertex {
+            size: Size::new(width.max(54.0), HEIGHT),
+            outline,
+            cluster: item.cluster,
+        }
+    });
+    let mut widest: Vec<Option<f64>> = vec![None; view.arrows.len()];
+    for shown in view.frames.iter().flat_map(|frame| &frame.arrows) {
+        let arrow = view.arrows.get(shown.id as usize);
+        let label = arrow.and_then(|arrow| rqt::label(arrow, shown));
+        if let (Some(label), Some(most)) = (label, widest.get_mut(shown.id as usize)) {
+            let lines = label.lines().map(width).fold(0.0, f64::max);
+            *most = Some(most.unwrap_or(0.0).max(lines));
+        }
+    }
+    let links = view.arrows.iter().zip(widest).map(|(arrow, widest)| Link {
+        from: arrow.from as usize,
+        to: arrow.to as usize,
+        label: widest.map(|w| Size::new(w + 8.0, LINE)),
+    });
+    let clusters = view.namespaces.iter().map(|space| layout::Cluster {
+        parent: space.parent,
+        title: Size::new(width(&space.name), LINE),
+    });
+    Plan {
+        vertices: vertices.collect(),
+        links: links.collect(),
+        clusters: clusters.collect(),
+    }
+}

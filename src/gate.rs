@@ -1,0 +1,19 @@
+//! Missions judged: compared with each other, written down as an expectation, held against one.
+//!
+//! Everything here judges lives, rates and the ledger, never the difference of two windows. What the bag has no evidence
+//! of is not absent: it is undecidable, and told as such.
+
+mod baseline;
+mod expectation;
+mod facts;
+mod finding;
+mod judge;
+mod pattern;
+mod range;
+mod report;
+
+pub(crate) use baseline::{Update, update, write};
+pub(crate) use expectation::{Expectation, read};
+pub(crate) use finding::{Kind, Severity};
+pub(crate) use judge::{Verdict, judge};
+pub(crate) use report::{FORMATS, Format, Subject, explain};

@@ -1,0 +1,247 @@
+//! Brings an expectation up to date: what no longer holds is written anew, every other character stays.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::edit::Text;
+use super::{Draft, NodeLine, TopicLine, length, list, scalar};
+use crate::base::error::{Error, Result};
+use crate::base::yaml::BadYaml;
+use crate::gate::facts::Facts;
+use crate::gate::finding::{Finding, Kind, Severity};
+use crate::gate::pattern::Pattern;
+use crate::gate::{Expectation, judge, read};
+use crate::mission::Mission;
+
+/// An expectation brought up to date.
+#[derive(Debug)]
+pub(crate) struct Update {
+    /// The whole file.
+    pub(crate) text: String,
+    /// How many facts were written anew.
+    pub(crate) changed: usize,
+    /// Findings that only the author of a rule can resolve.
+    pub(crate) left: usize,
+}
+
+/// Writes anew what these runs break: of all names, or of those that `only` holds.
+///
+/// # Errors
+/// As [`read`], and where the file is written in a way that cannot be changed in place.
+pub(crate) fn update(text: &str, path: &Path, runs: &[Mission], only: &[String]) -> Result<Update> {
+    let expectation = read(text, path)?;
+    let draft = Draft::of(runs);
+    let mut work = Work {
+        text: Text(text.to_owned()),
+        draft: &draft,
+        runs,
+    };
+    let mut done = BTreeSet::new();
+    let mut left = 0;
+    for finding in broken(&expectation, runs) {
+        let Some(name) = &finding.accept else {
+            left += 1;
+            continue;
+        };
+        if !only.is_empty() && !only.iter().any(|o| o == name || *o == finding.name) {
+            continue;
+        }
+        if done.insert((name.clone(), fact(finding.kind))) {
+            work.accept(name, &finding)
+                .map_err(|bad| unchanged(path, &bad))?;
+        }
+    }
+    let text = work.text.0;
+    read(&text, path)?;
+    Ok(Update {
+        text,
+        changed: done.len(),
+        left,
+    })
+}
+
+fn unchanged(path: &Path, bad: &BadYaml) -> Error {
+    Error::BadExpectation {
+        path: path.to_owned(),
+        line: bad.line,
+        column: bad.column,
+        reason: format!("this cannot be changed in place: {}", bad.reason),
+        hint: "write the element as `/name: {key: value}` on one line".to_owned(),
+    }
+}
+
+/// What the runs break.
+fn broken(expectation: &Expectation, runs: &[Mission]) -> Vec<Finding> {
+    let verdicts = runs.iter().map(|run| judge(expectation, run));
+    let findings = verdicts
+        .flat_map(|verdict| verdict.checks)
+        .flat_map(|check| check.findings);
+    let is_broken = |f: &Finding| {
+        matches!(f.severity, Severity::Error | Severity::Warning) && f.kind != Kind::AllowUnused
+    };
+    findings.filter(is_broken).collect()
+}
+
+/// The key that a finding is about; empty for the element itself.
+fn fact(kind: Kind) -> &'static str {
+    match kind {
+        Kind::NodeGone => "may_end",
+        Kind::NodeLate => "present_within",
+        Kind::NodeRestarted => "restarts",
+        Kind::NodeLifecycle => "lifecycle",
+        Kind::TopicType => "type",
+        Kind::TopicQos => "qos",
+        Kind::TopicRateLow | Kind::TopicRateHigh => "hz",
+        Kind::TopicGap => "max_gap",
+        Kind::PublisherMissing | Kind::PublisherUnexpected => "by",
+        Kind::SubscriberMissing => "to",
+        _ => "",
+    }
+}
+
+/// The work under way.
+struct Work<'a> {
+    text: Text,
+    draft: &'a Draft,
+    runs: &'a [Mission],
+}
+
+impl Work<'_> {
+    /// Writes anew what one finding is about; `name` is the entry's.
+    fn accept(&mut self, name: &str, finding: &Finding) -> Result<(), BadYaml> {
+        let key = fact(finding.kind);
+        match finding.kind {
+            Kind::UnexpectedNode => {
+                let line = self.draft.nodes.get(name).map(NodeLine::text);
+                self.insert("nodes", name, line)
+            }
+            Kind::UnexpectedTopic => {
+                let line = self.draft.topics.get(name).map(TopicLine::text);
+                self.insert("topics", name, line)
+            }
+            Kind::NodeMissing => self.lost("nodes", name, self.draft.nodes.contains_key(name)),
+            Kind::TopicMissing => self.lost("topics", name, self.draft.topics.contains_key(name)),
+            Kind::NodeForbidden => self.text.drop_entry("nodes", name),
+            Kind::TopicForbidden => self.text.drop_entry("topics", name),
+            Kind::NodeGone | Kind::NodeLate | Kind::NodeRestarted | Kind::NodeLifecycle => {
+                let value = self.of_node(name, key);
+                self.write("nodes", name, key, value)
+            }
+            Kind::TopicQos => {
+                self.text.unset("topics", name, "qos")?;
+                self.text.unset("topics", name, "latched")
+            }
+            _ => {
+                let value = self.of_topic(name, key);
+                self.write("topics", name, key, value)
+            }
+        }
+    }
+
+    fn insert(&mut self, section: &str, name: &str, line: Option<String>) -> Result<(), BadYaml> {
+        match line {
+            Some(line) => self.text.insert(section, name, &scalar(name), &line),
+            None => Ok(()),
+        }
+    }
+
+    /// What is in no run is expected no more; what is in some need not be there.
+    fn lost(&mut self, section: &str, name: &str, is_in_some: bool) -> Result<(), BadYaml> {
+        if is_in_some {
+            self.text.set(section, name, "optional", "true")
+        } else {
+            self.text.drop_entry(section, name)
+        }
+    }
+
+    fn write(
+        &mut self,
+        section: &str,
+        name: &str,
+        key: &str,
+        value: Option<String>,
+    ) -> Result<(), BadYaml> {
+        match value {
+            Some(value) => self.text.set(section, name, key, &value),
+            None => self.text.unset(section, name, key),
+        }
+    }
+
+    /// The value of a node's key that holds in all runs; of a pattern, for all that it stands for.
+    fn of_node(&self, name: &str, key: &str) -> Option<String> {
+        let pattern = Pattern::new(name);
+        let lines = self
+            .draft
+            .nodes
+            .iter()
+            .filter(|(role, _)| pattern.matches(role));
+        let lines: Vec<&NodeLine> = lines.map(|(_, line)| line).collect();
+        match key {
+            "may_end" => Some("true".to_owned()),
+            "restarts" => {
+                let most = lines.iter().map(|l| l.restarts).max()?;
+                Some(format!("..{most}"))
+            }
+            "lifecycle" => {
+                let first = lines.first()?.lifecycle.clone()?;
+                let same = lines.iter().all(|l| l.lifecycle.as_ref() == Some(&first));
+                same.then(|| scalar(&first))
+            }
+            _ => self.began(&pattern),
+        }
+    }
+
+    /// The whole seconds within which a node appeared in all runs.
+    fn began(&self, pattern: &Pattern) -> Option<String> {
+        let mut latest = 0;
+        for run in self.runs {
+            let facts = Facts::new(run);
+            for (_, nodes) in facts.nodes(pattern) {
+                let began = facts.began(nodes)?;
+                latest = latest.max(began.time.since(run.span.start));
+            }
+        }
+        Some(length(whole(latest)))
+    }
+
+    /// The value of a topic's key that holds in all runs.
+    fn of_topic(&self, name: &str, key: &str) -> Option<String> {
+        let pattern = Pattern::new(name);
+        if key == "max_gap" {
+            return self.longest(&pattern);
+        }
+        // What differs between the topics of a pattern is not said of all of them.
+        let lines = self
+            .draft
+            .topics
+            .iter()
+            .filter(|(topic, _)| pattern.matches(topic));
+        let [line] = lines.map(|(_, line)| line).collect::<Vec<_>>()[..] else {
+            return None;
+        };
+        match key {
+            "type" => line.kind.as_deref().map(scalar),
+            "by" => line.by.as_ref().map(|by| list(by.iter())),
+            "to" => (!line.to.is_empty()).then(|| list(line.to.iter())),
+            _ => line.hz.map(|hz| hz.to_string()),
+        }
+    }
+
+    fn longest(&self, pattern: &Pattern) -> Option<String> {
+        let mut longest = 0;
+        for run in self.runs {
+            let facts = Facts::new(run);
+            for topic in facts.topics(pattern) {
+                let gaps = facts.gaps(topic, run.span);
+                longest = gaps.iter().map(|(_, nanos)| *nanos).fold(longest, i64::max);
+            }
+        }
+        (longest > 0).then(|| length(whole(longest)))
+    }
+}
+
+/// Rounded up to a second.
+fn whole(nanos: i64) -> i64 {
+    const SECOND: i64 = 1_000_000_000;
+    nanos.saturating_add(SECOND - 1) / SECOND * SECOND
+}

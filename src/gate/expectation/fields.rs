@@ -1,0 +1,221 @@
+//! The keys of a mapping: each known, each of the right kind, or an error that tells where and what was meant.
+
+use std::path::Path;
+
+use super::super::pattern::Pattern;
+use super::super::range::{During, Range};
+use super::{At, Place};
+use crate::base::error::{Error, Result};
+use crate::base::time::parse_nanos;
+use crate::base::yaml::{Data, Placed};
+use crate::evidence::topology::nearest::nearest;
+
+/// The document under way.
+#[derive(Clone, Copy)]
+pub(super) struct Document<'a> {
+    pub(super) path: &'a Path,
+}
+
+impl<'a> Document<'a> {
+    /// What is wrong at a place, and the way out.
+    pub(super) fn bad(
+        self,
+        at: Place,
+        reason: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Error {
+        Error::BadExpectation {
+            path: self.path.to_owned(),
+            line: at.line,
+            column: at.column,
+            reason: reason.into(),
+            hint: hint.into(),
+        }
+    }
+
+    /// A word that is not one of those known.
+    pub(super) fn unknown<'w>(
+        self,
+        at: Place,
+        what: &str,
+        word: &str,
+        known: impl Iterator<Item = &'w str> + Clone,
+    ) -> Error {
+        let near = nearest(word, known.clone());
+        let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
+        let all: Vec<&str> = known.collect();
+        self.bad(
+            at,
+            format!("unknown {what} `{word}`{near}"),
+            format!("it is one of {}", all.join(", ")),
+        )
+    }
+
+    /// The pairs of a mapping; none of what is left empty.
+    pub(super) fn pairs(
+        self,
+        part: &'a Placed,
+        what: &str,
+    ) -> Result<&'a [(String, Place, Placed)]> {
+        match &part.data {
+            Data::Map(pairs) => Ok(pairs),
+            Data::Scalar(text) if text.is_empty() => Ok(&[]),
+            _ => Err(self.bad(
+                part.at,
+                format!("{what} is not a mapping"),
+                "write `key: value`",
+            )),
+        }
+    }
+
+    /// The members of a list; none of what is left empty.
+    pub(super) fn list(self, part: &'a Placed, what: &str) -> Result<&'a [Placed]> {
+        match &part.data {
+            Data::List(list) => Ok(list),
+            Data::Scalar(text) if text.is_empty() => Ok(&[]),
+            _ => Err(self.bad(
+                part.at,
+                format!("{what} is not a list"),
+                "write `[one, two]`",
+            )),
+        }
+    }
+
+    /// The text of a scalar that is not empty.
+    pub(super) fn text(self, part: &'a Placed, what: &str) -> Result<&'a str> {
+        match &part.data {
+            Data::Scalar(text) if !text.is_empty() => Ok(text),
+            _ => Err(self.bad(part.at, format!("{what} is not a text"), "write one value")),
+        }
+    }
+
+    /// The mapping `part` with the keys that it may hold.
+    pub(super) fn fields(
+        self,
+        part: &'a Placed,
+        what: &'a str,
+        known: &'static [&'static str],
+    ) -> Result<Fields<'a>> {
+        let pairs = self.pairs(part, what)?;
+        if let Some((key, at, _)) = pairs
+            .iter()
+            .find(|(key, ..)| !known.contains(&key.as_str()))
+        {
+            return Err(self.unknown(*at, "key", key, known.iter().copied()));
+        }
+        Ok(Fields {
+            document: self,
+            at: part.at,
+            pairs,
+        })
+    }
+}
+
+/// A mapping whose keys are all known.
+#[derive(Clone, Copy)]
+pub(super) struct Fields<'a> {
+    pub(super) document: Document<'a>,
+    pub(super) at: Place,
+    pairs: &'a [(String, Place, Placed)],
+}
+
+impl<'a> Fields<'a> {
+    /// The value of a key, if it is there.
+    pub(super) fn get(&self, key: &str) -> Option<&'a Placed> {
+        self.pairs.iter().find(|(k, ..)| k == key).map(|(.., v)| v)
+    }
+
+    /// The value of a key that must be there.
+    pub(super) fn need(&self, key: &str, hint: &str) -> Result<&'a Placed> {
+        let missing = || {
+            self.document
+                .bad(self.at, format!("`{key}` is missing"), hint)
+        };
+        self.get(key).ok_or_else(missing)
+    }
+
+    /// The first key that is not one of these.
+    pub(super) fn other(&self, keys: &[&str]) -> Option<(&'a str, Place)> {
+        let other = self
+            .pairs
+            .iter()
+            .find(|(key, ..)| !keys.contains(&key.as_str()));
+        other.map(|(key, at, _)| (key.as_str(), *at))
+    }
+
+    /// The value of a key, read by `parse`; `hint` tells how to write it.
+    pub(super) fn read<T>(
+        &self,
+        key: &str,
+        hint: &str,
+        parse: impl Fn(&str) -> Option<T>,
+    ) -> Result<Option<At<T>>> {
+        let Some(part) = self.get(key) else {
+            return Ok(None);
+        };
+        let text = self.document.text(part, &format!("`{key}`"))?;
+        let wrong = || {
+            self.document
+                .bad(part.at, format!("`{key}: {text}` makes no sense"), hint)
+        };
+        let value = parse(text).ok_or_else(wrong)?;
+        Ok(Some(At { at: part.at, value }))
+    }
+
+    pub(super) fn string(&self, key: &str) -> Result<Option<At<String>>> {
+        self.read(key, "", |text| Some(text.to_owned()))
+    }
+
+    pub(super) fn name(&self, key: &str) -> Result<Option<At<Pattern>>> {
+        self.read(key, "", |text| Some(Pattern::new(text)))
+    }
+
+    pub(super) fn flag(&self, key: &str) -> Result<Option<At<bool>>> {
+        self.read(key, "write `true` or `false`", |text| text.parse().ok())
+    }
+
+    /// A flag that is `false` where it is not there.
+    pub(super) fn is_set(&self, key: &str) -> Result<bool> {
+        Ok(self.flag(key)?.is_some_and(|flag| flag.value))
+    }
+
+    pub(super) fn range(&self, key: &str) -> Result<Option<At<Range>>> {
+        self.read(
+            key,
+            "write a range: `13.5..16.5`, `5..` or `..1`",
+            Range::parse,
+        )
+    }
+
+    pub(super) fn length(&self, key: &str) -> Result<Option<At<i64>>> {
+        self.read(
+            key,
+            "write a length of time: `20s`, `500ms`, `1m`",
+            parse_nanos,
+        )
+    }
+
+    pub(super) fn during(&self) -> Result<Option<During>> {
+        let hint = "write a stretch of time: `1:30..2m`, `-30s..`";
+        Ok(self.read("during", hint, During::parse)?.map(|d| d.value))
+    }
+
+    /// A list of names.
+    pub(super) fn names(&self, key: &str) -> Result<Option<At<Vec<At<Pattern>>>>> {
+        let Some(part) = self.get(key) else {
+            return Ok(None);
+        };
+        let what = format!("`{key}`");
+        let mut names = Vec::new();
+        for one in self.document.list(part, &what)? {
+            names.push(At {
+                at: one.at,
+                value: Pattern::new(self.document.text(one, &what)?),
+            });
+        }
+        Ok(Some(At {
+            at: part.at,
+            value: names,
+        }))
+    }
+}

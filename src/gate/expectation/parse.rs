@@ -1,0 +1,508 @@
+//! Reads `graph.yaml`. Whatever is not known is an error with its line, its column, and the nearest name.
+
+use std::path::Path;
+
+use super::fields::{Document, Fields};
+use super::{
+    Allowance, Closed, Demand, Event, EventKind, Expectation, Named, NodeFacts, Place, Policy,
+    Rule, SCHEMA, TopicFacts, While,
+};
+use crate::base::error::Result;
+use crate::base::time::{Moment, Period, Stamp};
+use crate::base::yaml::{Placed, parse_placed};
+use crate::gate::Kind;
+use crate::gate::pattern::Pattern;
+
+/// The keys of the whole file.
+const FILE: &[&str] = &[
+    "schema", "from", "period", "policy", "nodes", "topics", "rules", "allow",
+];
+const POLICY: &[&str] = &[
+    "unexpected_nodes",
+    "unexpected_topics",
+    "unexpected_publishers",
+];
+const NODE: &[&str] = &[
+    "forbidden",
+    "optional",
+    "may_end",
+    "restarts",
+    "lifecycle",
+    "present_within",
+];
+const TOPIC: &[&str] = &[
+    "forbidden",
+    "optional",
+    "may_end",
+    "type",
+    "by",
+    "to",
+    "hz",
+    "percent",
+    "max_gap",
+    "latched",
+    "qos",
+];
+/// The keys that say what a rule is about, each with those that go with it.
+const FORMS: &[(&str, &[&str])] = &[
+    ("node", NODE),
+    ("nodes", NODE),
+    (
+        "topic",
+        &[
+            "hz",
+            "percent",
+            "max_gap",
+            "by",
+            "to",
+            "type",
+            "latched",
+            "qos",
+            "may_end",
+            "optional",
+            "forbidden",
+            "while",
+            "during",
+        ],
+    ),
+    ("appear_in_order", &[]),
+    ("when", &["expect", "within"]),
+    ("changes", &["during"]),
+];
+const RULE: &[&str] = &[
+    "id",
+    "node",
+    "nodes",
+    "topic",
+    "appear_in_order",
+    "when",
+    "changes",
+    "expect",
+    "within",
+    "while",
+    "during",
+    "forbidden",
+    "optional",
+    "may_end",
+    "restarts",
+    "lifecycle",
+    "present_within",
+    "type",
+    "by",
+    "to",
+    "hz",
+    "percent",
+    "max_gap",
+    "latched",
+    "qos",
+];
+const EVENT: &[&str] = &[
+    "added",
+    "removed",
+    "restarted",
+    "silent",
+    "handed_over",
+    "rate",
+    "lifecycle",
+    "from",
+    "to",
+];
+const ALLOW: &[&str] = &["finding", "name", "until", "why"];
+
+/// Reads an expectation.
+///
+/// # Errors
+/// [`crate::Error::BadExpectation`] for what is no YAML, unfolds without end, or says something that is not known.
+pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
+    let document = Document { path };
+    let whole = parse_placed(text).map_err(|bad| {
+        let at = Place {
+            line: bad.line,
+            column: bad.column,
+        };
+        document.bad(at, bad.reason, "it is YAML: `name: {key: value}`")
+    })?;
+    let fields = document.fields(&whole, "the file", FILE)?;
+    let hint = format!("the first line is `schema: {SCHEMA}`");
+    let schema = fields.need("schema", &hint)?;
+    let is_known = |text: &str| (text == SCHEMA).then_some(());
+    fields.read("schema", &hint, is_known)?;
+    if let Some(from) = fields.get("from") {
+        document.text(from, "`from`")?;
+    }
+    Ok(Expectation {
+        file: path.to_owned(),
+        period: fields
+            .read("period", "write `60s`, `1m` or `500ms`", Period::parse)?
+            .map(|p| p.value),
+        policy: policy(&fields, schema.at)?,
+        nodes: section(&fields, "nodes", NODE, node)?,
+        topics: section(&fields, "topics", TOPIC, topic)?,
+        rules: rules(&fields)?,
+        allow: each(&fields, "allow", allowance)?,
+    })
+}
+
+fn policy(file: &Fields<'_>, top: Place) -> Result<Policy> {
+    let mut policy = Policy {
+        at: top,
+        nodes: Closed::Allow,
+        topics: Closed::Allow,
+        publishers: Closed::Error,
+    };
+    let Some(part) = file.get("policy") else {
+        return Ok(policy);
+    };
+    let fields = file.document.fields(part, "`policy`", POLICY)?;
+    let closed = |key: &str, usual: Closed| {
+        let parse = |text: &str| match text {
+            "allow" => Some(Closed::Allow),
+            "warn" => Some(Closed::Warn),
+            "error" => Some(Closed::Error),
+            _ => None,
+        };
+        let found = fields.read(key, "write `allow`, `warn` or `error`", parse)?;
+        Ok(found.map_or(usual, |found| found.value))
+    };
+    policy.at = part.at;
+    policy.nodes = closed(POLICY[0], policy.nodes)?;
+    policy.topics = closed(POLICY[1], policy.topics)?;
+    policy.publishers = closed(POLICY[2], policy.publishers)?;
+    Ok(policy)
+}
+
+/// A mapping from names to what is expected of them.
+fn section<T>(
+    file: &Fields<'_>,
+    key: &'static str,
+    known: &'static [&'static str],
+    facts: impl Fn(&Fields<'_>) -> Result<T>,
+) -> Result<Vec<Named<T>>> {
+    let Some(part) = file.get(key) else {
+        return Ok(Vec::new());
+    };
+    let mut all = Vec::new();
+    for (name, at, value) in file.document.pairs(part, &format!("`{key}`"))? {
+        let what = format!("`{name}`");
+        all.push(Named {
+            name: Pattern::new(name),
+            at: *at,
+            body: value.at,
+            facts: facts(&file.document.fields(value, &what, known)?)?,
+        });
+    }
+    Ok(all)
+}
+
+/// The members of a list.
+fn each<T>(
+    file: &Fields<'_>,
+    key: &str,
+    one: impl Fn(Document<'_>, &Placed) -> Result<T>,
+) -> Result<Vec<T>> {
+    let Some(part) = file.get(key) else {
+        return Ok(Vec::new());
+    };
+    let list = file.document.list(part, &format!("`{key}`"))?;
+    list.iter().map(|part| one(file.document, part)).collect()
+}
+
+fn node(fields: &Fields<'_>) -> Result<NodeFacts> {
+    Ok(NodeFacts {
+        forbidden: fields.is_set("forbidden")?,
+        optional: fields.is_set("optional")?,
+        may_end: fields.is_set("may_end")?,
+        restarts: fields.range("restarts")?,
+        lifecycle: fields.string("lifecycle")?,
+        within: fields.length("present_within")?,
+    })
+}
+
+fn topic(fields: &Fields<'_>) -> Result<TopicFacts> {
+    let share = |text: &str| text.parse().ok().filter(|p| (0.0..=100.0).contains(p));
+    Ok(TopicFacts {
+        forbidden: fields.is_set("forbidden")?,
+        optional: fields.is_set("optional")?,
+        may_end: fields.is_set("may_end")?,
+        kind: fields.string("type")?,
+        by: fields.names("by")?,
+        to: fields.names("to")?,
+        hz: fields.range("hz")?,
+        percent: fields
+            .read("percent", "write 0 to 100", share)?
+            .map(|p| p.value),
+        max_gap: fields.length("max_gap")?,
+        latched: fields.flag("latched")?,
+        qos: fields.string("qos")?,
+        during: None,
+        whilst: None,
+    })
+}
+
+fn rules(file: &Fields<'_>) -> Result<Vec<Rule>> {
+    let rules = each(file, "rules", rule)?;
+    for (at, rule) in rules.iter().enumerate() {
+        if rules[..at].iter().any(|other| other.id == rule.id) {
+            let reason = format!("a second rule is called `{}`", rule.id);
+            return Err(file.document.bad(rule.at, reason, "give it another `id`"));
+        }
+    }
+    Ok(rules)
+}
+
+fn rule(document: Document<'_>, part: &Placed) -> Result<Rule> {
+    let fields = document.fields(part, "a rule", RULE)?;
+    let id = fields.need("id", "every rule has an `id: a-name`")?;
+    let id = document.text(id, "`id`")?.to_owned();
+    let form = FORMS.iter().find(|(key, _)| fields.get(key).is_some());
+    let Some((form, with)) = form else {
+        let keys: Vec<&str> = FORMS.iter().map(|(key, _)| *key).collect();
+        let hint = format!("a rule has one of {}", keys.join(", "));
+        return Err(document.bad(part.at, "the rule is about nothing", hint));
+    };
+    let allowed = [&["id", form], *with].concat();
+    if let Some((key, at)) = fields.other(&allowed) {
+        let reason = format!("`{key}` does not go with `{form}`");
+        let hint = format!("with it go {}", with.join(", "));
+        return Err(document.bad(at, reason, hint));
+    }
+    let demand = demand(&fields, form)?;
+    let is_empty = match &demand {
+        Demand::Nodes(_, facts) => *facts == NodeFacts::default(),
+        Demand::Topic(_, facts) => {
+            let only = TopicFacts {
+                during: facts.during,
+                whilst: facts.whilst.clone(),
+                ..TopicFacts::default()
+            };
+            **facts == only
+        }
+        Demand::Order(names) => names.len() < 2,
+        Demand::Reaction { .. } | Demand::Changes { .. } => false,
+    };
+    if is_empty {
+        let hint = format!("with `{form}` go {}", with.join(", "));
+        return Err(document.bad(part.at, format!("the rule `{id}` asks for nothing"), hint));
+    }
+    Ok(Rule {
+        id,
+        at: part.at,
+        demand,
+    })
+}
+
+fn demand(fields: &Fields<'_>, form: &str) -> Result<Demand> {
+    let lost = |key: &str| {
+        fields
+            .document
+            .bad(fields.at, format!("`{key}` is missing"), "")
+    };
+    Ok(match form {
+        "node" => {
+            let name = fields.name("node")?.ok_or_else(|| lost("node"))?;
+            Demand::Nodes(vec![name], node(fields)?)
+        }
+        "nodes" => {
+            let names = fields.names("nodes")?.ok_or_else(|| lost("nodes"))?;
+            Demand::Nodes(names.value, node(fields)?)
+        }
+        "topic" => {
+            let name = fields.name("topic")?.ok_or_else(|| lost("topic"))?;
+            let mut facts = topic(fields)?;
+            facts.during = fields.during()?;
+            facts.whilst = whilst(fields)?;
+            Demand::Topic(name, Box::new(facts))
+        }
+        "appear_in_order" => {
+            let names = fields.names(form)?.ok_or_else(|| lost(form))?;
+            Demand::Order(names.value)
+        }
+        "when" => Demand::Reaction {
+            when: event(fields, "when")?,
+            expect: event(fields, "expect")?,
+            within: fields
+                .length("within")?
+                .ok_or_else(|| lost("within"))?
+                .value,
+        },
+        _ => Demand::Changes {
+            during: fields.during()?,
+            many: fields.range("changes")?.ok_or_else(|| lost(form))?.value,
+        },
+    })
+}
+
+fn whilst(fields: &Fields<'_>) -> Result<Option<While>> {
+    let Some(part) = fields.get("while") else {
+        return Ok(None);
+    };
+    let document = fields.document;
+    let inner = document.fields(part, "`while`", &["topic", "hz", "node"])?;
+    let rate = (
+        inner.name("topic")?,
+        inner.range("hz")?,
+        inner.name("node")?,
+    );
+    match rate {
+        (Some(topic), Some(hz), None) => Ok(Some(While::Rate(topic.value, hz.value))),
+        (None, None, Some(node)) => Ok(Some(While::Node(node.value))),
+        _ => Err(document.bad(
+            part.at,
+            "`while` is neither a topic with its rate nor a node",
+            "write `while: {topic: /cmd_vel, hz: 1..}` or `while: {node: /teleop}`",
+        )),
+    }
+}
+
+fn event(rule: &Fields<'_>, key: &str) -> Result<Event> {
+    let hint = "write `when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`";
+    let part = rule.need(key, hint)?;
+    let document = rule.document;
+    let fields = document.fields(part, "an event", EVENT)?;
+    let mut found = Vec::new();
+    for kind in EventKind::ALL {
+        found.extend(fields.name(kind.word())?.map(|name| (kind, name.value)));
+    }
+    let [(kind, name)] = &found[..] else {
+        let words = EventKind::ALL.map(EventKind::word).join(", ");
+        let reason = format!("`{key}` does not name one event");
+        return Err(document.bad(part.at, reason, format!("it has one of {words}")));
+    };
+    let ends = (fields.name("from")?, fields.name("to")?);
+    let has_ends = matches!(kind, EventKind::HandedOver | EventKind::Lifecycle);
+    if !has_ends && let Some(end) = ends.0.as_ref().or(ends.1.as_ref()) {
+        let reason = format!("`{}` has no `from` and no `to`", kind.word());
+        return Err(document.bad(end.at, reason, "only `handed_over` and `lifecycle` have"));
+    }
+    Ok(Event {
+        kind: *kind,
+        name: name.clone(),
+        from: ends.0.map(|from| from.value),
+        to: ends.1.map(|to| to.value),
+    })
+}
+
+fn allowance(document: Document<'_>, part: &Placed) -> Result<Allowance> {
+    let fields = document.fields(part, "an allowance", ALLOW)?;
+    let finding = fields.need("finding", "name the finding, such as `topic-rate-low`")?;
+    let word = document.text(finding, "`finding`")?;
+    let kind = Kind::from_word(word);
+    let unknown = || document.unknown(finding.at, "finding", word, Kind::words());
+    let hint = "every allowance says why, for those who come after";
+    fields.need("why", hint)?;
+    fields.need("name", "name the node or topic")?;
+    let date = "write a date: `2027-01-31`, or RFC 3339";
+    Ok(Allowance {
+        at: part.at,
+        finding: kind.ok_or_else(unknown)?,
+        name: fields
+            .name("name")?
+            .map_or_else(|| Pattern::new(""), |name| name.value),
+        until: fields.read("until", date, day)?,
+        why: fields
+            .string("why")?
+            .map_or_else(String::new, |why| why.value),
+    })
+}
+
+/// The end of a day in UTC, or a point in time.
+fn day(text: &str) -> Option<Stamp> {
+    const DAY: i64 = 86_400_000_000_000;
+    let midnight = Moment::parse(&format!("{text}T00:00:00Z"));
+    match (midnight, Moment::parse(text)) {
+        (Some(Moment::Absolute(at)), _) => Some(at.plus(DAY)),
+        (_, Some(Moment::Absolute(at))) => Some(at),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Expectation> {
+        read(
+            &format!("schema: {SCHEMA}\n{text}"),
+            Path::new("graph.yaml"),
+        )
+    }
+
+    #[test]
+    fn everything_that_can_be_expected_is_read() {
+        let all = parsed(
+            "from: nav.mcap # for the reader\nperiod: 10s\n\
+             policy: {unexpected_nodes: warn, unexpected_publishers: allow}\n\
+             nodes:\n  /a: {}\n  /b:\n  /debug/*: {forbidden: true}\n  /c: {lifecycle: active, restarts: ..0, present_within: 20s}\n\
+             topics:\n  /scan: {type: sensor_msgs/LaserScan, by: [/a], to: [/b], hz: 13.5..16.5, percent: 95, max_gap: 0.5s}\n  /map: {latched: true}\n\
+             rules:\n  - {id: up, nodes: [/a, /b], present_within: 20s}\n  - {id: order, appear_in_order: [/a, /b]}\n\
+             \x20 - {id: drive, topic: /scan, hz: 10.., while: {topic: /cmd_vel, hz: 1..}}\n\
+             \x20 - {id: safe, when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s}\n\
+             \x20 - {id: flap, node: /nav/*, restarts: ..1}\n  - {id: quiet, during: -30s.., changes: ..0}\n\
+             allow:\n  - {finding: topic-rate-low, name: /scan, until: 2027-01-31, why: on loan}\n",
+        )
+        .unwrap();
+        assert_eq!(
+            (all.nodes.len(), all.topics.len(), all.rules.len()),
+            (4, 2, 6)
+        );
+        assert_eq!(all.policy.nodes, Closed::Warn);
+        let scan = &all.topics[0];
+        assert_eq!((scan.at.line, scan.at.column), (11, 3));
+        assert_eq!(scan.facts.hz.as_ref().map(|hz| hz.at.line), Some(11));
+        let until = all.allow[0].until.as_ref().map(|u| u.value.to_string());
+        assert_eq!(until.as_deref(), Some("2027-02-01T00:00:00Z"));
+    }
+
+    #[test]
+    fn what_is_wrong_has_a_line_a_column_and_the_nearest_name() {
+        let table = [
+            (
+                "topics:\n  /s: {hx: 5..}",
+                "line 3, column 8: unknown key `hx`; the nearest is `hz`",
+            ),
+            (
+                "topic:\n  /s: {}",
+                "line 2, column 1: unknown key `topic`; the nearest is `topics`",
+            ),
+            (
+                "topics:\n  /s: {hz: 5}",
+                "line 3, column 12: `hz: 5` makes no sense",
+            ),
+            ("nodes: [/a]", "line 2, column 8: `nodes` is not a mapping"),
+            ("nodes:\n  /a: {}\n  /a: {}", "line 4"),
+            ("rules:\n  - {node: /a, restarts: ..1}", "`id` is missing"),
+            ("rules:\n  - {id: x}", "the rule is about nothing"),
+            ("rules:\n  - {id: x, node: /a}", "asks for nothing"),
+            (
+                "rules:\n  - {id: x, node: /a, hz: 5..}",
+                "`hz` does not go with `node`",
+            ),
+            (
+                "rules:\n  - {id: x, changes: ..0}\n  - {id: x, changes: ..0}",
+                "a second rule is called `x`",
+            ),
+            (
+                "rules:\n  - {id: x, when: {removed: /a, to: /b}, expect: {added: /b}, within: 1}",
+                "has no `from`",
+            ),
+            (
+                "allow:\n  - {finding: topic-rate-lo, name: /s, why: x}",
+                "unknown finding `topic-rate-lo`; the nearest is `topic-rate-low`",
+            ),
+            (
+                "allow:\n  - {finding: topic-rate-low, name: /s}",
+                "`why` is missing",
+            ),
+            (
+                "policy: {unexpected_nodes: deny}",
+                "`unexpected_nodes: deny` makes no sense",
+            ),
+        ];
+        for (text, says) in table {
+            let error = parsed(text).unwrap_err().to_string();
+            assert!(error.contains(says), "{text}: {error}");
+        }
+        let none = read("nodes: {}\n", Path::new("g.yaml")).unwrap_err();
+        assert!(none.to_string().contains("`schema` is missing"), "{none}");
+    }
+}

@@ -1,0 +1,351 @@
+//! What can be found wrong, each kind a row in [`KINDS`]; and one thing found.
+
+use std::fmt;
+
+use crate::base::digest;
+use crate::base::time::{Span, Stamp};
+use crate::base::words::visible;
+use crate::base::yaml::Place;
+
+/// A kind of finding: its place in [`KINDS`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kind {
+    NodeMissing,
+    NodeForbidden,
+    NodeLate,
+    NodeGone,
+    NodeRestarted,
+    NodeLifecycle,
+    TopicMissing,
+    TopicForbidden,
+    TopicType,
+    TopicQos,
+    TopicRateLow,
+    TopicRateHigh,
+    TopicGap,
+    PublisherMissing,
+    PublisherUnexpected,
+    SubscriberMissing,
+    OrderBroken,
+    ReactionMissing,
+    TooManyChanges,
+    UnexpectedNode,
+    UnexpectedTopic,
+    AllowUnused,
+}
+
+/// All kinds in their order: the word, what it says, and what decides it.
+pub(crate) const KINDS: &[(Kind, &str, &str, &str)] = &[
+    (
+        Kind::NodeMissing,
+        "node-missing",
+        "A node that is expected is not in the bag.",
+        "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
+         folded). Undecidable in a bag that names no node at all. `optional: true` asks for nothing.",
+    ),
+    (
+        Kind::NodeForbidden,
+        "node-forbidden",
+        "A node is in the bag that must not be there.",
+        "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.",
+    ),
+    (
+        Kind::NodeLate,
+        "node-late",
+        "A node appeared later than it should have.",
+        "`present_within: 20s` counts from the first message. Undecidable where the node may have been there earlier for \
+         all that the bag tells.",
+    ),
+    (
+        Kind::NodeGone,
+        "node-gone",
+        "A node ended before the mission did.",
+        "A node that is expected is expected to stay. Its end is told by a rhythm that broke for good, or by something \
+         that says so; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go.",
+    ),
+    (
+        Kind::NodeRestarted,
+        "node-restarted",
+        "A node restarted more or less often than allowed.",
+        "`restarts: ..0`. A restart is proved by sequence numbers, a new process, or a new anonymous name of one role.",
+    ),
+    (
+        Kind::NodeLifecycle,
+        "node-lifecycle",
+        "A node is in another lifecycle state at the end.",
+        "`lifecycle: active`. Undecidable without the node's transition events.",
+    ),
+    (
+        Kind::TopicMissing,
+        "topic-missing",
+        "A topic that is expected is not in the bag.",
+        "A topic is there if it has messages or a publisher. `optional: true` asks for nothing.",
+    ),
+    (
+        Kind::TopicForbidden,
+        "topic-forbidden",
+        "A topic is in the bag that must not be there.",
+        "Written as `forbidden: true`, mostly for a pattern.",
+    ),
+    (
+        Kind::TopicType,
+        "topic-type",
+        "A topic has another type than expected.",
+        "`type: sensor_msgs/LaserScan`; the `/msg/` of ROS 2 makes no difference.",
+    ),
+    (
+        Kind::TopicQos,
+        "topic-qos",
+        "A topic is offered with another quality of service.",
+        "`qos: reliable` asks for each of its words; `latched: true` for a last message that stands. Undecidable where \
+         the bag does not tell.",
+    ),
+    (
+        Kind::TopicRateLow,
+        "topic-rate-low",
+        "A topic had fewer messages per second than expected.",
+        "`hz: 13.5..16.5` is judged in every whole window from the topic's first message to the mission's end, `percent: \
+         95` of them at least. A message more or less at the edge of a window is none.",
+    ),
+    (
+        Kind::TopicRateHigh,
+        "topic-rate-high",
+        "A topic had more messages per second than expected.",
+        "As `topic-rate-low`, above the range.",
+    ),
+    (
+        Kind::TopicGap,
+        "topic-gap",
+        "A topic was silent for longer than allowed.",
+        "`max_gap: 0.5s` holds between messages of one window; across windows for silences of 4 s and more.",
+    ),
+    (
+        Kind::PublisherMissing,
+        "publisher-missing",
+        "A node does not publish a topic that it should.",
+        "`by: [/a, /b]`. Undecidable where the bag does not tell who publishes the topic.",
+    ),
+    (
+        Kind::PublisherUnexpected,
+        "publisher-unexpected",
+        "A topic has a publisher that is not listed.",
+        "`by: [/a]` names all of them; `policy: {unexpected_publishers: warn}` makes it milder. Only publishers that are \
+         measured or stated count.",
+    ),
+    (
+        Kind::SubscriberMissing,
+        "subscriber-missing",
+        "A node does not subscribe a topic that it should.",
+        "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
+         discovery, or this node's log of its connections.",
+    ),
+    (
+        Kind::OrderBroken,
+        "order-broken",
+        "Nodes did not appear in the expected order.",
+        "`appear_in_order: [/a, /b]`. Undecidable where the times that the bag tells overlap.",
+    ),
+    (
+        Kind::ReactionMissing,
+        "reaction-missing",
+        "Something did not happen that should follow something else.",
+        "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second \
+         must follow; times count as uncertain as they are known.",
+    ),
+    (
+        Kind::TooManyChanges,
+        "too-many-changes",
+        "There were more, or fewer, reconfigurations than allowed.",
+        "`during: -30s.., changes: ..0` counts the entries that `bagreel events` prints.",
+    ),
+    (
+        Kind::UnexpectedNode,
+        "unexpected-node",
+        "A node is in the bag that the file does not name.",
+        "Only with `policy: {unexpected_nodes: warn}` or `error`. Recorders and players never count.",
+    ),
+    (
+        Kind::UnexpectedTopic,
+        "unexpected-topic",
+        "A topic is in the bag that the file does not name.",
+        "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.",
+    ),
+    (
+        Kind::AllowUnused,
+        "allow-unused",
+        "An allowance forgave nothing.",
+        "Remove it, so that it does not forgive something else later.",
+    ),
+];
+
+impl Kind {
+    /// Its word.
+    pub(crate) fn word(self) -> &'static str {
+        let row = KINDS.iter().find(|(kind, ..)| *kind == self);
+        row.map_or("", |(_, word, ..)| word)
+    }
+
+    /// The kind of a word.
+    pub(crate) fn from_word(word: &str) -> Option<Self> {
+        let row = KINDS.iter().find(|(_, own, ..)| *own == word);
+        row.map(|(kind, ..)| *kind)
+    }
+
+    /// All words.
+    pub(crate) fn words() -> impl Iterator<Item = &'static str> + Clone {
+        KINDS.iter().map(|(_, word, ..)| *word)
+    }
+}
+
+/// How bad a finding is, the worst first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Severity {
+    Error,
+    Warning,
+    /// The bag does not tell.
+    Unknown,
+    /// Known and forgiven.
+    Allowed,
+}
+
+impl Severity {
+    /// Its word.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+            Self::Unknown => "unknown",
+            Self::Allowed => "allowed",
+        }
+    }
+}
+
+/// Why something is as it is: what the ledger tells, by which findings are grouped.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Cause {
+    /// When it happened, if the ledger tells.
+    pub(crate) time: Option<Stamp>,
+    /// What: `/lidar stopped at 04:50`.
+    pub(crate) text: String,
+}
+
+/// One thing found. All its texts are visible: control characters are spelled out.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Finding {
+    pub(crate) kind: Kind,
+    pub(crate) severity: Severity,
+    /// Where the file says what was expected.
+    pub(crate) place: Place,
+    /// The node or topic that it is about.
+    pub(crate) name: String,
+    /// One sentence.
+    pub(crate) says: String,
+    /// What was seen, in few words.
+    pub(crate) seen: String,
+    /// What was expected.
+    pub(crate) expected: String,
+    /// When.
+    pub(crate) when: Option<Span>,
+    /// Lines that tell more.
+    pub(crate) details: Vec<String>,
+    /// What caused it.
+    pub(crate) cause: Option<Cause>,
+    /// What to do.
+    pub(crate) help: Vec<String>,
+    /// The name in the file that `baseline --update` would write anew.
+    pub(crate) accept: Option<String>,
+    /// Why it is forgiven.
+    pub(crate) why: Option<String>,
+}
+
+impl Finding {
+    /// A finding about a name, an error until something else is said.
+    pub(crate) fn new(kind: Kind, name: &str, place: Place, says: impl fmt::Display) -> Self {
+        Self {
+            kind,
+            severity: Severity::Error,
+            place,
+            name: visible(name).into_owned(),
+            says: visible(&says.to_string()).into_owned(),
+            seen: String::new(),
+            expected: String::new(),
+            when: None,
+            details: Vec::new(),
+            cause: None,
+            help: Vec::new(),
+            accept: None,
+            why: None,
+        }
+    }
+
+    /// That the bag does not tell, and why.
+    pub(crate) fn unknown(kind: Kind, name: &str, place: Place, says: impl fmt::Display) -> Self {
+        Self {
+            severity: Severity::Unknown,
+            ..Self::new(kind, name, place, says)
+        }
+    }
+
+    /// What was seen instead of what.
+    pub(crate) fn saw(mut self, seen: impl fmt::Display, expected: impl fmt::Display) -> Self {
+        self.seen = visible(&seen.to_string()).into_owned();
+        self.expected = visible(&expected.to_string()).into_owned();
+        self
+    }
+
+    /// When it was so.
+    pub(crate) fn at(mut self, when: Span) -> Self {
+        self.when = Some(when);
+        self
+    }
+
+    /// One more line.
+    pub(crate) fn detail(mut self, text: impl fmt::Display) -> Self {
+        self.details.push(visible(&text.to_string()).into_owned());
+        self
+    }
+
+    /// A way out.
+    pub(crate) fn hint(mut self, text: impl fmt::Display) -> Self {
+        self.help.push(visible(&text.to_string()).into_owned());
+        self
+    }
+
+    /// The sentence and every line that tells more, with `between` them.
+    pub(crate) fn told(&self, between: &str) -> String {
+        let mut all = vec![self.says.as_str()];
+        all.extend(self.details.iter().map(String::as_str));
+        all.join(between)
+    }
+
+    /// Twelve hex digits that stay the same from run to run, and when lines of the file move.
+    pub(crate) fn fingerprint(&self) -> String {
+        let text = format!("{}\n{}\n{}", self.kind.word(), self.name, self.expected);
+        digest::hex(&text, 12)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_stands_at_its_place_with_a_word_of_its_own() {
+        for (at, (kind, word, ..)) in KINDS.iter().enumerate() {
+            assert_eq!(*kind as usize, at, "{word}");
+            assert_eq!(Kind::from_word(word), Some(*kind));
+            assert_eq!(kind.word(), *word);
+        }
+    }
+
+    #[test]
+    fn a_fingerprint_does_not_know_lines_or_numbers_seen() {
+        let at = |line| Place { line, column: 1 };
+        let one = Finding::new(Kind::TopicRateLow, "/scan", at(3), "a").saw("7", "9..");
+        let two = Finding::new(Kind::TopicRateLow, "/scan", at(9), "b").saw("6", "9..");
+        let other = Finding::new(Kind::TopicRateLow, "/scan2", at(3), "a").saw("7", "9..");
+        assert_eq!(one.fingerprint(), two.fingerprint());
+        assert_ne!(one.fingerprint(), other.fingerprint());
+        assert_eq!(one.fingerprint().len(), 12);
+    }
+}

@@ -1,0 +1,166 @@
+//! Holds a mission against an expectation: every fact of the file is judged by itself.
+
+mod allow;
+mod event;
+mod node;
+mod policy;
+mod rate;
+mod rule;
+mod topic;
+
+use super::expectation::{Closed, Expectation, Place};
+use super::facts::Facts;
+use super::finding::{Cause, Finding, Severity};
+use super::pattern::Pattern;
+use crate::base::words::visible;
+use crate::evidence::topology::nearest::nearest;
+use crate::mission::Mission;
+
+/// One fact of the file, judged.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Checked {
+    /// What it is about: `/scan hz`, or a rule's `id`.
+    pub(crate) title: String,
+    /// Where it stands.
+    pub(crate) place: Place,
+    /// What was found; nothing where it is kept.
+    pub(crate) findings: Vec<Finding>,
+    /// Whether there was nothing to judge, because what it is about is not there.
+    pub(crate) is_moot: bool,
+}
+
+/// What became of a fact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Judgement {
+    Kept,
+    Broken,
+    Undecidable,
+    Moot,
+}
+
+impl Checked {
+    pub(crate) fn judgement(&self) -> Judgement {
+        let any = |severity| self.findings.iter().any(|f| f.severity == severity);
+        if any(Severity::Error) || any(Severity::Warning) {
+            Judgement::Broken
+        } else if any(Severity::Unknown) {
+            Judgement::Undecidable
+        } else if self.is_moot {
+            Judgement::Moot
+        } else {
+            Judgement::Kept
+        }
+    }
+}
+
+/// Everything that was judged, in the order of the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Verdict {
+    pub(crate) checks: Vec<Checked>,
+}
+
+impl Verdict {
+    /// All findings, the worst first, then in the order of the file.
+    pub(crate) fn findings(&self) -> Vec<&Finding> {
+        let mut all: Vec<&Finding> = self.checks.iter().flat_map(|c| &c.findings).collect();
+        all.sort_by_key(|f| f.severity);
+        all
+    }
+
+    /// How many findings are so bad.
+    pub(crate) fn count(&self, severity: Severity) -> usize {
+        let all = self.checks.iter().flat_map(|c| &c.findings);
+        all.filter(|f| f.severity == severity).count()
+    }
+
+    /// How many facts came out so.
+    pub(crate) fn facts(&self, judgement: Judgement) -> usize {
+        let all = self.checks.iter();
+        all.filter(|c| c.judgement() == judgement).count()
+    }
+
+    /// Whether nothing at all could be decided.
+    pub(crate) fn is_blind(&self) -> bool {
+        self.facts(Judgement::Undecidable) > 0
+            && self.facts(Judgement::Kept) + self.facts(Judgement::Broken) == 0
+    }
+}
+
+/// Judges a mission.
+pub(crate) fn judge(expectation: &Expectation, mission: &Mission) -> Verdict {
+    let facts = Facts::new(mission);
+    let mut judge = Judge {
+        facts: &facts,
+        expectation,
+        checks: Vec::new(),
+    };
+    for named in &expectation.nodes {
+        judge.node(named);
+    }
+    for named in &expectation.topics {
+        judge.topic(named);
+    }
+    for rule in &expectation.rules {
+        judge.rule(rule);
+    }
+    judge.policy();
+    judge.allow();
+    Verdict {
+        checks: judge.checks,
+    }
+}
+
+/// The work under way.
+struct Judge<'a> {
+    facts: &'a Facts<'a>,
+    expectation: &'a Expectation,
+    checks: Vec<Checked>,
+}
+
+impl Judge<'_> {
+    /// Notes what was found of one fact.
+    fn note(&mut self, title: impl Into<String>, place: Place, findings: Vec<Finding>) {
+        self.checks.push(Checked {
+            title: title.into(),
+            place,
+            findings,
+            is_moot: false,
+        });
+    }
+
+    /// Notes a fact about something that is not there.
+    fn moot(&mut self, title: impl Into<String>, place: Place) {
+        self.checks.push(Checked {
+            title: title.into(),
+            place,
+            findings: Vec::new(),
+            is_moot: true,
+        });
+    }
+}
+
+/// How to go on where a name is not there: the nearest one.
+fn near(pattern: &Pattern, known: impl Iterator<Item = String>) -> Option<String> {
+    let known: Vec<String> = known.collect();
+    let near = nearest(pattern.as_str(), known.iter().map(String::as_str))?;
+    Some(format!("the nearest name in the bag is `{near}`"))
+}
+
+/// That a node is not there, as a cause of findings.
+fn absence(name: &str) -> Cause {
+    Cause {
+        time: None,
+        text: format!("{} is not in the bag", visible(name)),
+    }
+}
+
+impl Closed {
+    /// How bad a finding under this policy is; `None` for no finding at all.
+    fn severity(self) -> Option<Severity> {
+        match self {
+            Self::Allow => None,
+            Self::Warn => Some(Severity::Warning),
+            Self::Error => Some(Severity::Error),
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Findings that are known and forgiven, until a date of the bag's own time.
+
+use super::{Checked, Judge};
+use crate::base::time::Stamp;
+use crate::base::words;
+use crate::gate::expectation::Allowance;
+use crate::gate::finding::{Finding, Kind, Severity};
+
+impl Judge<'_> {
+    /// Forgives what is allowed, and tells of allowances that forgave nothing.
+    pub(super) fn allow(&mut self) {
+        let start = self.facts.mission.span.start;
+        let mut unused = Vec::new();
+        for allowance in &self.expectation.allow {
+            if !forgive(&mut self.checks, allowance, start) {
+                let name = allowance.name.as_str();
+                let word = allowance.finding.word();
+                let says = format!("the allowance of {word} for {name} forgave nothing");
+                let mut finding = Finding::new(Kind::AllowUnused, name, allowance.at, says)
+                    .saw("nothing", word)
+                    .hint("remove it");
+                finding.severity = Severity::Warning;
+                unused.push((format!("allow {word} {name}"), allowance.at, vec![finding]));
+            }
+        }
+        for (title, place, found) in unused {
+            self.note(title, place, found);
+        }
+    }
+}
+
+/// Forgives the findings that an allowance means; answers whether there were any.
+fn forgive(checks: &mut [Checked], allowance: &Allowance, start: Stamp) -> bool {
+    let mut is_used = false;
+    let all = checks.iter_mut().flat_map(|c| &mut c.findings);
+    for finding in all.filter(|f| f.kind == allowance.finding && allowance.name.matches(&f.name)) {
+        is_used = true;
+        if finding.severity == Severity::Unknown {
+            continue;
+        }
+        let over = allowance
+            .until
+            .as_ref()
+            .filter(|until| start >= until.value);
+        if let Some(until) = over {
+            let at = allowance.at.line;
+            let day = words::date_and_clock(until.value.0);
+            let text = format!("the allowance in line {at} held for bags before {day}");
+            finding.details.push(text);
+            continue;
+        }
+        finding.severity = Severity::Allowed;
+        finding.why = Some(words::visible(&allowance.why).into_owned());
+    }
+    is_used
+}

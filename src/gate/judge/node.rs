@@ -1,0 +1,247 @@
+//! What is expected of nodes: to be there, to stay, to come in time, not to restart, to end in a state.
+
+use super::{Judge, absence, near};
+use crate::base::time::Span;
+use crate::base::words;
+use crate::gate::expectation::{Named, NodeFacts, Place};
+use crate::gate::facts::SHUTDOWN_NS;
+use crate::gate::finding::{Cause, Finding, Kind};
+use crate::gate::pattern::Pattern;
+use crate::graph::NodeId;
+use crate::mission::ledger;
+
+/// The roles that a name stands for.
+type Roles<'a> = [(&'a str, &'a [NodeId])];
+
+impl Judge<'_> {
+    /// Judges a node of the file.
+    pub(super) fn node(&mut self, named: &Named<NodeFacts>) {
+        let facts = &named.facts;
+        let name = named.name.as_str();
+        let before = self.checks.len();
+        if facts.forbidden {
+            let found = self.forbidden_nodes(&named.name, named.at);
+            self.note(format!("{name} forbidden"), named.at, found);
+        } else {
+            let found = self.presence(&named.name, named.at, facts);
+            self.note(name, named.at, found);
+            self.node_facts(name, &named.name, facts);
+        }
+        for finding in self.checks[before..]
+            .iter_mut()
+            .flat_map(|c| &mut c.findings)
+        {
+            finding.accept = Some(name.to_owned());
+        }
+    }
+
+    /// Judges what is said of a node beside that it is there. `title` begins what the facts are called.
+    pub(super) fn node_facts(&mut self, title: &str, pattern: &Pattern, facts: &NodeFacts) {
+        let roles = self.facts.nodes(pattern);
+        let wanted = [
+            ("present_within", facts.within.as_ref().map(|w| w.at)),
+            ("restarts", facts.restarts.as_ref().map(|r| r.at)),
+            ("lifecycle", facts.lifecycle.as_ref().map(|l| l.at)),
+        ];
+        for (key, place) in wanted {
+            let Some(place) = place else { continue };
+            let title = format!("{title} {key}");
+            if roles.is_empty() {
+                self.moot(title, place);
+                continue;
+            }
+            let found = match key {
+                "present_within" => self.late(&roles, facts, place),
+                "restarts" => self.restarted(&roles, facts, place),
+                _ => self.lifecycle(&roles, facts, place),
+            };
+            self.note(title, place, found);
+        }
+    }
+
+    pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: Place) -> Vec<Finding> {
+        let roles = self.facts.nodes(pattern);
+        let found = roles.into_iter().map(|(role, nodes)| {
+            let lives = self.facts.lives(nodes);
+            let finding = Finding::new(
+                Kind::NodeForbidden,
+                role,
+                at,
+                format!("{role} is in the bag, and `{pattern}` is forbidden"),
+            );
+            match lives.first() {
+                Some(life) => finding
+                    .saw("present", "absent")
+                    .at(*life)
+                    .detail(self.facts.stretch(*life)),
+                None => finding.saw("present", "absent"),
+            }
+        });
+        found.collect()
+    }
+
+    /// Whether a node is there, and stays.
+    pub(super) fn presence(&self, pattern: &Pattern, at: Place, facts: &NodeFacts) -> Vec<Finding> {
+        let roles = self.facts.nodes(pattern);
+        let name = pattern.as_str();
+        if roles.is_empty() {
+            return match (facts.optional, self.facts.names_nodes()) {
+                (true, _) => Vec::new(),
+                (false, true) => vec![self.missing(pattern, at)],
+                (false, false) => {
+                    vec![Finding::unknown(
+                    Kind::NodeMissing,
+                    name,
+                    at,
+                    format!("cannot tell whether {name} is there: this bag names no nodes"),
+                )
+                .hint("record /rosout and /parameter_events, or /rosgraph; see `bagreel info`")]
+                }
+            };
+        }
+        if facts.may_end {
+            return Vec::new();
+        }
+        roles
+            .iter()
+            .filter_map(|(role, nodes)| self.gone(role, nodes, at))
+            .collect()
+    }
+
+    fn missing(&self, pattern: &Pattern, at: Place) -> Finding {
+        let name = pattern.as_str();
+        let roles = self.facts.roles().map(|(role, _)| role.to_owned());
+        let mut finding = Finding::new(
+            Kind::NodeMissing,
+            name,
+            at,
+            format!("{name} is not in the bag"),
+        )
+        .saw("absent", "present");
+        finding.cause = Some(absence(name));
+        match near(pattern, roles) {
+            Some(near) => finding.hint(near),
+            None => finding,
+        }
+    }
+
+    fn gone(&self, role: &str, nodes: &[NodeId], at: Place) -> Option<Finding> {
+        let whole = self.facts.mission.span;
+        let end = self.facts.lives(nodes).last()?.end;
+        if whole.end.since(end) <= SHUTDOWN_NS {
+            return None;
+        }
+        let clock = self.facts.clock(end);
+        let finding = Finding::new(
+            Kind::NodeGone,
+            role,
+            at,
+            format!("{role} ended at {clock}, expected to stay"),
+        );
+        let mut finding = finding
+            .saw(format!("ended at {clock}"), "to the end")
+            .at(Span {
+                start: end,
+                end: whole.end,
+            })
+            .detail(format!(
+                "{} before the end of the mission",
+                words::duration(whole.end.since(end))
+            ));
+        let around = Span {
+            start: end.plus(-SHUTDOWN_NS),
+            end: end.plus(SHUTDOWN_NS),
+        };
+        finding.cause = self.facts.cause(&nodes.iter().copied().collect(), around);
+        Some(finding)
+    }
+
+    fn late(&self, roles: &Roles<'_>, facts: &NodeFacts, at: Place) -> Vec<Finding> {
+        let Some(within) = &facts.within else {
+            return Vec::new();
+        };
+        let start = self.facts.mission.span.start;
+        let limit = start.plus(within.value);
+        let expected = format!("within {}", words::duration(within.value));
+        let late = roles.iter().filter_map(|(role, nodes)| {
+            let began = self.facts.began(nodes)?;
+            if began.time <= limit {
+                return None;
+            }
+            let clock = self.facts.clock(began.time);
+            if began.earliest <= limit {
+                let says = format!(
+                    "cannot tell whether {role} appeared {expected}: its first sign is at {clock}"
+                );
+                return Some(Finding::unknown(Kind::NodeLate, role, at, says));
+            }
+            let says = format!("{role} appeared at {clock}, expected {expected}");
+            let finding = Finding::new(Kind::NodeLate, role, at, says);
+            Some(finding.saw(format!("at {clock}"), &expected).at(Span {
+                start,
+                end: began.time,
+            }))
+        });
+        late.collect()
+    }
+
+    fn restarted(&self, roles: &Roles<'_>, facts: &NodeFacts, at: Place) -> Vec<Finding> {
+        let Some(range) = &facts.restarts else {
+            return Vec::new();
+        };
+        let found = roles.iter().filter_map(|(role, nodes)| {
+            let entries = self.facts.entries(nodes, ledger::Kind::Restarted);
+            if range.value.holds(entries.len() as f64) {
+                return None;
+            }
+            let many = words::count(entries.len(), "time");
+            let says = format!("{role} restarted {many}, expected {}", range.value);
+            let mut finding =
+                Finding::new(Kind::NodeRestarted, role, at, says).saw(entries.len(), range.value);
+            for entry in entries.iter().take(6) {
+                let until = entry.until.unwrap_or(entry.time);
+                let away = words::duration(until.since(entry.time).max(0));
+                let text = format!("at {}, away for {away}", self.facts.clock(entry.time));
+                finding = finding.detail(text);
+            }
+            if let Some(first) = entries.first() {
+                finding.cause = Some(Cause {
+                    time: Some(first.time),
+                    text: format!("{role} restarted at {}", self.facts.clock(first.time)),
+                });
+                finding.when = Some(Span {
+                    start: first.time,
+                    end: first.until.unwrap_or(first.time),
+                });
+            }
+            Some(finding)
+        });
+        found.collect()
+    }
+
+    fn lifecycle(&self, roles: &Roles<'_>, facts: &NodeFacts, at: Place) -> Vec<Finding> {
+        let Some(state) = &facts.lifecycle else {
+            return Vec::new();
+        };
+        let expected = state.value.as_str();
+        let found = roles.iter().filter_map(|(role, nodes)| {
+            match self.facts.lifecycle(nodes) {
+                Some(seen) if *seen == *expected => None,
+                Some(seen) => {
+                    let says = format!("{role} ends {seen}, expected {expected}");
+                    Some(Finding::new(Kind::NodeLifecycle, role, at, says).saw(seen, expected))
+                }
+                None => Some(
+                    Finding::unknown(
+                        Kind::NodeLifecycle,
+                        role,
+                        at,
+                        format!("cannot tell whether {role} is {expected}: this bag has no transition of it"),
+                    )
+                    .hint(format!("record {role}/transition_event")),
+                ),
+            }
+        });
+        found.collect()
+    }
+}

@@ -1,0 +1,84 @@
+//! What the file does not name: allowed, or a finding where its policy closes the world.
+
+use super::Judge;
+use crate::gate::expectation::Demand;
+use crate::gate::finding::{Finding, Kind};
+use crate::gate::pattern::Pattern;
+
+impl Judge<'_> {
+    /// Judges what is not named.
+    pub(super) fn policy(&mut self) {
+        let policy = self.expectation.policy;
+        if policy.nodes.severity().is_some() {
+            let found = self.strange_nodes();
+            self.note("unexpected nodes", policy.at, found);
+        }
+        if policy.topics.severity().is_some() {
+            let found = self.strange_topics();
+            self.note("unexpected topics", policy.at, found);
+        }
+    }
+
+    fn strange_nodes(&self) -> Vec<Finding> {
+        let known = self.named_nodes();
+        let mut found = Vec::new();
+        for (role, nodes) in self.facts.roles() {
+            let is_named = known
+                .iter()
+                .any(|p| nodes.iter().any(|id| self.facts.fits(p, *id)));
+            if is_named || self.facts.is_tool(nodes) || !self.facts.is_sure(nodes) {
+                continue;
+            }
+            let file = self.expectation.file.display();
+            let name = nodes.first().map_or(role, |id| self.facts.node(*id));
+            let says = if name == role {
+                format!("{role} is not in {file}")
+            } else {
+                format!("{name} (role {role}) is not in {file}")
+            };
+            let policy = self.expectation.policy;
+            let mut finding = Finding::new(Kind::UnexpectedNode, role, policy.at, says)
+                .saw("present", "not named");
+            finding.severity = policy.nodes.severity().unwrap_or(finding.severity);
+            finding.accept = Some(role.to_owned());
+            finding.when = self.facts.lives(nodes).first().copied();
+            found.push(finding);
+        }
+        found
+    }
+
+    /// Every name of a node that stands anywhere in the file.
+    fn named_nodes(&self) -> Vec<&Pattern> {
+        let mut all: Vec<&Pattern> = self.expectation.nodes.iter().map(|n| &n.name).collect();
+        for topic in &self.expectation.topics {
+            let lists = topic.facts.by.iter().chain(&topic.facts.to);
+            all.extend(lists.flat_map(|list| &list.value).map(|name| &name.value));
+        }
+        for rule in &self.expectation.rules {
+            if let Demand::Nodes(names, _) | Demand::Order(names) = &rule.demand {
+                all.extend(names.iter().map(|name| &name.value));
+            }
+        }
+        all
+    }
+
+    fn strange_topics(&self) -> Vec<Finding> {
+        let known: Vec<&Pattern> = self.expectation.topics.iter().map(|t| &t.name).collect();
+        let policy = self.expectation.policy;
+        let mut found = Vec::new();
+        for topic in self.facts.topics(&Pattern::new("**")) {
+            let name = self.facts.topic(topic);
+            let is_named = known.iter().any(|p| p.matches(name));
+            if is_named || self.facts.is_housekeeping(topic) || self.facts.messages(topic) == 0 {
+                continue;
+            }
+            let says = format!("{name} is not in {}", self.expectation.file.display());
+            let mut finding = Finding::new(Kind::UnexpectedTopic, name, policy.at, says)
+                .saw("present", "not named");
+            finding.severity = policy.topics.severity().unwrap_or(finding.severity);
+            finding.accept = Some(name.to_owned());
+            found.push(finding);
+        }
+        found
+    }
+}

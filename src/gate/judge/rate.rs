@@ -1,0 +1,163 @@
+//! How often and how evenly topics come: in every whole window, or in those that a rule means.
+
+use super::Judge;
+use crate::base::time::Span;
+use crate::base::words;
+use crate::gate::expectation::{Place, TopicFacts, While};
+use crate::gate::facts::{Rate, SHUTDOWN_NS, count};
+use crate::gate::finding::{Finding, Kind};
+use crate::gate::range::Range;
+use crate::graph::TopicId;
+
+impl Judge<'_> {
+    /// Whether a topic's rate lies in its range, in as many windows as it must.
+    pub(super) fn rate(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+        let Some(range) = facts.hz.as_ref().map(|hz| hz.value) else {
+            return Vec::new();
+        };
+        let rates = self.judged(topic, facts);
+        if rates.is_empty() {
+            return self.no_window(topic, facts, at);
+        }
+        let low: Vec<Rate> = rates
+            .iter()
+            .filter(|r| range.is_above(r.at_most()))
+            .copied()
+            .collect();
+        let high: Vec<Rate> = rates
+            .iter()
+            .filter(|r| range.is_below(r.at_least()))
+            .copied()
+            .collect();
+        let allowed = rates.len() as f64 * (1.0 - facts.percent.unwrap_or(100.0) / 100.0);
+        if (low.len() + high.len()) as f64 <= allowed {
+            return Vec::new();
+        }
+        let told = [(Kind::TopicRateLow, low), (Kind::TopicRateHigh, high)];
+        told.iter()
+            .filter_map(|(kind, bad)| self.off(topic, *kind, bad, rates.len(), range, at))
+            .collect()
+    }
+
+    /// Where no window is judged: a condition that never held is kept, all else cannot be told.
+    fn no_window(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+        if facts.whilst.is_some() {
+            return Vec::new();
+        }
+        let name = self.facts.topic(topic);
+        let says = format!("cannot tell the rate of {name}: no whole window of it can be judged");
+        let finding = Finding::unknown(Kind::TopicRateLow, name, at, says);
+        vec![finding.hint("take a shorter period: `period: 5s`, or `--period 5`")]
+    }
+
+    /// The windows in which a topic is judged.
+    fn judged(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Rate> {
+        let whole = self.facts.mission.span;
+        let during = facts.during.map_or(whole, |d| d.on(whole));
+        let mut rates = self.facts.rates(topic, facts.may_end, during);
+        if let Some(whilst) = &facts.whilst {
+            rates.retain(|rate| self.is_while(whilst, rate.window));
+        }
+        rates
+    }
+
+    fn is_while(&self, whilst: &While, window: usize) -> bool {
+        let Some(window) = self.facts.mission.windows.get(window) else {
+            return false;
+        };
+        let seconds = window.span.nanos().max(1) as f64 / 1e9;
+        match whilst {
+            While::Rate(pattern, range) => self
+                .facts
+                .topics(pattern)
+                .iter()
+                .any(|topic| range.holds(count(window, *topic) as f64 / seconds)),
+            While::Node(pattern) => self.facts.nodes(pattern).iter().any(|(_, nodes)| {
+                let lives = self.facts.lives(nodes);
+                lives
+                    .iter()
+                    .any(|l| l.start <= window.span.start && window.span.end <= l.end)
+            }),
+        }
+    }
+
+    /// The finding for the windows in which a rate was off.
+    fn off(
+        &self,
+        topic: TopicId,
+        kind: Kind,
+        bad: &[Rate],
+        judged: usize,
+        range: Range,
+        at: Place,
+    ) -> Option<Finding> {
+        let (first, last) = (bad.first()?, bad.last()?);
+        let name = self.facts.topic(topic);
+        let span = Span {
+            start: first.span.start,
+            end: last.span.end,
+        };
+        let count: u64 = bad.iter().map(|r| r.count).sum();
+        let nanos: i64 = bad.iter().map(|r| r.span.nanos()).sum();
+        let hz = words::rate(count as f64 / (nanos.max(1) as f64 / 1e9));
+        let by = |a: &&Rate, b: &&Rate| a.hz().total_cmp(&b.hz());
+        let (word, worst) = if kind == Kind::TopicRateLow {
+            ("lowest", bad.iter().min_by(by)?)
+        } else {
+            ("highest", bad.iter().max_by(by)?)
+        };
+        let says = format!("{name} at {hz}, expected {range}");
+        let detail = format!(
+            "{} ({} of {}), {word} {} at {}, {}",
+            self.facts.stretch(span),
+            bad.len(),
+            words::count(judged, "window"),
+            words::rate(worst.hz()),
+            self.facts.clock(worst.span.start),
+            words::count(usize::try_from(count).unwrap_or(usize::MAX), "message"),
+        );
+        let mut finding = Finding::new(kind, name, at, says)
+            .saw(hz, words::rate_range(range.from, range.to))
+            .at(span)
+            .detail(detail);
+        let around = Span {
+            start: first.span.start.plus(-first.span.nanos() / 2),
+            end: first.span.end,
+        };
+        finding.cause = self.facts.cause_for_topic(topic, around);
+        Some(finding)
+    }
+
+    /// Whether a topic was never silent for too long.
+    pub(super) fn gap(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+        let Some(most) = facts.max_gap.as_ref().map(|gap| gap.value) else {
+            return Vec::new();
+        };
+        let whole = self.facts.mission.span;
+        let during = facts.during.map_or(whole, |d| d.on(whole));
+        let mut gaps = self.facts.gaps(topic, during);
+        if let (Some(heard), false) = (self.facts.heard(topic), facts.may_end) {
+            let span = Span {
+                start: heard.end,
+                end: whole.end,
+            };
+            // Up to the end, where it does not end with the robot.
+            if span.nanos() > SHUTDOWN_NS && during.end == whole.end {
+                gaps.push((span, span.nanos()));
+            }
+        }
+        gaps.retain(|(_, nanos)| *nanos > most);
+        let Some((span, longest)) = gaps.iter().max_by_key(|(_, nanos)| *nanos) else {
+            return Vec::new();
+        };
+        let name = self.facts.topic(topic);
+        let (seen, expected) = (words::duration(*longest), words::duration(most));
+        let says = format!("{name} was silent for {seen}, expected at most {expected}");
+        let mut finding = Finding::new(Kind::TopicGap, name, at, says)
+            .saw(seen, format!("..{expected}"))
+            .at(*span)
+            .detail(format!("within {}", self.facts.stretch(*span)));
+        finding.cause = self.facts.cause_for_topic(topic, *span);
+        vec![finding]
+    }
+}

@@ -1,0 +1,267 @@
+//! Rules with names of their own: about several nodes, about order, about reactions, about quiet.
+
+use super::{Judge, absence};
+use crate::base::time::Span;
+use crate::base::words;
+use crate::gate::expectation::{At, Demand, Event, EventKind, NodeFacts, Place, Rule, TopicFacts};
+use crate::gate::finding::{Cause, Finding, Kind};
+use crate::gate::pattern::Pattern;
+use crate::gate::range::{During, Range};
+use crate::graph::lives::Bound;
+use crate::mission::events::sentence;
+use crate::mission::ledger::Entry;
+
+/// A reaction may be told so long before what it reacts to: the last sign of who is gone comes a period before its end.
+const BEFORE_NS: i64 = 1_000_000_000;
+/// So many entries are written out.
+const TOLD: usize = 6;
+
+impl Judge<'_> {
+    /// Judges a rule.
+    pub(super) fn rule(&mut self, rule: &Rule) {
+        let before = self.checks.len();
+        match &rule.demand {
+            Demand::Nodes(names, facts) => self.node_rule(rule, names, facts),
+            Demand::Topic(name, facts) => self.topic_rule(rule, name, facts),
+            Demand::Order(names) => {
+                let found = self.order(names);
+                self.note(&rule.id, rule.at, found);
+            }
+            Demand::Reaction {
+                when,
+                expect,
+                within,
+            } => {
+                let found = self.reaction(rule, when, expect, *within);
+                self.note(&rule.id, rule.at, found);
+            }
+            Demand::Changes { during, many } => {
+                let found = self.changes(rule.at, *during, *many);
+                self.note(&rule.id, rule.at, found);
+            }
+        }
+        for finding in self.checks[before..]
+            .iter_mut()
+            .flat_map(|c| &mut c.findings)
+        {
+            finding
+                .details
+                .push(format!("rule {}", words::visible(&rule.id)));
+        }
+    }
+
+    fn node_rule(&mut self, rule: &Rule, names: &[At<Pattern>], facts: &NodeFacts) {
+        for name in names {
+            let title = format!("{}: {}", rule.id, name.value);
+            if facts.forbidden {
+                let found = self.forbidden_nodes(&name.value, name.at);
+                self.note(title, name.at, found);
+                continue;
+            }
+            // To come in time is to come.
+            if facts.within.is_some() && self.facts.nodes(&name.value).is_empty() {
+                let is_there = NodeFacts {
+                    may_end: true,
+                    ..NodeFacts::default()
+                };
+                let found = self.presence(&name.value, name.at, &is_there);
+                self.note(title, name.at, found);
+                continue;
+            }
+            self.node_facts(&title, &name.value, facts);
+        }
+    }
+
+    fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, facts: &TopicFacts) {
+        let title = format!("{}: {}", rule.id, name.value);
+        if facts.forbidden {
+            let found = self.forbidden_topics(&name.value, name.at);
+            self.note(title, name.at, found);
+            return;
+        }
+        if self.facts.topics(&name.value).is_empty() {
+            let found = self.topic_presence(&name.value, name.at, facts);
+            self.note(title, name.at, found);
+            return;
+        }
+        self.topic_facts(&title, &name.value, facts);
+    }
+
+    fn order(&self, names: &[At<Pattern>]) -> Vec<Finding> {
+        let mut found = Vec::new();
+        let mut before: Option<(&At<Pattern>, Bound)> = None;
+        for name in names {
+            let roles = self.facts.nodes(&name.value);
+            let began = roles
+                .iter()
+                .filter_map(|(_, nodes)| self.facts.began(nodes));
+            let Some(began) = began.min_by_key(|bound| bound.time) else {
+                let says = format!("{} never appeared, expected in order", name.value);
+                let mut finding =
+                    Finding::new(Kind::OrderBroken, name.value.as_str(), name.at, says)
+                        .saw("absent", order_of(names));
+                finding.cause = Some(absence(name.value.as_str()));
+                found.push(finding);
+                continue;
+            };
+            if let Some((other, earlier)) = before
+                && began.time < earlier.time
+            {
+                found.push(self.swapped((other, earlier), (name, began), names));
+            }
+            before = Some((name, began));
+        }
+        found
+    }
+
+    fn swapped(
+        &self,
+        (first, earlier): (&At<Pattern>, Bound),
+        (second, began): (&At<Pattern>, Bound),
+        names: &[At<Pattern>],
+    ) -> Finding {
+        let (one, other) = (first.value.as_str(), second.value.as_str());
+        let at = |bound: Bound| self.facts.clock(bound.time);
+        if began.latest >= earlier.earliest {
+            let says =
+                format!("cannot tell whether {other} appeared after {one}: the times overlap");
+            return Finding::unknown(Kind::OrderBroken, other, second.at, says);
+        }
+        let says = format!(
+            "{other} appeared at {}, expected after {one} at {}",
+            at(began),
+            at(earlier)
+        );
+        let seen = format!("{other} at {}, {one} at {}", at(began), at(earlier));
+        Finding::new(Kind::OrderBroken, other, second.at, says)
+            .saw(seen, order_of(names))
+            .at(Span {
+                start: began.time,
+                end: earlier.time,
+            })
+    }
+
+    fn reaction(&self, rule: &Rule, when: &Event, expect: &Event, within: i64) -> Vec<Finding> {
+        let answers = self.entries(expect);
+        let mut found = Vec::new();
+        for cause in self.entries(when) {
+            let from = cause.earliest.plus(-BEFORE_NS);
+            let to = cause.latest.plus(within);
+            if answers.iter().any(|e| from <= e.time && e.time <= to) {
+                continue;
+            }
+            // A hand-over is over when the new sender sends, whatever is known of its beginning.
+            let may = |e: &&&Entry| {
+                expect.kind != EventKind::HandedOver && e.earliest <= to && from <= e.latest
+            };
+            found.push(self.no_answer(
+                rule.at,
+                (when, cause),
+                expect,
+                within,
+                answers.iter().any(|e| may(&e)),
+            ));
+        }
+        found
+    }
+
+    fn no_answer(
+        &self,
+        at: Place,
+        (when, cause): (&Event, &Entry),
+        expect: &Event,
+        within: i64,
+        is_unsure: bool,
+    ) -> Finding {
+        let name = expect.name.as_str();
+        let expected = format!("{} within {}", told(expect), words::duration(within));
+        let what = format!("{} {}", when.name, past(when));
+        let clock = self.facts.clock(cause.time);
+        if is_unsure {
+            let says = format!(
+                "cannot tell whether {name} {} in time after {what} at {clock}: the times overlap",
+                past(expect)
+            );
+            return Finding::unknown(Kind::ReactionMissing, name, at, says);
+        }
+        let says = format!("{what} at {clock}, and {expected} did not follow");
+        let mut finding = Finding::new(Kind::ReactionMissing, name, at, says)
+            .saw("nothing", expected)
+            .at(Span {
+                start: cause.time,
+                end: cause.latest.plus(within),
+            });
+        let after = self
+            .entries(expect)
+            .into_iter()
+            .find(|e| e.time > cause.time);
+        if let Some(after) = after {
+            let late = words::duration(after.time.since(cause.time));
+            finding = finding.detail(format!("it followed after {late}"));
+        }
+        finding.cause = Some(Cause {
+            time: Some(cause.time),
+            text: format!("{what} at {clock}"),
+        });
+        finding
+    }
+
+    fn changes(&self, at: Place, during: Option<During>, many: Range) -> Vec<Finding> {
+        let whole = self.facts.mission.span;
+        let span = during.map_or(whole, |d| d.on(whole));
+        let entries: Vec<_> = self.facts.mission.ledger.headlines(span).collect();
+        if many.holds(entries.len() as f64) {
+            return Vec::new();
+        }
+        let seen = words::count(entries.len(), "reconfiguration");
+        let says = format!(
+            "{seen} from {} to {}, expected {many}",
+            self.facts.clock(span.start),
+            self.facts.clock(span.end)
+        );
+        let mut finding = Finding::new(Kind::TooManyChanges, "reconfigurations", at, says)
+            .saw(entries.len(), many)
+            .at(span);
+        for (id, entry) in entries.iter().take(TOLD) {
+            let text = sentence(self.facts.mission, *id, entry);
+            finding = finding.detail(format!("{}  {text}", self.facts.clock(entry.time)));
+        }
+        if entries.len() > TOLD {
+            finding = finding.detail(format!("and {} more", entries.len() - TOLD));
+        }
+        vec![finding]
+    }
+}
+
+fn order_of(names: &[At<Pattern>]) -> String {
+    let names: Vec<&str> = names.iter().map(|n| n.value.as_str()).collect();
+    names.join(", ")
+}
+
+/// What happened, after a name: `was removed`.
+fn past(event: &Event) -> String {
+    match event.kind {
+        EventKind::Added => "appeared".to_owned(),
+        EventKind::Removed => "was removed".to_owned(),
+        EventKind::Restarted => "restarted".to_owned(),
+        EventKind::Silent => "fell silent".to_owned(),
+        EventKind::HandedOver => "was handed over".to_owned(),
+        EventKind::Rate => "changed its rate".to_owned(),
+        EventKind::Lifecycle => "changed its state".to_owned(),
+    }
+}
+
+/// What should happen: `/cmd_vel handed over to /teleop`.
+fn told(event: &Event) -> String {
+    let verb = match event.kind {
+        EventKind::HandedOver => "handed over",
+        EventKind::Rate => "at another rate",
+        EventKind::Lifecycle => "in another state",
+        kind => kind.word(),
+    };
+    let to = event
+        .to
+        .as_ref()
+        .map_or_else(String::new, |to| format!(" to {to}"));
+    format!("{} {verb}{to}", event.name)
+}

@@ -1,0 +1,294 @@
+//! What is expected of topics: to be there, of which type, from whom, to whom, and of which quality.
+
+use super::{Judge, absence, near};
+use crate::base::time::Span;
+use crate::base::words;
+use crate::evidence::Degree;
+use crate::gate::expectation::{At, Named, Place, TopicFacts};
+use crate::gate::finding::{Finding, Kind};
+use crate::gate::pattern::Pattern;
+use crate::graph::TopicId;
+
+/// So many names are told in one line.
+const NAMED: usize = 6;
+
+impl Judge<'_> {
+    /// Judges a topic of the file.
+    pub(super) fn topic(&mut self, named: &Named<TopicFacts>) {
+        let facts = &named.facts;
+        let name = named.name.as_str();
+        let before = self.checks.len();
+        if facts.forbidden {
+            let found = self.forbidden_topics(&named.name, named.at);
+            self.note(format!("{name} forbidden"), named.at, found);
+        } else {
+            let found = self.topic_presence(&named.name, named.at, facts);
+            self.note(name, named.at, found);
+            self.topic_facts(name, &named.name, facts);
+        }
+        for finding in self.checks[before..]
+            .iter_mut()
+            .flat_map(|c| &mut c.findings)
+        {
+            finding.accept = Some(name.to_owned());
+        }
+    }
+
+    /// Judges what is said of a topic beside that it is there.
+    pub(super) fn topic_facts(&mut self, title: &str, pattern: &Pattern, facts: &TopicFacts) {
+        let topics = self.facts.topics(pattern);
+        let wanted = [
+            ("type", facts.kind.as_ref().map(|k| k.at)),
+            ("by", facts.by.as_ref().map(|b| b.at)),
+            ("to", facts.to.as_ref().map(|t| t.at)),
+            ("hz", facts.hz.as_ref().map(|h| h.at)),
+            ("max_gap", facts.max_gap.as_ref().map(|g| g.at)),
+            ("latched", facts.latched.as_ref().map(|l| l.at)),
+            ("qos", facts.qos.as_ref().map(|q| q.at)),
+        ];
+        for (key, place) in wanted {
+            let Some(place) = place else { continue };
+            let title = format!("{title} {key}");
+            if topics.is_empty() {
+                self.moot(title, place);
+                continue;
+            }
+            let found = topics.iter().flat_map(|topic| match key {
+                "type" => self.kind(*topic, facts, place),
+                "by" => self.publishers(*topic, facts),
+                "to" => self.subscribers(*topic, facts),
+                "hz" => self.rate(*topic, facts, place),
+                "max_gap" => self.gap(*topic, facts, place),
+                "latched" => self.latched(*topic, facts, place),
+                _ => self.qos(*topic, facts, place),
+            });
+            let found = found.collect();
+            self.note(title, place, found);
+        }
+    }
+
+    pub(super) fn forbidden_topics(&self, pattern: &Pattern, at: Place) -> Vec<Finding> {
+        let found = self.facts.topics(pattern).into_iter().map(|topic| {
+            let name = self.facts.topic(topic);
+            let says = format!("{name} is in the bag, and `{pattern}` is forbidden");
+            let many = usize::try_from(self.facts.messages(topic)).unwrap_or(usize::MAX);
+            Finding::new(Kind::TopicForbidden, name, at, says)
+                .saw("present", "absent")
+                .detail(words::count(many, "message"))
+        });
+        found.collect()
+    }
+
+    pub(super) fn topic_presence(
+        &self,
+        pattern: &Pattern,
+        at: Place,
+        facts: &TopicFacts,
+    ) -> Vec<Finding> {
+        if facts.optional || !self.facts.topics(pattern).is_empty() {
+            return Vec::new();
+        }
+        let name = pattern.as_str();
+        let topics = self.facts.mission.elements.topics.iter();
+        let names = topics.map(|t| t.name.to_string()).filter(|n| n != name);
+        let near = near(pattern, names);
+        let says = format!("{name} is not in the bag");
+        let mut finding = Finding::new(Kind::TopicMissing, name, at, says).saw("absent", "present");
+        // Where its publisher is missing too, that is why.
+        let by = facts.by.iter().flat_map(|by| &by.value);
+        let mut lost = by.filter(|by| self.facts.nodes(&by.value).is_empty());
+        finding.cause = lost.next().map(|by| absence(by.value.as_str()));
+        vec![match near {
+            Some(near) => finding.hint(near),
+            None => finding,
+        }]
+    }
+
+    fn kind(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+        let Some(kind) = &facts.kind else {
+            return Vec::new();
+        };
+        let types = &self.facts.mission.elements.topics[topic as usize].types;
+        let plain = |text: &str| text.replace("/msg/", "/");
+        let other: Vec<&str> = types
+            .iter()
+            .map(|t| &**t)
+            .filter(|t| plain(t) != plain(&kind.value))
+            .collect();
+        let name = self.facts.topic(topic);
+        let expected = &kind.value;
+        if types.is_empty() {
+            let says =
+                format!("cannot tell whether {name} is a {expected}: this bag tells no type of it");
+            return vec![Finding::unknown(Kind::TopicType, name, at, says)];
+        }
+        if other.is_empty() {
+            return Vec::new();
+        }
+        let seen = words::some_of(&other, NAMED);
+        let says = format!("{name} is a {seen}, expected {expected}");
+        vec![Finding::new(Kind::TopicType, name, at, says).saw(seen, expected)]
+    }
+
+    fn publishers(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Finding> {
+        let Some(by) = &facts.by else {
+            return Vec::new();
+        };
+        let name = self.facts.topic(topic);
+        let known = self.facts.publishers(topic);
+        let expected: Vec<&str> = by.value.iter().map(|p| p.value.as_str()).collect();
+        let expected = words::some_of(&expected, NAMED);
+        let mut found = Vec::new();
+        for wanted in &by.value {
+            if known
+                .iter()
+                .any(|(node, ..)| self.facts.fits(&wanted.value, *node))
+            {
+                continue;
+            }
+            found.push(self.no_publisher(topic, wanted));
+        }
+        let Some(severity) = self.expectation.policy.publishers.severity() else {
+            return found;
+        };
+        for (node, _, degree) in known
+            .iter()
+            .filter(|(.., degree)| *degree <= Degree::Stated)
+        {
+            let fits = by.value.iter().any(|p| self.facts.fits(&p.value, *node));
+            if fits || self.facts.is_tool(&[*node]) {
+                continue;
+            }
+            let role = self.facts.role(*node);
+            let says = format!("{name} also from {role}, expected only {expected}");
+            let mut finding =
+                Finding::new(Kind::PublisherUnexpected, name, by.at, says).saw(role, &expected);
+            finding.severity = severity;
+            let lives = self.facts.lives(&[*node]);
+            if let (Some(first), Some(last)) = (lives.first(), lives.last()) {
+                let span = Span {
+                    start: first.start,
+                    end: last.end,
+                };
+                finding = finding.at(span).detail(format!(
+                    "{}; {}",
+                    self.facts.stretch(span),
+                    degree.word()
+                ));
+            }
+            found.push(finding);
+        }
+        found
+    }
+
+    fn no_publisher(&self, topic: TopicId, wanted: &At<Pattern>) -> Finding {
+        let name = self.facts.topic(topic);
+        let who = wanted.value.as_str();
+        let kind = Kind::PublisherMissing;
+        if !self.facts.tells_publishers(topic) {
+            let says = format!(
+                "cannot tell whether {who} publishes {name}: this bag does not say who does"
+            );
+            let hint = "record /rosgraph, or add `--topology FILE`; see `bagreel info`";
+            return Finding::unknown(kind, name, wanted.at, says).hint(hint);
+        }
+        let known = self.facts.publishers(topic);
+        let roles: Vec<&str> = known
+            .iter()
+            .map(|(node, ..)| self.facts.role(*node))
+            .collect();
+        let seen = if roles.is_empty() {
+            "nobody".to_owned()
+        } else {
+            words::some_of(&roles, NAMED)
+        };
+        let says = format!("{who} does not publish {name}, which comes from {seen}");
+        let mut finding = Finding::new(kind, name, wanted.at, says).saw(seen, who);
+        if self.facts.nodes(&wanted.value).is_empty() {
+            finding.cause = Some(absence(who));
+        }
+        finding
+    }
+
+    fn subscribers(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Finding> {
+        let wanted = facts.to.iter().flat_map(|to| &to.value);
+        wanted
+            .filter_map(|wanted| self.subscriber(topic, wanted))
+            .collect()
+    }
+
+    fn subscriber(&self, topic: TopicId, wanted: &At<Pattern>) -> Option<Finding> {
+        let name = self.facts.topic(topic);
+        let who = wanted.value.as_str();
+        let known = self.facts.subscribers(topic);
+        if known
+            .iter()
+            .any(|(node, ..)| self.facts.fits(&wanted.value, *node))
+        {
+            return None;
+        }
+        let kind = Kind::SubscriberMissing;
+        let roles = self.facts.nodes(&wanted.value);
+        let nodes: Vec<_> = roles
+            .iter()
+            .flat_map(|(_, nodes)| *nodes)
+            .copied()
+            .collect();
+        // A node that is not there reads nothing.
+        let is_absent = roles.is_empty() && self.facts.names_nodes();
+        if !is_absent && !self.facts.tells_subscribers(&nodes) {
+            let says = format!(
+                "cannot tell whether {who} reads {name}: this bag has no evidence of subscribers"
+            );
+            let hint = "record /rosgraph, or enable statistics; see `bagreel info`";
+            return Some(Finding::unknown(kind, name, wanted.at, says).hint(hint));
+        }
+        let says = format!("{who} does not subscribe {name}");
+        let mut finding = Finding::new(kind, name, wanted.at, says).saw("nothing", who);
+        if is_absent {
+            finding.cause = Some(absence(who));
+        }
+        Some(finding)
+    }
+
+    fn latched(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+        let Some(wanted) = &facts.latched else {
+            return Vec::new();
+        };
+        let name = self.facts.topic(topic);
+        let word = |is: bool| if is { "latched" } else { "not latched" };
+        let expected = word(wanted.value);
+        match self.facts.is_latched(topic) {
+            Some(seen) if seen == wanted.value => Vec::new(),
+            Some(seen) => {
+                let says = format!("{name} is {}, expected {expected}", word(seen));
+                vec![Finding::new(Kind::TopicQos, name, at, says).saw(word(seen), expected)]
+            }
+            None => {
+                let says =
+                    format!("cannot tell whether {name} is {expected}: this bag does not say");
+                vec![Finding::unknown(Kind::TopicQos, name, at, says)]
+            }
+        }
+    }
+
+    fn qos(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+        let Some(wanted) = &facts.qos else {
+            return Vec::new();
+        };
+        let name = self.facts.topic(topic);
+        let expected = &wanted.value;
+        let Some(seen) = &self.facts.mission.elements.topics[topic as usize].qos else {
+            let says = format!(
+                "cannot tell whether {name} is {expected}: this bag has no quality of service"
+            );
+            return vec![Finding::unknown(Kind::TopicQos, name, at, says)];
+        };
+        let has = |word: &str| seen.split_whitespace().any(|own| own == word);
+        if expected.split_whitespace().all(has) {
+            return Vec::new();
+        }
+        let says = format!("{name} is {seen}, expected {expected}");
+        vec![Finding::new(Kind::TopicQos, name, at, says).saw(seen, expected)]
+    }
+}

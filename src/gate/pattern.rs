@@ -1,0 +1,120 @@
+//! Names with blanks: `*` stands for any characters but `/`, `**` for any at all, `?` for one that is not `/`.
+
+use std::fmt;
+
+/// A name that may hold blanks.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Pattern {
+    text: String,
+    parts: Vec<Part>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Part {
+    This(char),
+    One,
+    Some,
+    All,
+}
+
+impl Pattern {
+    /// The pattern of this text.
+    pub(crate) fn new(text: &str) -> Self {
+        let mut parts = Vec::new();
+        for c in text.chars() {
+            match (c, parts.last()) {
+                ('*', Some(Part::Some | Part::All)) => {
+                    parts.pop();
+                    parts.push(Part::All);
+                }
+                ('*', _) => parts.push(Part::Some),
+                ('?', _) => parts.push(Part::One),
+                (c, _) => parts.push(Part::This(c)),
+            }
+        }
+        Self {
+            text: text.to_owned(),
+            parts,
+        }
+    }
+
+    /// The pattern as written.
+    pub(crate) fn as_str(&self) -> &str {
+        &self.text
+    }
+
+    /// Whether it stands for one name only.
+    pub(crate) fn is_name(&self) -> bool {
+        self.parts.iter().all(|p| matches!(p, Part::This(_)))
+    }
+
+    /// Whether the name is one of those that it stands for. The work is the product of both lengths at most.
+    pub(crate) fn matches(&self, name: &str) -> bool {
+        if self.is_name() {
+            return self.text == name;
+        }
+        // Which beginnings of the pattern fit what was read of the name.
+        let mut fits = vec![false; self.parts.len() + 1];
+        fits[0] = true;
+        self.skip_blanks(&mut fits);
+        for c in name.chars() {
+            let mut next = vec![false; fits.len()];
+            for (at, part) in self.parts.iter().enumerate().filter(|(at, _)| fits[*at]) {
+                match part {
+                    Part::This(own) => next[at + 1] |= *own == c,
+                    Part::One => next[at + 1] |= c != '/',
+                    Part::Some => next[at] |= c != '/',
+                    Part::All => next[at] = true,
+                }
+            }
+            self.skip_blanks(&mut next);
+            fits = next;
+        }
+        fits.last().copied().unwrap_or(false)
+    }
+
+    /// A blank may stand for nothing.
+    fn skip_blanks(&self, fits: &mut [bool]) {
+        for (at, part) in self.parts.iter().enumerate() {
+            if fits[at] && matches!(part, Part::Some | Part::All) {
+                fits[at + 1] = true;
+            }
+        }
+    }
+}
+
+impl fmt::Display for Pattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blanks_stand_for_parts_of_names() {
+        let table = [
+            ("/scan", "/scan", true),
+            ("/scan", "/scan2", false),
+            ("/nav/*", "/nav/planner", true),
+            ("/nav/*", "/nav/a/b", false),
+            ("/nav/**", "/nav/a/b", true),
+            ("/cam_*/image", "/cam_front/image", true),
+            ("/cam_*/image", "/cam_/raw/image", false),
+            ("/cam_?", "/cam_1", true),
+            ("/cam_?", "/cam_", false),
+            ("*", "a", true),
+            ("**", "/a/b", true),
+            ("/a*b*c", "/aXbbYc", true),
+        ];
+        for (pattern, name, fits) in table {
+            assert_eq!(
+                Pattern::new(pattern).matches(name),
+                fits,
+                "{pattern} {name}"
+            );
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Ranges as people write them: `13.5..16.5`, `5..`, `..1`; times on either side of `..` for stretches of a mission.
+
+use std::fmt;
+
+use crate::base::time::{Moment, Span};
+
+/// Numbers from one to another, both included; an open end allows everything on its side.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Range {
+    pub(crate) from: Option<f64>,
+    pub(crate) to: Option<f64>,
+}
+
+impl Range {
+    /// Reads a range of numbers, 0 or more; `None` if it is none, or if nothing lies in it.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let (from, to) = text.split_once("..")?;
+        let range = Self {
+            from: bound(from).ok()?,
+            to: bound(to).ok()?,
+        };
+        let is_some = range.from.is_some() || range.to.is_some();
+        let is_ordered = range.from.unwrap_or(0.0) <= range.to.unwrap_or(f64::INFINITY);
+        (is_some && is_ordered).then_some(range)
+    }
+
+    /// Whether the number lies below it.
+    pub(crate) fn is_above(&self, value: f64) -> bool {
+        self.from.is_some_and(|from| value < from)
+    }
+
+    /// Whether the number lies beyond it.
+    pub(crate) fn is_below(&self, value: f64) -> bool {
+        self.to.is_some_and(|to| value > to)
+    }
+
+    /// Whether the number lies in it.
+    pub(crate) fn holds(&self, value: f64) -> bool {
+        !self.is_above(value) && !self.is_below(value)
+    }
+}
+
+/// One end of a range: nothing, or a number; an error for anything else.
+fn bound(text: &str) -> Result<Option<f64>, ()> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let plain = |c: char| c.is_ascii_digit() || c == '.';
+    let number = text.parse().ok().filter(|_| text.chars().all(plain));
+    number.map(Some).ok_or(())
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(from) = self.from {
+            write!(f, "{from}")?;
+        }
+        f.write_str("..")?;
+        match self.to {
+            Some(to) => write!(f, "{to}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A stretch of a mission: `1:30..2m`, `-30s..`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct During {
+    from: Option<Moment>,
+    to: Option<Moment>,
+}
+
+impl During {
+    /// Reads a stretch; `None` if it is none.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let (from, to) = text.split_once("..")?;
+        let moment = |text: &str| match text.trim() {
+            "" => Some(None),
+            text => Moment::parse(text).map(Some),
+        };
+        let during = Self {
+            from: moment(from)?,
+            to: moment(to)?,
+        };
+        (during.from.is_some() || during.to.is_some()).then_some(during)
+    }
+
+    /// Where it lies in a mission, within it.
+    pub(crate) fn on(&self, mission: Span) -> Span {
+        let start = self.from.map_or(mission.start, |m| m.on(mission));
+        let end = self.to.map_or(mission.end, |m| m.on(mission));
+        let start = start.clamp(mission.start, mission.end);
+        Span {
+            start,
+            end: end.clamp(start, mission.end),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::time::Stamp;
+
+    #[test]
+    fn ranges_are_read_and_written_the_same() {
+        for text in ["13.5..16.5", "5..", "..1", "0..0"] {
+            let range = Range::parse(text);
+            assert_eq!(range.map(|r| r.to_string()).as_deref(), Some(text));
+        }
+        for bad in [
+            "", "5", "..", "2..1", "a..b", "-1..", "1e9..", "nan..", "1...2",
+        ] {
+            assert_eq!(Range::parse(bad), None, "{bad}");
+        }
+        let range = Range::parse("2..3").unwrap();
+        assert!(range.holds(2.0) && range.is_above(1.9) && range.is_below(3.1));
+    }
+
+    #[test]
+    fn stretches_count_from_either_end() {
+        let second = |s: i64| Stamp(s * 1_000_000_000);
+        let mission = Span {
+            start: second(100),
+            end: second(200),
+        };
+        let on = |text| {
+            let span = During::parse(text).unwrap().on(mission);
+            (span.start.0 / 1_000_000_000, span.end.0 / 1_000_000_000)
+        };
+        assert_eq!(on("-30s.."), (170, 200));
+        assert_eq!(on("10..1:00"), (110, 160));
+        assert_eq!(on("..500"), (100, 200));
+        assert_eq!(During::parse("soon.."), None);
+        assert_eq!(During::parse(".."), None);
+    }
+}

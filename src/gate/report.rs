@@ -1,0 +1,223 @@
+//! Verdicts in the formats of those who read them: people, programs, and the services that run jobs.
+
+mod github;
+mod gitlab;
+mod json;
+mod junit;
+mod markdown;
+mod mermaid;
+mod sarif;
+mod text;
+
+use super::finding::{Finding, KINDS, Kind, Severity};
+use super::judge::Verdict;
+use crate::base::words::{self, visible};
+use crate::mission::Mission;
+
+/// What was judged, and how the user called it.
+#[derive(Clone, Debug)]
+pub(crate) struct Subject<'a> {
+    pub(crate) mission: &'a Mission,
+    /// The bags, as they were typed.
+    pub(crate) bags: Vec<String>,
+    /// The expectation, as it was typed.
+    pub(crate) file: String,
+    /// Names and addresses of what stands beside the report.
+    pub(crate) links: Vec<(String, String)>,
+}
+
+/// A format that a verdict can be written in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Format {
+    /// Its word, in `--format` and before a colon in `-o`.
+    pub(crate) word: &'static str,
+    /// What file names of it end in.
+    pub(crate) endings: &'static [&'static str],
+    /// What it is, for the help.
+    pub(crate) what: &'static str,
+    pub(crate) write: fn(&Subject<'_>, &Verdict) -> String,
+}
+
+/// All formats. Endings are looked for in this order.
+pub(crate) const FORMATS: &[Format] = &[
+    Format {
+        word: "text",
+        endings: &[".txt"],
+        what: "for people: findings with file and line, grouped by cause",
+        write: text::write,
+    },
+    Format {
+        word: "gitlab",
+        endings: &[
+            "codequality.json",
+            "code-quality-report.json",
+            "code-quality.json",
+        ],
+        what: "GitLab's code quality; also called codequality",
+        write: gitlab::write,
+    },
+    Format {
+        word: "json",
+        endings: &[".json"],
+        what: "everything, for programs",
+        write: json::write,
+    },
+    Format {
+        word: "markdown",
+        endings: &[".md", ".markdown"],
+        what: "a summary for a pull request, with the graph around the changes",
+        write: markdown::write,
+    },
+    Format {
+        word: "junit",
+        endings: &[".xml"],
+        what: "a test case for every fact of the file",
+        write: junit::write,
+    },
+    Format {
+        word: "sarif",
+        endings: &[".sarif", ".sarif.json"],
+        what: "SARIF 2.1.0, for code scanning",
+        write: sarif::write,
+    },
+    Format {
+        word: "github",
+        endings: &[],
+        what: "GitHub's annotations, then the text",
+        write: github::write,
+    },
+];
+
+impl Format {
+    /// The format of a word.
+    pub(crate) fn from_word(word: &str) -> Option<&'static Self> {
+        let word = match word {
+            "codequality" => "gitlab",
+            "md" => "markdown",
+            word => word,
+        };
+        FORMATS.iter().find(|f| f.word == word)
+    }
+
+    /// The format that a file's name tells: the longest ending of all that fit.
+    pub(crate) fn of_name(name: &str) -> Option<&'static Self> {
+        let name = name.to_ascii_lowercase();
+        let fitting = |f: &&Self| {
+            let ends = f.endings.iter().filter(|e| name.ends_with(**e));
+            ends.map(|e| e.len()).max()
+        };
+        FORMATS
+            .iter()
+            .filter(|f| fitting(f).is_some())
+            .max_by_key(|f| fitting(f))
+    }
+}
+
+impl Subject<'_> {
+    /// The bags by their names, without folders.
+    fn name(&self) -> String {
+        let names = self.mission.bags.iter().map(|bag| bag.name.clone());
+        let names: Vec<String> = names.collect();
+        match &names[..] {
+            [] => words::some_of(&self.bags, 2),
+            names => words::some_of(names, 2),
+        }
+    }
+
+    /// The command that accepts what was seen of a name; of everything that was found without one.
+    fn accept(&self, name: Option<&str>) -> String {
+        let bags: Vec<String> = self.bags.iter().map(|bag| quoted(bag)).collect();
+        let only = name.map_or_else(String::new, |name| format!(" --only {}", quoted(name)));
+        let (bags, file) = (bags.join(" "), quoted(&self.file));
+        format!("bagreel baseline {bags} --update {file}{only}")
+    }
+}
+
+impl Verdict {
+    /// What was found, in words: `2 errors, 1 warning, 1 unknown`.
+    fn summary(&self) -> String {
+        let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
+        let mut parts: Vec<String> = counts
+            .iter()
+            .map(|(severity, word)| (self.count(*severity), word))
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, word)| words::count(n, word))
+            .collect();
+        for (severity, word) in [
+            (Severity::Unknown, "unknown"),
+            (Severity::Allowed, "allowed"),
+        ] {
+            let n = self.count(severity);
+            if n > 0 {
+                parts.push(format!("{n} {word}"));
+            }
+        }
+        if parts.is_empty() {
+            parts.push("no findings".to_owned());
+        }
+        parts.join(", ")
+    }
+}
+
+/// Text as one word of a shell; harmless names as they are.
+fn quoted(text: &str) -> String {
+    let text = visible(text);
+    let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '/' | '_' | '-' | '.' | ':');
+    if !text.is_empty() && text.chars().all(harmless) {
+        return text.into_owned();
+    }
+    format!("'{}'", text.replace('\'', "'\\''"))
+}
+
+/// What a kind of finding means, for `--explain`; `None` for a word that is none.
+pub(crate) fn explain(word: &str) -> Option<String> {
+    let (_, word, says, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
+    let more = wrapped(more);
+    Some(format!(
+        "{word}\n\n{}\n\n{more}\n\nTo forgive it:\n\nallow:\n  - {{finding: {word}, name: /name, until: 2027-01-31, why: \"…\"}}\n",
+        wrapped(says)
+    ))
+}
+
+/// Text in lines of 80 characters.
+fn wrapped(text: &str) -> String {
+    let mut out = String::new();
+    let mut width = 0;
+    for word in text.split_whitespace() {
+        let long = word.chars().count();
+        if width > 0 && width + 1 + long > 80 {
+            out.push('\n');
+            width = 0;
+        } else if width > 0 {
+            out.push(' ');
+            width += 1;
+        }
+        out.push_str(word);
+        width += long;
+    }
+    out
+}
+
+/// Findings by what caused them, in the order of the worst of each; what stands alone has no cause of its own.
+fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Finding>)> {
+    let mut groups: Vec<(Option<&str>, Vec<&Finding>)> = Vec::new();
+    for finding in findings {
+        let cause = finding.cause.as_ref().map(|c| c.text.as_str());
+        match groups
+            .iter_mut()
+            .find(|(own, _)| own.is_some() && *own == cause)
+        {
+            Some((_, group)) => group.push(finding),
+            None => groups.push((cause, vec![finding])),
+        }
+    }
+    groups
+}
+
+/// The kinds found, once each, in their order.
+fn kinds(findings: &[&Finding]) -> Vec<Kind> {
+    let mut kinds: Vec<Kind> = findings.iter().map(|f| f.kind).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds
+}

@@ -1,0 +1,79 @@
+//! GitHub's annotations: workflow commands at lines of the expectation, and the text, since the rest of them is dropped.
+
+use std::fmt::Write as _;
+
+use super::{Subject, text};
+use crate::gate::finding::{Finding, Severity};
+use crate::gate::judge::Verdict;
+
+/// A step shows so many annotations of one kind; more are dropped without a word.
+const MOST: usize = 10;
+
+/// The report; ends in a new line.
+pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
+    let findings = verdict.findings();
+    let mut out = String::new();
+    for (severity, command) in [(Severity::Error, "error"), (Severity::Warning, "warning")] {
+        let own = findings.iter().filter(|f| f.severity == severity);
+        let own: Vec<&&Finding> = own.collect();
+        // The last one that is shown says how many are not.
+        let told = if own.len() > MOST {
+            MOST - 1
+        } else {
+            own.len()
+        };
+        for finding in own.iter().take(told) {
+            annotation(subject, command, finding, &finding.says, &mut out);
+        }
+        if let Some(next) = own.get(told) {
+            let rest = own.len() - told - 1;
+            let says = format!("{} (and {rest} more in the log)", next.says);
+            annotation(subject, command, next, &says, &mut out);
+        }
+    }
+    let text = text::write(subject, verdict);
+    for line in text.lines() {
+        let _ = writeln!(out, "{}", inert(line));
+    }
+    out
+}
+
+fn annotation(
+    subject: &Subject<'_>,
+    command: &str,
+    finding: &Finding,
+    says: &str,
+    out: &mut String,
+) {
+    let details = finding.details.iter().map(String::as_str);
+    let says: Vec<&str> = std::iter::once(says).chain(details).collect();
+    let _ = writeln!(
+        out,
+        "::{command} file={},line={},title={}::{}",
+        property(&subject.file),
+        finding.place.line.max(1),
+        property(finding.kind.word()),
+        data(&says.join("\n"))
+    );
+}
+
+/// Text behind a command.
+fn data(text: &str) -> String {
+    text.replace('%', "%25")
+        .replace('\r', "%0D")
+        .replace('\n', "%0A")
+}
+
+/// A property of a command.
+fn property(text: &str) -> String {
+    data(text).replace(':', "%3A").replace(',', "%2C")
+}
+
+/// A line of the log that no runner takes for a command, which begin with `::` behind blanks.
+fn inert(line: &str) -> String {
+    if line.trim_start().starts_with("::") {
+        format!("\\{line}")
+    } else {
+        line.to_owned()
+    }
+}

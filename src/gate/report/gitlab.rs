@@ -1,0 +1,55 @@
+//! GitLab's code quality: a list of findings, each with a fingerprint that does not move with lines.
+
+use serde::Serialize;
+
+use super::Subject;
+use crate::base::words::visible_json;
+use crate::gate::finding::{Finding, Severity};
+use crate::gate::judge::Verdict;
+
+#[derive(Serialize)]
+struct Issue<'a> {
+    description: &'a str,
+    check_name: &'static str,
+    fingerprint: String,
+    severity: &'static str,
+    location: Location<'a>,
+}
+
+#[derive(Serialize)]
+struct Location<'a> {
+    path: &'a str,
+    lines: Lines,
+}
+
+#[derive(Serialize)]
+struct Lines {
+    begin: usize,
+}
+
+/// The report; ends in a new line. What is forgiven is left out.
+pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
+    let findings = verdict.findings().into_iter();
+    let told = findings.filter(|f| f.severity != Severity::Allowed);
+    let issues: Vec<Issue<'_>> = told.map(|f| issue(subject, f)).collect();
+    visible_json(&serde_json::to_string_pretty(&issues).unwrap_or_default()).into_owned() + "\n"
+}
+
+fn issue<'a>(subject: &'a Subject<'_>, finding: &'a Finding) -> Issue<'a> {
+    Issue {
+        description: &finding.says,
+        check_name: finding.kind.word(),
+        fingerprint: finding.fingerprint(),
+        severity: match finding.severity {
+            Severity::Error => "major",
+            Severity::Warning => "minor",
+            Severity::Unknown | Severity::Allowed => "info",
+        },
+        location: Location {
+            path: &subject.file,
+            lines: Lines {
+                begin: finding.place.line.max(1),
+            },
+        },
+    }
+}

@@ -1,0 +1,191 @@
+//! A summary in Markdown for a pull request or a job: its first line is enough, its table says what and when.
+
+use std::fmt::Write as _;
+
+use super::{Subject, mermaid};
+use crate::base::words;
+use crate::export::report::escape::{address, code, plain};
+use crate::gate::facts::Facts;
+use crate::gate::finding::{Finding, Severity};
+use crate::gate::judge::{Judgement, Verdict};
+
+/// The most bytes of each part; together they stay below 256 KiB, a quarter of what a job's summary may hold.
+const MOST_ROWS: usize = 128 << 10;
+const MOST_UNKNOWN: usize = 32 << 10;
+
+/// The report; ends in a new line.
+pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
+    let findings = verdict.findings();
+    let facts = Facts::new(subject.mission);
+    let told = |severities: &[Severity]| -> Vec<&Finding> {
+        let own = findings.iter().filter(|f| severities.contains(&f.severity));
+        own.copied().collect()
+    };
+    let broken = told(&[Severity::Error, Severity::Warning]);
+    let mut out = headline(subject, verdict) + "\n\n";
+    if !broken.is_empty() {
+        table(&facts, &broken, &mut out);
+    }
+    links(subject, &mut out);
+    if let Some(chart) = mermaid::chart(&facts, &broken) {
+        let open = "<details><summary>Graph around the changes</summary>";
+        let _ = writeln!(out, "{open}\n\n```mermaid\n{chart}```\n</details>\n");
+    }
+    if broken.iter().any(|f| f.accept.is_some()) {
+        let open = "<details><summary>Accept these changes</summary>";
+        let _ = writeln!(
+            out,
+            "{open}\n\n{}\n</details>\n",
+            command(&subject.accept(None))
+        );
+    }
+    list(
+        &told(&[Severity::Unknown]),
+        "What this bag cannot tell",
+        &mut out,
+    );
+    list(&told(&[Severity::Allowed]), "Allowed", &mut out);
+    let _ = writeln!(out, "<!-- bagreel:{} -->", mark(&subject.name()));
+    out
+}
+
+/// The one line that says it all.
+fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
+    let mission = subject.mission;
+    let any = |severity| verdict.count(severity) > 0;
+    let sign = if any(Severity::Error) {
+        "❌"
+    } else if any(Severity::Warning) {
+        "⚠️"
+    } else if verdict.is_blind() {
+        "❔"
+    } else {
+        "✅"
+    };
+    let said = if any(Severity::Error) || any(Severity::Warning) {
+        verdict.summary()
+    } else {
+        let kept = words::count(verdict.facts(Judgement::Kept), "rule");
+        match verdict.count(Severity::Unknown) {
+            0 => format!("{kept} kept"),
+            unknown => format!("{kept} kept, {unknown} unknown"),
+        }
+    };
+    format!(
+        "### {sign} Graph check: {said} · {} · {} · {} × {}",
+        code(&subject.name()),
+        words::offset_seconds(mission.span.nanos()),
+        mission.windows.len(),
+        words::period(mission.period.nanos())
+    )
+}
+
+fn table(facts: &Facts<'_>, findings: &[&Finding], out: &mut String) {
+    out.push_str("| | what | when | seen | expected |\n|---|---|---|---|---|\n");
+    let start = out.len();
+    for (at, finding) in findings.iter().enumerate() {
+        let row = row(facts, finding);
+        if out.len() - start + row.len() > MOST_ROWS {
+            let _ = writeln!(out, "\n{} more left out.", findings.len() - at);
+            break;
+        }
+        out.push_str(&row);
+    }
+    out.push('\n');
+}
+
+fn row(facts: &Facts<'_>, finding: &Finding) -> String {
+    let sign = if finding.severity == Severity::Error {
+        "❌"
+    } else {
+        "⚠️"
+    };
+    let when = finding
+        .when
+        .map_or_else(|| "–".to_owned(), |span| facts.stretch(span));
+    let cell = |text: &str| {
+        if text.is_empty() {
+            "–".to_owned()
+        } else {
+            value(text)
+        }
+    };
+    // A pull request is read in seconds: the kind's own words, not its whole sentence.
+    let what = finding.kind.word().replace('-', " ");
+    format!(
+        "| {sign} | {} {what} | {when} | {} | {} |\n",
+        code(&finding.name),
+        cell(&finding.seen),
+        cell(&finding.expected)
+    )
+}
+
+/// A value: names as code, words as they are.
+fn value(text: &str) -> String {
+    if text.starts_with('/') {
+        code(text)
+    } else {
+        plain(text)
+    }
+}
+
+fn links(subject: &Subject<'_>, out: &mut String) {
+    let links = subject.links.iter();
+    let links: Vec<String> = links
+        .map(|(name, url)| format!("[▶ {}](<{}>)", plain(name), address(url)))
+        .collect();
+    if !links.is_empty() {
+        let _ = writeln!(out, "{}\n", links.join(" · "));
+    }
+}
+
+fn list(findings: &[&Finding], title: &str, out: &mut String) {
+    if findings.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        out,
+        "<details><summary>{title}: {}</summary>\n",
+        findings.len()
+    );
+    let start = out.len();
+    for (at, finding) in findings.iter().enumerate() {
+        let why = finding
+            .why
+            .as_ref()
+            .map_or_else(String::new, |why| format!(": {}", plain(why)));
+        let line = format!("- {}{why}\n", plain(&finding.says));
+        if out.len() - start + line.len() > MOST_UNKNOWN {
+            let _ = writeln!(out, "- {} more left out", findings.len() - at);
+            break;
+        }
+        out.push_str(&line);
+    }
+    out.push_str("\n</details>\n\n");
+}
+
+/// A command that can be copied: a block of code, whose fence is longer than any run of backticks inside.
+fn command(text: &str) -> String {
+    let mut longest = 0;
+    let mut run = 0;
+    for c in text.chars() {
+        run = if c == '`' { run + 1 } else { 0 };
+        longest = longest.max(run);
+    }
+    let fence = "`".repeat((longest + 1).max(3));
+    format!("{fence}sh\n{text}\n{fence}")
+}
+
+/// A word inside a comment, by which an action finds what it wrote before: nothing that ends the comment.
+fn mark(name: &str) -> String {
+    let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
+    let mark: String = name
+        .chars()
+        .map(|c| if harmless(c) { c } else { '_' })
+        .collect();
+    let mark = mark
+        .trim_end_matches(".mcap")
+        .trim_end_matches(".bag")
+        .trim_end_matches(".db3");
+    mark.chars().take(100).collect()
+}

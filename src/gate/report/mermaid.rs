@@ -1,0 +1,167 @@
+//! The graph around what was found, as a Mermaid flow chart: what is gone, what is new, what changed, and what they touch.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+
+use crate::export::mermaid::escaped;
+use crate::gate::facts::Facts;
+use crate::gate::finding::{Finding, Kind};
+use crate::graph::Edge;
+
+/// The most edges that are drawn.
+const MOST_EDGES: usize = 60;
+/// The most boxes that are drawn.
+const MOST_ITEMS: usize = 80;
+/// A name of more characters is cut.
+const LONGEST: usize = 80;
+
+/// A box: whether it is a topic, and its name.
+type Item<'a> = (bool, &'a str);
+
+/// What became of a box.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Class {
+    Gone,
+    New,
+    Changed,
+}
+
+/// The chart; `None` where nothing that was found has a place in the graph. Ends in a new line.
+pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
+    let mut marked: BTreeMap<Item<'_>, (Class, &str)> = BTreeMap::new();
+    for finding in findings {
+        if let Some((item, class)) = class(finding) {
+            marked.entry(item).or_insert((class, label(finding)));
+        }
+    }
+    let edges = edges(facts, &marked, findings);
+    let mut items: BTreeSet<Item<'_>> = edges.iter().flat_map(|(a, b, _)| [*a, *b]).collect();
+    items.extend(marked.keys().take(MOST_ITEMS));
+    if items.is_empty() {
+        return None;
+    }
+    Some(written(&items, &marked, &edges))
+}
+
+fn class(finding: &Finding) -> Option<(Item<'_>, Class)> {
+    let class = match finding.kind {
+        Kind::NodeMissing | Kind::NodeGone | Kind::TopicMissing => Class::Gone,
+        Kind::UnexpectedNode
+        | Kind::UnexpectedTopic
+        | Kind::NodeForbidden
+        | Kind::TopicForbidden => Class::New,
+        Kind::OrderBroken | Kind::ReactionMissing | Kind::TooManyChanges | Kind::AllowUnused => {
+            return None;
+        }
+        _ => Class::Changed,
+    };
+    let is_node = matches!(
+        finding.kind,
+        Kind::NodeMissing
+            | Kind::NodeGone
+            | Kind::NodeForbidden
+            | Kind::NodeLate
+            | Kind::NodeRestarted
+            | Kind::NodeLifecycle
+            | Kind::UnexpectedNode
+    );
+    Some(((!is_node, &finding.name), class))
+}
+
+/// What stands behind the name in its box.
+fn label(finding: &Finding) -> &str {
+    match finding.kind {
+        Kind::TopicRateLow | Kind::TopicRateHigh | Kind::NodeLifecycle => &finding.seen,
+        _ => "",
+    }
+}
+
+/// Edges of what is marked, and those that are missing; the latter first, and dotted.
+fn edges<'a>(
+    facts: &Facts<'a>,
+    marked: &BTreeMap<Item<'_>, (Class, &str)>,
+    findings: &[&'a Finding],
+) -> Vec<(Item<'a>, Item<'a>, bool)> {
+    let mut all = Vec::new();
+    for finding in findings {
+        match finding.kind {
+            Kind::PublisherMissing => {
+                all.push((
+                    (false, finding.expected.as_str()),
+                    (true, finding.name.as_str()),
+                    true,
+                ));
+            }
+            Kind::SubscriberMissing => {
+                all.push((
+                    (true, finding.name.as_str()),
+                    (false, finding.expected.as_str()),
+                    true,
+                ));
+            }
+            _ => {}
+        }
+    }
+    let elements = &facts.mission.elements;
+    let ends = |edge: &Edge| {
+        (
+            (false, facts.role(edge.node)),
+            (true, facts.topic(edge.topic)),
+        )
+    };
+    let touches = |(node, topic): &(Item<'_>, Item<'_>), edge: &Edge| {
+        let own = marked.contains_key(node) || marked.contains_key(topic);
+        own && !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic)
+    };
+    for edge in &elements.publishes {
+        let (node, topic) = ends(edge);
+        if touches(&(node, topic), edge) {
+            all.push((node, topic, false));
+        }
+    }
+    for edge in &elements.subscribes {
+        let (node, topic) = ends(edge);
+        if touches(&(node, topic), edge) {
+            all.push((topic, node, false));
+        }
+    }
+    let mut seen = BTreeSet::new();
+    all.retain(|(a, b, _)| seen.insert((*a, *b)));
+    all.truncate(MOST_EDGES);
+    all
+}
+
+fn written(
+    items: &BTreeSet<Item<'_>>,
+    marked: &BTreeMap<Item<'_>, (Class, &str)>,
+    edges: &[(Item<'_>, Item<'_>, bool)],
+) -> String {
+    let place: BTreeMap<&Item<'_>, usize> = items.iter().zip(0..).collect();
+    let mut out = String::from("flowchart LR\n");
+    for (item, at) in &place {
+        let (open, close) = if item.0 { ("[", "]") } else { ("([", "])") };
+        let mark = marked.get(*item);
+        let name = crate::base::words::shorten(item.1, LONGEST);
+        let more = mark.map_or("", |(_, label)| *label);
+        let text = escaped(format!("{name} {more}").trim_end());
+        let class = match mark {
+            Some((Class::Gone, _)) => ":::gone",
+            Some((Class::New, _)) => ":::new",
+            Some((Class::Changed, _)) => ":::changed",
+            None => "",
+        };
+        // Writing into a string does not fail.
+        let _ = writeln!(out, "  i{at}{open}\"{text}\"{close}{class}");
+    }
+    for (from, to, is_missing) in edges {
+        let line = if *is_missing { "-.->" } else { "-->" };
+        if let (Some(from), Some(to)) = (place.get(from), place.get(to)) {
+            let _ = writeln!(out, "  i{from} {line} i{to}");
+        }
+    }
+    // Colours that hold on a light and on a dark page.
+    out.push_str("  classDef gone stroke:#d1242f,stroke-width:3px,stroke-dasharray:6 4\n");
+    out.push_str("  classDef new stroke:#1a7f37,stroke-width:3px\n");
+    out.push_str("  classDef changed stroke:#bf8700,stroke-width:3px\n");
+    out
+}

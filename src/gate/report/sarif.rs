@@ -1,0 +1,84 @@
+//! SARIF 2.1.0: every result at a line of the expectation, without which GitHub rejects the whole file.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use super::{Subject, kinds};
+use crate::base::words::visible_json;
+use crate::gate::finding::{Finding, KINDS, Severity};
+use crate::gate::judge::Verdict;
+
+/// The report; ends in a new line. What cannot be decided is a note; what is forgiven is suppressed.
+pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
+    let findings = verdict.findings();
+    let found = kinds(&findings);
+    let rules: Vec<Value> = KINDS
+        .iter()
+        .filter(|(kind, ..)| found.contains(kind))
+        .map(|(_, word, says, more)| {
+            json!({
+                "id": word,
+                "shortDescription": {"text": says},
+                "help": {"text": more},
+            })
+        })
+        .collect();
+    let results: Vec<Value> = findings.iter().map(|f| result(subject, f)).collect();
+    let report = json!({
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [{
+            "tool": {"driver": {
+                "name": "bagreel",
+                "version": env!("CARGO_PKG_VERSION"),
+                "rules": rules,
+            }},
+            "results": results,
+        }],
+    });
+    visible_json(&serde_json::to_string_pretty(&report).unwrap_or_default()).into_owned() + "\n"
+}
+
+fn result(subject: &Subject<'_>, finding: &Finding) -> Value {
+    let level = match finding.severity {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+        Severity::Unknown | Severity::Allowed => "note",
+    };
+    let mut result = json!({
+        "ruleId": finding.kind.word(),
+        "level": level,
+        "message": {"text": finding.told("\n")},
+        "locations": [{"physicalLocation": {
+            "artifactLocation": {"uri": address(&subject.file)},
+            "region": {
+                "startLine": finding.place.line.max(1),
+                "startColumn": finding.place.column.max(1),
+            },
+        }}],
+        "partialFingerprints": {"bagreel/v1": finding.fingerprint()},
+    });
+    if let (Some(why), Some(result)) = (&finding.why, result.as_object_mut()) {
+        let why = json!([{"kind": "external", "justification": why}]);
+        result.insert("suppressions".to_owned(), why);
+    }
+    result
+}
+
+/// A path as a relative reference of a URI.
+fn address(path: &str) -> String {
+    let mut out = String::new();
+    for byte in path.bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'_' | b'-' => {
+                out.push(char::from(byte));
+            }
+            b'\\' => out.push('/'),
+            byte => {
+                let _ = write!(out, "%{byte:02X}");
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,60 @@
+//! What the project's own tests, benchmarks and fuzz targets reach past the front page. No promise is made of it.
+
+/// See `src/base.rs`.
+pub mod base {
+    pub use crate::base::{error, geometry, name, notice, time, words};
+}
+
+/// See `src/evidence.rs`.
+pub mod evidence {
+    pub use crate::evidence::{Degree, Evidence, EvidenceLine, SOURCES};
+    pub use crate::evidence::{code, collector, topology};
+}
+
+/// See `src/graph.rs`.
+pub mod graph {
+    pub use crate::graph::{
+        Built, EdgeState, Element, Elements, Graph, NodeState, Options, State, TopicState, build,
+        diff, window,
+    };
+}
+
+/// See `src/mission.rs`.
+pub mod mission {
+    pub use crate::mission::{
+        Activity, Ledger, Mission, Window, events, info, ledger, phases, read_json, write_json,
+    };
+}
+
+/// See `src/view.rs`.
+pub mod view {
+    pub use crate::view::{Counts, Frame, Headline, Mark, Shown, View, ViewOptions, view};
+}
+
+/// See `src/layout.rs`.
+pub mod layout {
+    pub use crate::layout::{
+        Cluster, ENGINES, Layout, Link, Options, Orientation, Outline, Plan, Route, Vertex, engine,
+        extend, lay_out,
+    };
+}
+
+/// See `src/draw.rs`.
+pub mod draw {
+    pub use crate::draw::{picture, scene, strip, style, text};
+
+    /// See `src/draw/paint.rs`.
+    pub mod paint {
+        pub use crate::draw::paint::raster;
+    }
+}
+
+/// See `src/export.rs`.
+pub mod export {
+    pub use crate::export::{FORMATS, Output, Written, options, run, sequence};
+}
+
+/// See `src/pipeline.rs`.
+pub mod pipeline {
+    pub use crate::pipeline::{Reading, Unwatched, explain, read};
+}

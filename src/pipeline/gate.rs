@@ -1,0 +1,197 @@
+//! Judging: read the expectation, read the mission, hold one against the other, write what was found.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::{Reading, Watch, read};
+use crate::bag::Input;
+use crate::base::error::Result;
+use crate::base::{budget, file, words};
+use crate::export::check as places;
+use crate::export::sink::Sink;
+use crate::export::target::Target;
+use crate::gate::{Format, Subject, Update, Verdict, judge, update, write};
+use crate::graph::window::Length;
+use crate::mission::Mission;
+
+/// One report to write.
+pub(crate) struct Report {
+    pub(crate) target: Target,
+    pub(crate) format: &'static Format,
+}
+
+/// The whole job of `bagreel check`.
+pub(crate) struct Check {
+    pub(crate) reading: Reading,
+    pub(crate) expect: PathBuf,
+    pub(crate) reports: Vec<Report>,
+    /// The bags as they were typed.
+    pub(crate) bags: Vec<String>,
+    pub(crate) links: Vec<(String, String)>,
+    /// A file that Markdown is written behind, not over.
+    pub(crate) append_to: Option<PathBuf>,
+}
+
+impl Check {
+    /// What the reports are about.
+    pub(crate) fn subject<'a>(&self, mission: &'a Mission) -> Subject<'a> {
+        Subject {
+            mission,
+            bags: self.bags.clone(),
+            file: self.expect.display().to_string(),
+            links: self.links.clone(),
+        }
+    }
+}
+
+/// What came of it.
+pub(crate) struct Checked {
+    pub(crate) mission: Mission,
+    pub(crate) verdict: Verdict,
+}
+
+/// Judges a mission and writes every report.
+///
+/// # Errors
+/// Where the expectation, the mission or an output cannot be read or written.
+pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
+    let text = file::read_text(&job.expect, budget::USER_TEXT)?;
+    let expectation = crate::gate::read(&text, &job.expect)?;
+    let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
+    let mut kept = paths(std::slice::from_ref(&job.reading));
+    kept.push(job.expect.clone());
+    places::check(&targets, &kept)?;
+    let mut reading = job.reading.clone();
+    if let (Length::Auto, Some(period)) = (reading.division.length, expectation.period) {
+        reading.division.length = Length::Fixed(period);
+    }
+    let mission = read(&reading, watch)?;
+    let verdict = judge(&expectation, &mission);
+    let subject = job.subject(&mission);
+    for report in &job.reports {
+        let text = (report.format.write)(&subject, &verdict);
+        let path = report.target.path();
+        let before = match job.append_to.as_deref() {
+            Some(summary) if summary == path && path.is_file() => {
+                file::read_text(path, budget::SUMMARY)?
+            }
+            _ => String::new(),
+        };
+        let text = match before.trim_end() {
+            "" => text,
+            before => format!("{before}\n\n{text}"),
+        };
+        put(&report.target, &text)?;
+    }
+    Ok(Checked { mission, verdict })
+}
+
+/// The whole job of `bagreel baseline`.
+pub(crate) struct Baseline {
+    /// Each a run of its own.
+    pub(crate) runs: Vec<Reading>,
+    /// The expectation to bring up to date, if one is.
+    pub(crate) update: Option<PathBuf>,
+    /// The names to bring up to date; all if empty.
+    pub(crate) only: Vec<String>,
+    pub(crate) output: Target,
+}
+
+/// What came of it.
+pub(crate) struct Written {
+    pub(crate) missions: Vec<Mission>,
+    /// Facts that were written anew.
+    pub(crate) changed: usize,
+    /// Findings that are left.
+    pub(crate) left: usize,
+}
+
+/// Writes down what runs have in common, or brings an expectation up to date.
+///
+/// # Errors
+/// Where the expectation or a run cannot be read, or the output cannot be written.
+pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Written> {
+    let old = job.update.as_deref().map(|path| {
+        let text = file::read_text(path, budget::USER_TEXT)?;
+        let expectation = crate::gate::read(&text, path)?;
+        Ok((path, text, expectation.period))
+    });
+    let old = old.transpose()?;
+    let kept = paths(&job.runs);
+    let target = match &old {
+        Some((path, ..)) => Target::Path((*path).to_owned()),
+        None => job.output.clone(),
+    };
+    places::check(std::slice::from_ref(&target), &kept)?;
+    let mut period = old.as_ref().and_then(|(.., period)| *period);
+    let mut missions: Vec<Mission> = Vec::new();
+    for run in &job.runs {
+        let mut reading = run.clone();
+        if let (Length::Auto, Some(period)) = (reading.division.length, period) {
+            reading.division.length = Length::Fixed(period);
+        }
+        let mission = read(&reading, watch)?;
+        // All runs are seen in the windows of the first.
+        period = period.or(Some(mission.period));
+        missions.push(mission);
+    }
+    let Update {
+        text,
+        changed,
+        left,
+    } = if let Some((path, text, _)) = old {
+        update(&text, path, &missions, &job.only)?
+    } else {
+        Update {
+            text: written(&missions),
+            changed: 0,
+            left: 0,
+        }
+    };
+    put(&target, &text)?;
+    Ok(Written {
+        missions,
+        changed,
+        left,
+    })
+}
+
+/// The expectation that holds in all of these runs.
+fn written(missions: &[Mission]) -> String {
+    let names: Vec<String> = missions.iter().map(name).collect();
+    let from = words::some_of(&names, 3);
+    let period = missions.first().map(|m| m.period);
+    period.map_or_else(String::new, |period| write(missions, &from, period))
+}
+
+fn name(mission: &Mission) -> String {
+    mission
+        .bags
+        .first()
+        .map_or_else(String::new, |bag| bag.name.clone())
+}
+
+/// The files that are read.
+fn paths(readings: &[Reading]) -> Vec<PathBuf> {
+    let inputs = readings.iter().flat_map(|reading| &reading.inputs);
+    let paths = inputs.filter_map(|input| match input {
+        Input::Path(path) => Some(path.clone()),
+        Input::Stdin => None,
+    });
+    paths
+        .filter(|path| path.as_path() != Path::new(""))
+        .collect()
+}
+
+/// Writes a text whole or not at all.
+fn put(target: &Target, text: &str) -> Result<()> {
+    places::make_folder(target)?;
+    let mut sink = Sink::create(target, None)?;
+    let failed = sink.error();
+    match sink.write_all(text.as_bytes()) {
+        Ok(()) => sink.commit().map(drop),
+        // Whoever reads the other end of a pipe has what it wanted.
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        Err(error) => Err(failed(error)),
+    }
+}

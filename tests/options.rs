@@ -1,0 +1,515 @@
+//! Every option of every command changes what comes out, or is refused with a hint: one row for each, and none missing.
+//!
+//! A row is a command line and what is added to it; the option is the first word that is added.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+use crate::source;
+use crate::support::{ORIGIN, Recording, rosbag1};
+
+/// Command, its arguments, and an option that changes the files or the results.
+#[rustfmt::skip]
+const CHANGES: &[(&str, &str, &str)] = &[
+    ("render", "r.bag -o out/x.json", "--output out/y.json"),
+    ("render", "r.bag -o -", "--format json"),
+    ("render", "r.bag -o out/x.json", "--period 7s"),
+    ("render", "r.bag -p 10 -o out/x.json", "--step 5s"),
+    ("render", "r.bag -o out/x.json", "--start 20"),
+    ("render", "r.bag -o out/x.json", "--end -20s"),
+    ("render", "r.bag -p 7 -o out/x.json", "--align clock"),
+    ("render", "r.bag -p 1 -o out/x.json", "--skip-unchanged"),
+    ("render", "r.bag -o out/x.json", "--rate-change 5"),
+    ("render", "r.bag -p 5 -o out/x.json", "--grace 2"),
+    ("render", "r.bag -o out/x.json", "--roles"),
+    ("render", "r.bag -o out/x.json", "--topology t.csv"),
+    ("render", "s.mcap -o out/x.json", "--source ws"),
+    ("render", "s.mcap --source ws -o out/x.json", "--source-at worktree"),
+    ("render", "r.bag -o out/x.json", "--infer stamps"),
+    ("render", "big.bag -o out/x.json", "--bytes"),
+    ("render", "r.bag -o out/x.dot", "--mode nodes"),
+    ("render", "r.bag -o out/x.dot", "--ns-filter /ns/.*"),
+    ("render", "r.bag -o out/x.dot", "--topic-filter /ns/.*"),
+    ("render", "r.bag -o out/x.dot", "--hide none"),
+    ("render", "r.bag -o out/x.dot", "--group none"),
+    ("render", "r.bag -o out/x.dot", "--collapse /ns"),
+    ("render", "r.bag -o out/x.dot", "--show-recorder"),
+    ("render", "r.bag -o out/x.dot", "--rqt-defaults"),
+    ("render", "r.bag -p all --size 100x100 -o out/x.svg", "--expand /ns"),
+    ("render", "r.bag -o out/x.json", "--filtered"),
+    ("render", "r.bag -o out/x.csv --ns-filter -/late", "--filtered"),
+    ("render", "r.bag -p all -o out/x.svg", "--style dark"),
+    ("render", "r.bag -p all -o out/x.svg", "--view board"),
+    ("render", "r.bag -p all -o out/x.svg", "--for column"),
+    ("render", "r.bag -p all -o out/x.png", "--size 300x200"),
+    ("render", "r.bag -p all -o out/x.svg", "--width 88mm"),
+    ("render", "r.bag -p all --size 100x100 -o out/x.svg", "--fit none"),
+    ("render", "r.bag -p all -o out/x.svg", "--orientation LR"),
+    ("render", "r.bag -p all -o out/x.svg", "--layout layout-rs"),
+    ("render", "r.bag -p all -o out/x.svg", "--layout-from wide.json"),
+    ("render", "r.bag -p all -o out/x.svg", "--title Hello"),
+    ("render", "r.bag -p all -o out/x.svg", "--bare"),
+    ("render", "r.bag -p all -o out/x.svg", "--captions c.txt"),
+    ("render", "r.bag -p 20 --size 200x200 -o out/x.gif", "--frame-ms 500"),
+    ("render", "r.bag -p 20 --size 200x200 -o out/x.gif", "--tween 1"),
+    ("render", "r.bag -p 20 --size 200x200 -o out/x.gif", "--hold-changes 2"),
+    ("render", "r.bag -p 20 --size 200x200 -o out/x.gif", "--max-bytes 6kB"),
+    ("render", "r.bag -p 20 --size 200x200 -o out/x.gif", "--poster out/p.png"),
+    ("render", "r.bag -p 20 -o out/x.svg", "--strip 0,1"),
+    ("render", "r.bag -o out/x.dot", "--dot-profile plain"),
+    ("render", "r.bag -o out/x.md", "--link player=https://example.org"),
+    ("render", "r.bag --width 180mm -o out/x.svg", "--figure lives"),
+    ("render", "r.bag --width 180mm --figure lives -o out/x.svg", "--rows topics"),
+    ("render", "r.bag --width 180mm --phases p.txt --figure steps -o out/x.svg", "--steps 2"),
+    ("render", "r.bag --width 180mm --figure lives -o out/x.svg", "--text 9pt"),
+    ("render", "r.bag -o out/x.json", "--phases p.txt"),
+    ("info", "r.bag", "--format json"),
+    ("info", "r.bag", "--why /chat"),
+    ("info", "r.bag", "--roles"),
+    ("info", "r.bag", "--topology t.csv"),
+    ("info", "s.mcap", "--source ws"),
+    ("info", "s.mcap --source ws", "--source-at worktree"),
+    ("info", "r.bag", "--infer stamps"),
+    ("info", "big.bag --format json", "--bytes"),
+    ("extract", "r.bag", "--output out/y.csv"),
+    ("extract", "r.bag -o out/x.csv", "--format parquet"),
+    ("extract", "r.bag -o out", "--fields"),
+    ("extract", "r.bag -o out/x.csv", "--topic-filter /chat"),
+    ("extract", "r.bag -o out/x.csv", "--start 20"),
+    ("extract", "r.bag -o out/x.csv", "--end 20"),
+    ("events", "r.bag", "--format csv"),
+    ("events", "r.bag", "--rate-change 5"),
+    ("events", "r.bag", "--parts"),
+    ("events", "r.bag", "--all"),
+    ("events", "r.bag --all", "--phases"),
+    ("events", "r.bag", "--start 20"),
+    ("events", "r.bag", "--end -20s"),
+    ("events", "r.bag", "--roles"),
+    ("events", "r.bag --parts", "--topology t.csv"),
+    ("events", "r.bag --parts", "--infer stamps"),
+    ("baseline", "r.bag", "--output out/x.yaml"),
+    ("baseline", "r.bag", "--period 7s"),
+    ("baseline", "r.bag", "--start 20"),
+    ("baseline", "r.bag", "--end 20"),
+    ("baseline", "r.bag", "--roles"),
+    ("baseline", "r.bag", "--update few.yaml"),
+    ("check", "r.bag --expect all.yaml", "--format json"),
+    ("check", "r.bag --expect all.yaml", "--output out/x.json"),
+    ("check", "r.bag --expect all.yaml --format markdown", "--link player=https://example.org"),
+    ("check", "r.bag --expect all.yaml", "--period 7s"),
+    ("check", "r.bag --expect all.yaml", "--start 20"),
+];
+
+/// Options whose row is still to be written.
+const OPEN: &[(&str, &[&str])] = &[
+    (
+        "baseline",
+        &["topology", "source", "source-at", "infer", "only"],
+    ),
+    (
+        "check",
+        &[
+            "end",
+            "roles",
+            "topology",
+            "source",
+            "source-at",
+            "infer",
+            "undecidable",
+            "expect",
+            "explain",
+        ],
+    ),
+];
+
+/// Command, its arguments, an option, and what it makes the command say.
+#[rustfmt::skip]
+const SAYS: &[(&str, &str, &str, &str)] = &[
+    ("render", "r.bag -o out/x.json", "--verify", "a second reader counts the same"),
+    ("render", "r.bag -o out/x.json", "--timings", " s  read"),
+    ("info", "r.bag", "--verify", "a second reader counts the same"),
+    ("events", "r.bag", "--verify", "a second reader counts the same"),
+    ("events", "s.mcap", "--source ws", "has no times"),
+    ("events", "r.bag", "--period 7s", "the same for all"),
+    ("events", "r.bag", "--step 7s", "the same for all"),
+    ("events", "r.bag", "--align clock", "the same for all"),
+    ("events", "r.bag", "--skip-unchanged", "the same for all"),
+    ("events", "r.bag", "--grace 2", "the same for all"),
+    ("render", "r.bag --figure lives -o out/x.svg", "--period 7s", "the same for all"),
+];
+
+/// Command, its arguments, an option that says nothing to them, and the hint.
+#[rustfmt::skip]
+const REFUSED: &[(&str, &str, &str, &str)] = &[
+    ("render", "r.bag -o out/x.gif", "--font c.txt", "hint: give `--font` a .ttf"),
+    ("render", "r.bag -o out/x.gif", "--watch", "hint: `bagreel styles light > mine.toml`"),
+    ("render", "old.json -o out/x.svg", "--verify", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--period 7s", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--step 7s", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--start 7s", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--end 7s", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--align clock", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--skip-unchanged", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--grace 3", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--rate-change 3", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--roles", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--topology t.csv", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--source ws", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.svg", "--infer stamps", "hint: give the bag itself"),
+    ("render", "old.json -o out/x.json", "--bytes", "hint: give the bag itself"),
+    ("events", "s.mcap", "--source-at HEAD", "--source <DIR>"),
+    ("info", "old.json", "--verify", "hint: give the bag itself"),
+    ("info", "old.json", "--topology t.csv", "hint: give the bag itself"),
+    ("events", "old.json", "--start 9", "hint: give the bag itself"),
+    ("info", "r.bag --why /chat", "--format json", "cannot be used with"),
+    ("info", "r.bag --why /chat", "--verify", "cannot be used with"),
+    ("info", "bags", "--why /chat", "hint: name one of the bags"),
+    ("render", "r.bag -o out/x.json", "--style dark", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.dot", "--style dark", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.mmd", "--orientation TB", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.dot", "--layout layout-rs", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.csv", "--layout-from wide.json", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.md", "--size 300x200", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.json", "--fit none", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.json", "--expand /ns", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.json", "--width 88mm", "hint: pictures take it"),
+    ("render", "r.bag -o out/x.json", "--title Hello", "hint: pictures, reports"),
+    ("render", "r.bag -o out/x.html", "--bare", "hint: animations, pages, figures"),
+    ("render", "r.bag -o out/x.html", "--captions c.txt", "hint: animations, pages"),
+    ("render", "r.bag -o out/x.svg", "--captions c.txt", "hint: animations, pages"),
+    ("render", "r.bag -o out/x.md", "--captions c.txt", "hint: animations, pages"),
+    ("render", "r.bag -o out/x.json", "--captions c.txt", "hint: animations, pages"),
+    ("render", "r.bag -o out/x.json", "--mode nodes", "hint: data holds the whole graph"),
+    ("render", "r.bag -o out/x.gexf", "--hide none", "hint: data holds the whole graph"),
+    ("render", "r.bag -o out/x.csv", "--ns-filter /ns/.*", "hint: data holds the whole graph"),
+    ("render", "r.bag -o out/x.gif", "--filtered", "hint: data takes it"),
+    ("render", "r.bag -o out/x.pdf", "--frame-ms 500", "hint: animations take it"),
+    ("render", "r.bag -o out/x.svg", "--tween 2", "hint: animations take it"),
+    ("render", "r.bag -o out/x.html", "--hold-changes 2", "hint: animations take it"),
+    ("render", "r.bag -o out/x.gif", "--strip changes", "hint: pictures of the whole"),
+    ("render", "r.bag -o out/{n}.svg", "--strip changes", "hint: pictures of the whole"),
+    ("render", "r.bag -o out/x.svg", "--max-bytes 1MB", "hint: `x.gif` and"),
+    ("render", "r.bag -o out/x.svg", "--dot-profile plain", "hint: `x.dot` takes it"),
+    ("render", "r.bag -o out/x.gif", "--link a=https://b.c", "hint: reports take it"),
+    ("render", "r.bag -o out/x.gif", "--phases p.txt", "hint: figures and data"),
+    ("render", "r.bag -o out/x.gif", "--source-at HEAD", "--source <DIR>"),
+    ("render", "r.bag -o out/x.svg", "--rows nodes", "--figure"),
+    ("render", "r.bag -o out/x.svg", "--steps 2", "--figure"),
+    ("render", "r.bag -o out/x.svg", "--text 9pt", "--figure"),
+];
+
+/// Half a minute in which something happens for every option: a rate that falls, a sender that stops, one that comes
+/// back under another name, a filter that copies stamps, housekeeping, a recorder.
+fn recording() -> Recording {
+    let mut bag = Recording::default();
+    let mut header = |node: &str, topic: &str| {
+        let place = bag.publisher(node, topic, "test_msgs/Stamped");
+        "Header header\n================\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n".clone_into(&mut bag.publishers[place].definition);
+        place
+    };
+    let image = header("/ns/cam/driver", "/ns/cam/image");
+    let filtered = header("/ns/nav/filter", "/ns/nav/points");
+    for (place, late) in [(image, 0), (filtered, 20_000_000)] {
+        for k in 0..150_i64 {
+            // From ten a second to four.
+            let at = if k < 100 {
+                k * 100
+            } else {
+                10_000 + (k - 100) * 250
+            };
+            if late > 0 && at < 5000 {
+                continue;
+            }
+            let stamp = ORIGIN + at * 1_000_000;
+            let mut payload = vec![u8::from(late > 0); 4];
+            payload.extend(u32::try_from(stamp / 1_000_000_000).unwrap().to_le_bytes());
+            payload.extend(u32::try_from(stamp % 1_000_000_000).unwrap().to_le_bytes());
+            payload.extend([0; 4]);
+            bag.messages.push((place, stamp + late, payload));
+        }
+    }
+    for (node, topic, from, to) in [
+        ("/talker_1_1704067200123", "/chat", 0, 10_000),
+        ("/talker_2_1704067230123", "/chat", 15_000, 22_000),
+        ("/late", "/ns/nav/found", 18_000, 22_000),
+        ("/rosbag2_recorder", "/ns/log", 0, 22_000),
+        ("/ns/cam/driver", "/ns/cam/image/compressed", 0, 22_000),
+        ("/ns/cam/driver", "/rosout_agg", 0, 22_000),
+    ] {
+        let place = bag.publisher(node, topic, "std_msgs/String");
+        bag.send(place, (from, to), 200, b"\x05\0\0\0hello");
+    }
+    bag.messages.sort_by_key(|m| m.1);
+    bag
+}
+
+/// More than is read of payloads unless somebody asks: 70 messages of 1 MB that do not pack.
+fn large() -> Recording {
+    let mut bag = Recording::default();
+    let place = bag.publisher("/camera", "/image", "std_msgs/String");
+    let mut state = 1_u64;
+    for second in 0..70 {
+        let payload = std::iter::repeat_with(|| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 56) as u8
+        });
+        let at = ORIGIN + second * 1_000_000_000;
+        bag.messages
+            .push((place, at, payload.take(1_000_000).collect()));
+    }
+    bag
+}
+
+/// A folder with everything that the rows name.
+fn folder() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    let bag = rosbag1::write(&recording(), rosbag1::Pack::Lz4, 4000);
+    let put = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    };
+    put("r.bag", &bag);
+    put(
+        "big.bag",
+        &rosbag1::write(&large(), rosbag1::Pack::Lz4, 4 << 20),
+    );
+    put("bags/a.bag", &bag);
+    put("bags/b.bag", &bag);
+    put(
+        "t.csv",
+        b"Name,Publish,Subscribe,Node-start,Node-end\n/new,[],\"['/chat']\",,\n",
+    );
+    let expects = |topics: &str| format!("schema: bagreel.expect/1\ntopics:\n{topics}");
+    let gone = "  /chat: {type: gone/Gone}\n  /ns/log: {type: gone/Gone}\n";
+    put("few.yaml", expects(gone).as_bytes());
+    put("new.yaml", expects("  /chat: {to: [/new]}\n").as_bytes());
+    put(
+        "code.yaml",
+        expects("  /in: {to: [/talker_late]}\n").as_bytes(),
+    );
+    put("c.txt", b"0|here it begins\n");
+    put("p.txt", b"0:00 first\n0:05 second\n0:12 third\n");
+    let topics = [("/out_late", source::STRING), ("/in", source::STRING)];
+    put("s.mcap", &source::bag(&topics, &["/talker_late"]));
+    let (package, xml) = source::PACKAGE;
+    put(&format!("ws/{package}"), xml.as_bytes());
+    put(
+        "ws/p/p/talker.py",
+        source::node("talker_late", "out_late", "/in").as_bytes(),
+    );
+    git(&folder.path().join("ws"));
+    put(
+        "ws/p/p/talker.py",
+        source::node("talker_late", "out_late", "/gone").as_bytes(),
+    );
+    let written = bagreel(folder.path(), "baseline", "r.bag -o all.yaml", "");
+    assert_eq!(written.status.code(), Some(0), "{}", text(&written.stderr));
+    for (with, name) in [("", "old.json"), ("--orientation=LR", "wide.json")] {
+        let args = format!("r.bag -p 20 -o {name} -o pic.svg {with}");
+        let output = bagreel(folder.path(), "render", &args, "");
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    }
+    folder
+}
+
+/// Commits what lies there, long before it was recorded.
+fn git(workspace: &Path) {
+    for args in [
+        "init -q",
+        "add .",
+        "-c user.name=a -c user.email=a@b.c commit -qm code",
+    ] {
+        let mut git = Command::new("git");
+        git.current_dir(workspace).args(args.split_whitespace());
+        git.env("GIT_COMMITTER_DATE", "2023-01-01T00:00:00Z");
+        assert!(git.status().unwrap().success(), "git {args}");
+    }
+}
+
+fn bagreel(folder: &Path, command: &str, args: &str, with: &str) -> Output {
+    fs::create_dir_all(folder.join("out")).unwrap();
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    run.current_dir(folder).arg(command);
+    run.args(args.split_whitespace())
+        .args(with.split_whitespace());
+    run.output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// The results and the files of one run.
+type Outcome = (Vec<u8>, BTreeMap<String, Vec<u8>>);
+
+/// What a command line gives; `None` where it is refused.
+fn outcome(folder: &Path, command: &str, args: &str, with: &str) -> Option<Outcome> {
+    let _ = fs::remove_dir_all(folder.join("out"));
+    let output = bagreel(folder, command, args, &format!("{with} -q"));
+    let said = text(&output.stderr);
+    match output.status.code() {
+        // 3: some topics cannot be decoded.
+        Some(0 | 3) => {}
+        // What is found is a result.
+        Some(1) if command == "check" => {}
+        Some(1 | 2) => return None,
+        code => panic!("{command} {args} {with}: {code:?} {said}"),
+    }
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(folder.join("out")).unwrap() {
+        let entry = entry.unwrap();
+        let name = text(entry.file_name().as_encoded_bytes());
+        files.insert(name, fs::read(entry.path()).unwrap());
+    }
+    Some((output.stdout, files))
+}
+
+fn changes(command: &str) {
+    let folder = folder();
+    let mut without: BTreeMap<&str, Option<Outcome>> = BTreeMap::new();
+    let mut wrong = Vec::new();
+    for (_, args, with) in CHANGES.iter().filter(|row| row.0 == command) {
+        let run = |with| outcome(folder.path(), command, args, with);
+        let plain = without.entry(args).or_insert_with(|| run(""));
+        let changed = run(with);
+        if changed.is_none() || *plain == changed {
+            wrong.push(format!("{command} {args} {with}"));
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "these do nothing, or are refused:\n{}",
+        wrong.join("\n")
+    );
+}
+
+#[test]
+fn every_option_of_render_changes_something() {
+    changes("render");
+}
+
+#[test]
+fn every_option_of_info_changes_something() {
+    changes("info");
+}
+
+#[test]
+fn every_option_of_events_changes_something() {
+    changes("events");
+}
+
+#[test]
+fn every_option_of_extract_changes_something() {
+    changes("extract");
+}
+
+#[test]
+fn every_option_of_baseline_changes_something() {
+    changes("baseline");
+}
+
+#[test]
+fn every_option_of_check_changes_something() {
+    changes("check");
+}
+
+#[test]
+fn what_an_option_says_is_said_only_with_it() {
+    let folder = folder();
+    for (command, args, with, says) in SAYS {
+        let said = |with| text(&bagreel(folder.path(), command, args, with).stderr);
+        let (without, with_it) = (said(""), said(with));
+        assert!(with_it.contains(says), "{command} {args} {with}: {with_it}");
+        assert!(!without.contains(says), "{command} {args}: {without}");
+    }
+}
+
+#[test]
+fn options_that_say_nothing_are_refused_with_a_hint() {
+    let folder = folder();
+    for (command, args, with, hint) in REFUSED {
+        let output = bagreel(folder.path(), command, args, with);
+        let said = text(&output.stderr);
+        let code = output.status.code();
+        assert!(
+            matches!(code, Some(1 | 2)),
+            "{command} {args} {with}: {code:?} {said}"
+        );
+        assert!(said.contains(hint), "{command} {args} {with}: {said}");
+        let files = fs::read_dir(folder.path().join("out")).unwrap().count();
+        assert_eq!(files, 0, "{command} {args} {with} wrote something");
+    }
+}
+
+/// The options that `--help` of a command lists.
+fn listed(command: &str) -> BTreeSet<String> {
+    let output = bagreel(Path::new("."), command, "", "--help");
+    let help = text(&output.stdout);
+    let options = help.lines().filter_map(|line| {
+        let line = line.trim_start();
+        let line = line
+            .strip_prefix('-')
+            .filter(|rest| !rest.starts_with('-'))
+            .map_or(line, |rest| {
+                rest.split_once(", ").map_or(line, |(_, long)| long)
+            });
+        let long = line.strip_prefix("--")?;
+        let end = long.find(|c: char| c != '-' && !c.is_ascii_lowercase());
+        Some(long[..end.unwrap_or(long.len())].to_owned())
+    });
+    // These two belong to the command line itself.
+    options
+        .filter(|o| !["help", "version", "quiet"].contains(&o.as_str()))
+        .collect()
+}
+
+#[test]
+fn every_option_has_a_row() {
+    let help = text(&bagreel(Path::new("."), "--help", "", "").stdout);
+    let commands = help.lines().skip_while(|l| *l != "Commands:").skip(1);
+    let commands = commands.take_while(|l| !l.is_empty());
+    let commands: Vec<&str> = commands
+        .filter_map(|l| l.split_whitespace().next())
+        .collect();
+    assert!(
+        commands.contains(&"render") && commands.len() > 5,
+        "{commands:?}"
+    );
+    let rows = CHANGES.iter().map(|row| (row.0, row.2));
+    let said = SAYS.iter().chain(REFUSED).map(|row| (row.0, row.2));
+    let rows: BTreeSet<(&str, &str)> = rows
+        .chain(said)
+        .filter_map(|(command, with)| {
+            Some((command, with.split_whitespace().next()?.strip_prefix("--")?))
+        })
+        .collect();
+    for command in commands.iter().filter(|c| **c != "help") {
+        let mut listed = listed(command);
+        for (_, open) in OPEN.iter().filter(|row| row.0 == *command) {
+            listed.retain(|option| !open.contains(&option.as_str()));
+        }
+        let missing: Vec<&String> = listed
+            .iter()
+            .filter(|o| !rows.contains(&(*command, o.as_str())))
+            .collect();
+        assert!(
+            missing.is_empty(),
+            "`bagreel {command}`: no row for {missing:?}"
+        );
+        let gone = rows
+            .iter()
+            .filter(|row| row.0 == *command && !listed.contains(row.1));
+        assert_eq!(
+            gone.count(),
+            0,
+            "`bagreel {command}`: a row for what is not listed"
+        );
+    }
+}
