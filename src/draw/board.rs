@@ -54,7 +54,7 @@ pub(crate) struct Board<'a> {
 
 /// The whole board in one drawing, and where the head stands in each window.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Overview {
+pub struct Overview {
     /// The board with everything that was sent; no head.
     pub scene: Scene,
     /// The head in pixels, per window.

@@ -27,7 +27,7 @@ pub use self::union::{Part, Union, rate_label, sign};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
-use crate::draw::figure::Course;
+pub use crate::draw::figure::course::Course;
 use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
@@ -54,7 +54,7 @@ pub struct PageOptions {
     /// Whether the signs are explained.
     pub has_legend: bool,
     /// Who lived when, for the strip at the bottom; without it the strip shows messages per second.
-    pub(crate) course: Option<Course>,
+    pub course: Option<Course>,
     /// From which relative change of a rate on it is told, for the legend.
     pub rate_change: f64,
 }

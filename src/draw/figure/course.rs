@@ -10,7 +10,7 @@ use crate::graph::NodeId;
 
 /// Who lived when, in rows from top to bottom, and the phases.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Course {
+pub struct Course {
     /// The phases, none if there is only one.
     pub(crate) phases: Vec<Span>,
     pub(crate) rows: Vec<CourseRow>,
