@@ -29,7 +29,7 @@ use crate::graph::window::{Division, Length};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::mission::{Mission, events};
 use crate::pipeline::{
-    Drawing, Phases, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read,
+    Drawing, Phases, Purpose, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read,
     survey, survey_file,
 };
 use applies::Given;
@@ -346,13 +346,25 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             .collect::<Result<_, _>>()?,
     };
     outputs.extend(args.sequence.poster.as_deref().map(Output::poster));
+    let purpose = args
+        .look
+        .purpose
+        .as_deref()
+        .map(Purpose::parse)
+        .transpose()?;
+    let page = look::options(&args.look, title, args.change.rate_change);
     Ok(Render {
         drawing: Drawing {
+            body: look::body(args)?,
             view: look::view(&args.view)?,
             style: look::style(&args.look.style)?,
             fonts: look::fonts(args.look.font.as_deref())?,
-            page: look::options(&args.look, title, args.change.rate_change),
-            is_sized: args.look.size.is_some(),
+            page: match purpose {
+                Some(purpose) => purpose.page(page),
+                None => page,
+            },
+            is_sized: args.look.size.is_some() || purpose.is_some(),
+            purpose,
             is_fitted: args.look.fit == "auto",
             engine: crate::layout::engine(&args.look.layout)?,
             kept: look::kept(args.look.layout_from.as_deref())?,

@@ -1,5 +1,6 @@
 //! Drawings as values: style, measured text and the scene of each window; painters stand in `paint`.
 
+pub(crate) mod board;
 pub(crate) mod figure;
 pub(crate) mod paint;
 pub mod picture;

@@ -42,6 +42,7 @@ function seek(w, quiet) {
 	const { n = 0, texts = [] } = chips.get(w) ?? {};
 	$.chips.dataset.entries = n;
 	$.chips.innerHTML = texts.map((t, m) => t && `<span class=${KINDS[m]}>${t}</span> `).join('');
+	if ($.head) for (const k of ['x', 'width']) $.head.setAttribute(k, $.head.dataset[k].split(' ')[w]);
 	$.seek.value = w;
 	$.seek.ariaValueText = [time, place, $.chips.textContent].join(', ');
 	list('news', news);

@@ -49,7 +49,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["filtered", "frames"],
     ]),
     ("layout", &[&["isotonic", "layers", "pack", "pinned", "routes", "spacing"], &["grid"], &["layered"], &["layout_rs", "ring"]]),
-    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["paint", "strip"]]),
+    ("draw", &[&["text"], &["style"], &["scene"], &["figure"], &["picture"], &["board", "paint", "strip"]]),
     ("export", &[
         &["options", "palette", "target"],
         &["sequence", "sink"],
@@ -67,7 +67,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["baseline", "difference", "report"],
     ]),
     ("pipeline", &[
-        &["collect", "draw", "phases"],
+        &["collect", "draw", "phases", "purpose"],
         &["figure", "verify"],
         &["read"],
         &["export", "extract", "survey"],

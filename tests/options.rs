@@ -43,6 +43,8 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("render", "r.bag -o out/x.json", "--filtered"),
     ("render", "r.bag -o out/x.csv --ns-filter -/late", "--filtered"),
     ("render", "r.bag -p all -o out/x.svg", "--style dark"),
+    ("render", "r.bag -p all -o out/x.svg", "--view board"),
+    ("render", "r.bag -p all -o out/x.svg", "--for column"),
     ("render", "r.bag -p all -o out/x.png", "--size 300x200"),
     ("render", "r.bag -p all -o out/x.svg", "--width 88mm"),
     ("render", "r.bag -p all --size 100x100 -o out/x.svg", "--fit none"),

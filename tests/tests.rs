@@ -9,6 +9,7 @@
 )]
 
 mod architecture;
+mod board;
 mod ci;
 mod cli;
 mod counts;

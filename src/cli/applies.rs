@@ -83,6 +83,8 @@ const RULES: &[Rule] = &[
     Rule {
         options: &[
             "style",
+            "view",
+            "for",
             "size",
             "width",
             "fit",

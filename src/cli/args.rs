@@ -286,6 +286,10 @@ pub(super) struct SizeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "View")]
 pub(super) struct ViewArgs {
+    /// What the picture is: the graph, or a board of topics over time, which is the default where of most messages nobody
+    /// knows the publisher and no option asks for the graph.
+    #[arg(long, value_name = "graph|board", value_parser = ["graph", "board"], conflicts_with = "figure")]
+    pub(super) view: Option<String>,
     /// What to draw: nodes only, nodes with one arrow for all topics between two of them, nodes and active topics, or
     /// all topics.
     #[arg(long, value_name = "nodes|bundles|active|all", value_parser = ["nodes", "bundles", "active", "all"])]
@@ -328,6 +332,11 @@ pub(super) struct LookArgs {
     /// The size of a frame in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<(u32, u32)>,
+    /// Where the picture will be seen, which sets page, text and furniture so that it can be read there: on a
+    /// repository's front page (830 pixels), a slide (1280 × 720), in a paper's column (88 mm) or on its page (181 mm).
+    #[arg(id = "for", long = "for", value_name = "readme|slide|column|page", value_parser = ["readme", "slide", "column", "page"],
+        conflicts_with_all = ["size", "width", "figure", "strip", "layout_from"])]
+    pub(super) purpose: Option<String>,
     /// The width of a vector figure on paper: `88mm`, `180mm`.
     #[arg(long, value_name = "MM", value_parser = width)]
     pub(super) width: Option<f64>,

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::args::{FigureArgs, LookArgs, SequenceArgs, ViewArgs};
+use super::args::{FigureArgs, LookArgs, RenderArgs, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::{budget, file};
@@ -14,7 +14,7 @@ use crate::draw::text::Fonts;
 use crate::export::options::{self, FigureOptions, Profile};
 use crate::layout::Orientation;
 use crate::mission::{Places, read_json};
-use crate::pipeline::Phases;
+use crate::pipeline::{Body, Phases};
 use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
 /// What is shown: `rqt_graph`'s defaults or ours, then what was asked for.
@@ -110,6 +110,34 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::Options> {
         links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
         ..options::Options::default()
     })
+}
+
+/// Graph or board: what is asked for, or a graph where an option says something that only a graph has.
+pub(super) fn body(args: &RenderArgs) -> Result<Body> {
+    let (view, look) = (&args.view, &args.look);
+    let typed = [
+        ("--mode", view.mode.is_some()),
+        ("--hide", view.hide.is_some()),
+        ("--group", view.group.is_some()),
+        ("--collapse", !view.collapse.is_empty()),
+        ("--expand", !view.expand.is_empty()),
+        ("--rqt-defaults", view.rqt_defaults),
+        ("--show-recorder", view.show_recorder),
+        ("--orientation", look.orientation != "auto"),
+        ("--layout", look.layout != "layered"),
+        ("--layout-from", look.layout_from.is_some()),
+        ("--strip", args.sequence.strip.is_some()),
+    ];
+    let graph = typed.iter().find(|(_, is)| *is).map(|(flag, _)| *flag);
+    match (view.view.as_deref(), graph) {
+        (Some("board"), Some(flag)) => Err(Error::usage(
+            format!("`{flag}` says nothing to a board of topics"),
+            "leave it out, or `--view graph`",
+        )),
+        (Some("board"), None) => Ok(Body::Board),
+        (None, None) => Ok(Body::Auto),
+        _ => Ok(Body::Graph),
+    }
 }
 
 /// The figure that was asked for.

@@ -5,11 +5,13 @@
 
 pub(crate) mod band;
 pub(crate) mod canvas;
+pub(crate) mod course;
 mod groups;
 pub(crate) mod incidents;
 mod labels;
 mod legend;
 pub(crate) mod levels;
+pub(crate) mod live;
 pub(crate) mod lives;
 mod map;
 pub(crate) mod notes;
@@ -31,6 +33,7 @@ use crate::mission::Mission;
 use crate::view::NameFilter;
 
 use canvas::Sizes;
+pub(crate) use course::Course;
 use source::Source;
 
 /// Which figure.

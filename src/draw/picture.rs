@@ -5,12 +5,13 @@ mod badge;
 mod boxes;
 mod chips;
 pub(crate) use chips::chips;
+mod course;
 mod legend;
 mod measured;
 mod options;
-mod page;
+pub(crate) mod page;
 mod timeline;
-mod title;
+pub(crate) mod title;
 mod tween;
 mod union;
 
@@ -27,6 +28,7 @@ pub use self::union::{Part, Union, rate_label, sign};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
+pub use crate::draw::figure::course::Course;
 use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
@@ -50,6 +52,12 @@ pub struct PageOptions {
     pub orientation: Option<Orientation>,
     /// The mission's phase in each window, by place among the view's frames; empty for none.
     pub phases: Vec<String>,
+    /// The scale of furniture; by the size of the page if `None`.
+    pub unit: Option<f64>,
+    /// Whether the signs are explained.
+    pub has_legend: bool,
+    /// Who lived when, for the strip at the bottom; without it the strip shows messages per second.
+    pub course: Option<Course>,
     /// From which relative change of a rate on it is told, for the legend.
     pub rate_change: f64,
 }
@@ -64,6 +72,9 @@ impl Default for PageOptions {
             title: String::new(),
             orientation: None,
             phases: Vec::new(),
+            unit: None,
+            has_legend: true,
+            course: None,
             rate_change: 0.25,
         }
     }
@@ -85,13 +96,12 @@ impl<'a> Measured<'a> {
     pub fn new(view: &'a View, style: &'a Style, fonts: &'a Fonts, options: PageOptions) -> Self {
         let graph = MeasuredGraph::new(view, style, fonts);
         let signs = legend::signs(view, options.rate_change);
-        let legend = legend::rows(
-            &signs,
-            style,
-            fonts,
-            page::unit(options.size),
-            options.size.w,
-        );
+        let unit = page::unit(&options);
+        let legend = if options.has_legend {
+            legend::rows(&signs, style, fonts, unit, options.size.w)
+        } else {
+            Vec::new()
+        };
         let page = Page::new(style, &options, legend.len());
         Self {
             view,
@@ -183,7 +193,7 @@ impl<'a> Picture<'a> {
             tracks,
             order,
             title: Title::new(style, fonts, page, view, &measured.options),
-            timeline: Timeline::new(style, fonts, page, view),
+            timeline: Timeline::new(style, fonts, page, view).with(measured.options.course.clone()),
             ground: Vec::new(),
             measured,
             layout,
@@ -256,11 +266,10 @@ impl<'a> Picture<'a> {
         let mut groups = Vec::new();
         if !measured.options.bare {
             groups.push(self.title.ground());
-            groups.push(legend::legend(
-                &measured.legend,
-                measured.style,
-                &measured.page,
-            ));
+            if measured.options.has_legend {
+                let (legend, style) = (&measured.legend, measured.style);
+                groups.push(legend::legend(legend, style, &measured.page));
+            }
             if !measured.options.compares {
                 groups.extend(self.timeline.ground(measured.view));
             }

@@ -7,9 +7,12 @@ mod table;
 use std::fmt::Write as _;
 
 use crate::base::digest;
+use crate::base::geometry::Rect;
 use crate::base::words;
 use crate::base::words::visible;
+use crate::draw::board::Overview;
 use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
+use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
@@ -37,6 +40,8 @@ pub(crate) struct Page<'a> {
     pub dark: Option<&'a Style>,
     /// The title, such as the bag's name.
     pub title: &'a str,
+    /// What is drawn in place of a graph, if there is none.
+    pub overview: Option<&'a Overview>,
 }
 
 impl Page<'_> {
@@ -71,7 +76,9 @@ impl Page<'_> {
             "title" => title.clone(),
             "fonts" => fonts.clone(),
             "css" => look.clone(),
-            "graph" => self.graph(&runs, still),
+            "graph" => self
+                .overview
+                .map_or_else(|| self.graph(&runs, still), board),
             "where" => self.place(still),
             "ticks" => self.ticks(),
             "summary" => table::summary(self.view),
@@ -157,6 +164,38 @@ impl Page<'_> {
         };
         (0..=4).map(tick).collect()
     }
+}
+
+/// The board of topics, with a head that the player moves.
+fn board(overview: &Overview) -> String {
+    let still = svg::write(&overview.scene);
+    let inside = still.split_once(">\n").map_or("", |(_, rest)| rest);
+    let inside = inside.trim_end().strip_suffix("</svg>").unwrap_or(inside);
+    let list = |of: &dyn Fn(&Rect) -> f64| {
+        let all: Vec<String> = overview
+            .heads
+            .iter()
+            .map(|h| format!("{:.1}", of(h)))
+            .collect();
+        all.join(" ")
+    };
+    let (size, head) = (
+        overview.scene.size,
+        overview.heads.first().copied().unwrap_or_default(),
+    );
+    format!(
+        "<svg id=\"graph\" viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" aria-label=\"Topics over time\">{inside}<g id=\"arrows\"></g><g id=\"items\"></g>\
+         <rect id=\"head\" data-x=\"{}\" data-width=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"2\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/></svg>",
+        size.w,
+        size.h,
+        list(&|h| h.x),
+        list(&|h| h.w),
+        head.x,
+        head.y,
+        head.w,
+        head.h,
+        overview.color,
+    )
 }
 
 /// An element as it is in one window.

@@ -2,7 +2,10 @@
 
 pub use super::options::Options;
 
+pub use crate::draw::board::Overview;
+
 use crate::base::notice::Notices;
+use crate::draw::board::Board;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Picture, Union};
 use crate::draw::scene::Scene;
@@ -19,6 +22,11 @@ pub trait Drawings: Sync {
 
     /// What all windows have in common, for outputs that draw the graph once; `None` where there is no such thing.
     fn graph(&self) -> Option<Whole<'_>> {
+        None
+    }
+
+    /// All windows in one drawing over time, for the same outputs where there is no graph.
+    fn overview(&self) -> Option<Overview> {
         None
     }
 }
@@ -45,6 +53,16 @@ impl Drawings for Picture<'_> {
             style: self.style(),
             title: self.title_text(),
         })
+    }
+}
+
+impl Drawings for Board<'_> {
+    fn scene(&self, window: usize, phase: f64) -> Scene {
+        self.scene(window, phase)
+    }
+
+    fn overview(&self) -> Option<Overview> {
+        Some(self.overview())
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{Stage, Watch};
+use super::{Purpose, Stage, Watch};
 use crate::base::geometry::{Rect, Size};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
@@ -11,13 +11,39 @@ use crate::draw::picture::{self, Measured, PageOptions};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{Engine, Layout, RING, engine, extend, lay_out};
+use crate::mission::phases::knows_publishers;
 use crate::mission::{Mission, Place, Places};
 use crate::view::{Mode, View, ViewOptions, outline, view};
+
+/// What the picture of a mission is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Body {
+    /// A graph; a board where of most messages nobody knows the publisher.
+    #[default]
+    Auto,
+    /// The computation graph.
+    Graph,
+    /// Topics over time.
+    Board,
+}
+
+impl Body {
+    /// Whether it is a board for this mission.
+    pub(super) fn is_board(self, mission: &Mission) -> bool {
+        match self {
+            Self::Graph => false,
+            Self::Board => true,
+            Self::Auto => !knows_publishers(&mission.elements, &mission.activity),
+        }
+    }
+}
 
 /// What to draw and how.
 #[derive(Clone)]
 #[non_exhaustive]
 pub struct Drawing {
+    /// Graph or board.
+    pub(crate) body: Body,
     /// What is shown.
     pub view: ViewOptions,
     /// Colours, strokes and fonts.
@@ -28,6 +54,8 @@ pub struct Drawing {
     pub page: PageOptions,
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
+    /// Where it will be seen, if that decides the page.
+    pub(crate) purpose: Option<Purpose>,
     /// Whether to grow the page and collapse namespaces until the text can be read.
     pub is_fitted: bool,
     /// What lays out.
@@ -43,15 +71,24 @@ impl Drawing {
     /// None that a user can cause: the built-in style is tested.
     pub fn new() -> crate::base::error::Result<Self> {
         Ok(Self {
+            body: Body::default(),
             view: ViewOptions::default(),
             style: Style::builtin("light")?,
             fonts: Fonts::bundled(),
             page: PageOptions::default(),
             is_sized: false,
+            purpose: None,
             is_fitted: true,
             engine: crate::layout::ENGINES[0].1,
             kept: None,
         })
+    }
+}
+
+impl Drawing {
+    /// The smallest text that can be read, in pixels.
+    fn readable(&self) -> f64 {
+        self.purpose.map_or(READABLE, Purpose::readable)
     }
 }
 
@@ -79,13 +116,28 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     let mut options = drawing.view.clone();
     let asked = options.collapse.len();
     let mut best = Attempt::new(mission, drawing, &options, &page);
-    if drawing.is_fitted && !best.is_readable() {
+    if let Some(purpose) = drawing.purpose {
+        for size in purpose.sizes().into_iter().skip(1) {
+            if best.is_readable(drawing) {
+                break;
+            }
+            let higher = PageOptions {
+                size,
+                ..page.clone()
+            };
+            let attempt = Attempt::new(mission, drawing, &options, &higher);
+            if attempt.text > best.text {
+                (page, best) = (higher, attempt);
+            }
+        }
+    }
+    if drawing.is_fitted && !best.is_readable(drawing) {
         if !drawing.is_sized && page.width_mm.is_none() {
             page.size = LARGEST;
             best = Attempt::new(mission, drawing, &options, &page);
         }
         collapse(mission, drawing, &page, &mut options, &mut best);
-        if best.is_readable() {
+        if best.is_readable(drawing) {
             open_again(mission, drawing, &page, (&mut options, asked), &mut best);
         } else {
             bundle(mission, drawing, &page, &mut options, &mut best);
@@ -97,13 +149,13 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
         layout,
         text,
     } = best;
-    if drawing.is_fitted {
+    if drawing.is_fitted || drawing.purpose.is_some() {
         let collapsed = &options.collapse[asked..];
-        notices.extend(told(collapsed, &drawing.page, &page, text).iter());
+        notices.extend(told(drawing, collapsed, &page, text).iter());
         if options.mode != drawing.view.mode {
             let text = format!(
                 "one arrow for all topics between two boxes{}; `--mode {}` draws each",
-                so_that(text >= READABLE),
+                so_that(text >= drawing.readable()),
                 drawing.view.mode.word()
             );
             notices.add(Notice::new(NoticeKind::Hidden, text));
@@ -176,8 +228,8 @@ impl Attempt {
         }
     }
 
-    fn is_readable(&self) -> bool {
-        self.text >= READABLE
+    fn is_readable(&self, drawing: &Drawing) -> bool {
+        self.text >= drawing.readable()
     }
 }
 
@@ -189,7 +241,7 @@ fn collapse(
     options: &mut ViewOptions,
     best: &mut Attempt,
 ) {
-    while !best.is_readable() {
+    while !best.is_readable(drawing) {
         let candidates = outline(mission, options).collapsible(mission, options);
         let fresh = candidates
             .into_iter()
@@ -200,7 +252,7 @@ fn collapse(
             return;
         }
         // Far too small a text is not worth a layout for every namespace on the way.
-        let many = if best.text < READABLE / 2.0 {
+        let many = if best.text < drawing.readable() / 2.0 {
             fresh.len().div_ceil(4)
         } else {
             1
@@ -266,24 +318,24 @@ fn open_again(
 ) {
     let (options, asked) = options;
     let collapsed = options.collapse[asked..].to_vec();
-    if !best.is_readable() {
+    if !best.is_readable(drawing) {
         return;
     }
     for name in collapsed.iter().rev().take(MOST_REOPENED) {
         let mut opened = options.clone();
         opened.collapse.retain(|n| n != name);
         let attempt = Attempt::new(mission, drawing, &opened, page);
-        if attempt.is_readable() {
+        if attempt.is_readable(drawing) {
             (*options, *best) = (opened, attempt);
         }
     }
 }
 
 /// What `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
-fn told(collapsed: &[Arc<str>], asked: &PageOptions, got: &PageOptions, text: f64) -> Notices {
+fn told(drawing: &Drawing, collapsed: &[Arc<str>], got: &PageOptions, text: f64) -> Notices {
     let mut notices = Notices::new();
-    let is_readable = text >= READABLE;
-    if asked.size != got.size {
+    let is_readable = text >= drawing.readable();
+    if drawing.page.size != got.size && drawing.purpose.is_none() {
         let text = format!(
             "the page is {}x{}{}; `--size` takes another",
             got.size.w,
@@ -300,7 +352,19 @@ fn told(collapsed: &[Arc<str>], asked: &PageOptions, got: &PageOptions, text: f6
         );
         notices.add(Notice::new(NoticeKind::Hidden, text));
     }
-    if !is_readable {
+    if let Some(purpose) = drawing.purpose.filter(|_| !is_readable) {
+        let size = match got.width_mm {
+            Some(mm) => {
+                let pt = text * mm / got.size.w * 72.0 / 25.4;
+                format!("{} pt", words::number(words::significant(pt, 2)))
+            }
+            None => format!("{} pixels", words::number(words::significant(text, 2))),
+        };
+        let advice = purpose.advice();
+        let text =
+            format!("the smallest text is {size} where it is seen, too small to be read; {advice}");
+        notices.add(Notice::new(NoticeKind::Note, text));
+    } else if !is_readable {
         let text = format!(
             "the smallest text is {} pixels high, too small to be read; `--ns-filter`, `--hide dead,leaf`, `--mode nodes` or a larger `--size` help",
             words::number(text)

@@ -3,13 +3,14 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::draw::{Composed, compose, places, unplaced, unseen};
+use super::draw::{Body, Composed, compose, places, unplaced, unseen};
 use super::{Drawing, Phases, Reading, Stage, Watch, read};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
-use crate::draw::figure::Figure;
+use crate::draw::board::Board;
+use crate::draw::figure::{self, Figure};
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Source, Strip, strip};
@@ -19,7 +20,7 @@ use crate::export::sequence::Sequence;
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{View, filtered, nothing};
+use crate::view::{View, ViewOptions, filtered, nothing};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -117,25 +118,30 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     if matches!(job.reading.phases, Phases::Captions(_)) {
         drawing.page.phases = captions(&mission);
     }
+    drawing.page.course = Some(course(&mission, &drawing));
     let figure = drawn_figure(job, &mission)?;
     // What is not drawn, or drawn as a figure, needs no places.
     let is_graph = |o: &Output| {
         o.format.is_drawn && !(figure.is_some() && o.format.whole != OneDrawing::Never)
     };
     let is_drawn = job.outputs.iter().any(is_graph);
+    let is_board = is_drawn && drawing.body.is_board(&mission);
     let Composed {
         view,
         options,
         page,
         layout,
         notices,
-    } = if is_drawn {
+    } = if is_drawn && !is_board {
         compose(&mission, &drawing, watch)
-    } else if job.outputs.iter().any(|o| o.format.is_viewed) {
+    } else if is_board || job.outputs.iter().any(|o| o.format.is_viewed) {
         unplaced(&mission, &drawing)
     } else {
         unseen(&drawing)
     };
+    if is_board {
+        return show_board(job, mission, &drawing, (&view, &options), watch);
+    }
     let elements = &mission.elements;
     if is_drawn && view.items.is_empty() && elements.nodes.len() + elements.topics.len() > 0 {
         return Err(nothing(elements, &options));
@@ -170,7 +176,16 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
         latex: figure.as_ref().map(|(_, latex)| latex.as_str()),
         options: job.sequence.clone(),
     };
-    if let Some(warning) = long_job(job, &sequence) {
+    let written = write(job, &sequence, watch)?;
+    Ok(Rendered {
+        mission,
+        notices: all,
+        written,
+    })
+}
+
+fn write(job: &Render, sequence: &Sequence<'_>, watch: &mut dyn Watch) -> Result<Vec<Written>> {
+    if let Some(warning) = long_job(job, sequence) {
         watch.note(&warning);
     }
     watch.stage(Stage::Draw);
@@ -183,13 +198,9 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
         }
     };
     let steps = run::Steps::default();
-    let written = run::run(&sequence, &job.outputs, &steps, &mut progress)?;
+    let written = run::run(sequence, &job.outputs, &steps, &mut progress)?;
     watch.shares(&steps.shares());
-    Ok(Rendered {
-        mission,
-        notices: all,
-        written,
-    })
+    Ok(written)
 }
 
 /// The name of the phase of every window: the last one that begins before its end.
@@ -234,6 +245,66 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     Some(format!(
         "{frames} frames will take about {about}; {advice} would show less, `--skip-unchanged` only what changes"
     ))
+}
+
+/// So many life lines fit below a frame.
+const MOST_LIVES: usize = 14;
+
+/// Who lived when, for the strip below frames.
+fn course(mission: &Mission, drawing: &Drawing) -> figure::Course {
+    let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
+    let source = figure::source::Source::new(mission, nodes, topics, false);
+    figure::Course::new(&source, MOST_LIVES)
+}
+
+/// Writes a mission whose picture is the topic board.
+fn show_board(
+    job: &Render,
+    mission: Mission,
+    drawing: &Drawing,
+    (view, options): (&View, &ViewOptions),
+    watch: &mut dyn Watch,
+) -> Result<Rendered> {
+    let mut all = mission.notices.clone();
+    if drawing.body == Body::Auto {
+        let text = "of most messages nobody knows the publisher, so the picture is a board of topics; `--view graph` draws what is known";
+        all.add(Notice::new(NoticeKind::Chosen, text));
+    }
+    let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
+    let source = figure::source::Source::new(&mission, nodes, topics, false);
+    let page = drawing.page.clone();
+    let is_sized = drawing.is_sized || !drawing.is_fitted;
+    let board = Board::new(
+        &source,
+        view,
+        &drawing.style,
+        &drawing.fonts,
+        page,
+        is_sized,
+    );
+    let remarks = board.remarks().into_iter();
+    all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
+    let overview = board.overview();
+    let viewed = job.is_filtered.then(|| filtered(&mission, options));
+    let sequence = Sequence {
+        mission: &mission,
+        data: viewed.as_ref().unwrap_or(&mission),
+        places: None,
+        notices: &all,
+        view,
+        picture: &board,
+        painter: &Painter::new(&drawing.fonts),
+        fonts: &drawing.fonts,
+        strip: Some(&overview.scene),
+        latex: None,
+        options: job.sequence.clone(),
+    };
+    let written = write(job, &sequence, watch)?;
+    Ok(Rendered {
+        mission,
+        notices: all,
+        written,
+    })
 }
 
 /// The figure with its lines for LaTeX, if one was asked for.

@@ -16,6 +16,7 @@ use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::draw::scene::Stroke;
+use crate::draw::style::Color;
 
 /// Lengths in pitches of 2.75 mm, as fractions of the pitch.
 const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
@@ -51,6 +52,8 @@ pub(crate) struct Place {
     pub(crate) rates: Option<f64>,
     /// Where the text of who sends and receives what begins, and its width, if there is room.
     pub(crate) talk: Option<(f64, f64)>,
+    /// Whether names and what was sent are drawn by [`super::live`], as time goes; bars are then pale.
+    pub(crate) is_live: bool,
 }
 
 impl<'a> Lives<'a> {
@@ -103,17 +106,22 @@ impl<'a> Lives<'a> {
         (widest + 1.2).min(width * 0.36)
     }
 
+    /// Where the rows begin.
+    pub(crate) fn top(&self, place: &Place) -> f64 {
+        let has_band = !self.source.phases.is_empty();
+        place.top + if has_band { band::HEIGHT + 0.9 } else { 0.0 }
+    }
+
+    /// Where they end, at the axis.
+    pub(crate) fn bottom(&self, canvas: &Canvas<'_>, place: &Place) -> f64 {
+        self.top(place) + self.rows.len() as f64 * canvas.sizes.pitch() + 0.4
+    }
+
     /// Draws band, rows, marks and axis; answers where the axis ends below.
     pub(crate) fn draw(&self, canvas: &mut Canvas<'_>, place: &Place) -> f64 {
         let pitch = canvas.sizes.pitch();
-        let phases = self.source.phases;
-        let top = place.top
-            + if phases.is_empty() {
-                0.0
-            } else {
-                band::HEIGHT + 0.9
-            };
-        let bottom = top + self.rows.len() as f64 * pitch + 0.4;
+        let top = self.top(place);
+        let bottom = self.bottom(canvas, place);
         canvas.begin("phases");
         self.columns(canvas, place, bottom);
         canvas.begin("rows");
@@ -198,8 +206,10 @@ impl<'a> Lives<'a> {
             }
             Row::Track(at, label, inside) => {
                 let indent = if *inside { 1.2 } else { 0.0 };
-                let label = canvas.cut(label, Type::Name, room - indent);
-                canvas.text(place.left + indent, y, Type::Name, ink::TEXT, &label);
+                if !place.is_live {
+                    let label = canvas.cut(label, Type::Name, room - indent);
+                    canvas.text(place.left + indent, y, Type::Name, ink::TEXT, &label);
+                }
                 let track = &self.tracks[*at];
                 lines(canvas, place, y, track);
                 rate(canvas, place, y, track.hz);
@@ -335,8 +345,9 @@ fn lines(canvas: &mut Canvas<'_>, place: &Place, y: f64, track: &Track) {
     for life in &track.lives {
         thin(canvas, place, y, life);
     }
+    let color = if place.is_live { ink::FOLDED } else { ink::BAR };
     for bar in &track.bars {
-        thick(canvas, place, y, bar);
+        thick(canvas, place, y, bar, color);
     }
     for life in &track.lives {
         if life.begins {
@@ -363,11 +374,12 @@ fn thin(canvas: &mut Canvas<'_>, place: &Place, y: f64, life: &Life) {
     canvas.line(Point::new(from, y), Point::new(to, y), &stroke);
 }
 
-fn thick(canvas: &mut Canvas<'_>, place: &Place, y: f64, bar: &Bar) {
+/// A stretch of sending.
+pub(crate) fn thick(canvas: &mut Canvas<'_>, place: &Place, y: f64, bar: &Bar, color: Color) {
     let high = (BAR.0 + BAR.1 * bar.share) * canvas.sizes.pitch();
     let (from, to) = (place.axis.x(bar.span.start), place.axis.x(bar.span.end));
     let wide = (to - from).max(0.25);
-    canvas.fill(Rect::new(from, y - high / 2.0, wide, high), ink::BAR);
+    canvas.fill(Rect::new(from, y - high / 2.0, wide, high), color);
 }
 
 /// The mark of a start.

@@ -210,6 +210,7 @@ fn lives_place(lives: &Lives<'_>, canvas: &Canvas<'_>, width: f64) -> Option<Pla
         },
         rates: Some(right + 5.1),
         talk: (width >= WIDE.0).then_some((width - WIDE.1, WIDE.1)),
+        is_live: false,
     })
 }
 

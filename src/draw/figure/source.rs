@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::base::name::{is_quiet, last_part};
-use crate::base::time::Span;
+use crate::base::time::{Span, Stamp};
 use crate::graph::{EdgeId, NodeId, State, TopicId};
 use crate::mission::Mission;
 use crate::mission::activity::is_hidden_node;
@@ -134,6 +134,16 @@ impl<'a> Source<'a> {
         self.runs(counts)
     }
 
+    /// Until when a topic's last message is kept for whoever comes late; `None` if it is not.
+    pub(crate) fn topic_kept(&self, topic: TopicId) -> Option<Stamp> {
+        let cells = self.mission.activity.cells.iter();
+        let mut kept = cells.filter(|cell| {
+            let found = cell.graph.topics.binary_search_by_key(&topic, |t| t.id);
+            found.is_ok_and(|at| cell.graph.topics[at].state == State::Latched)
+        });
+        kept.next_back().map(|cell| cell.span.end)
+    }
+
     /// Messages of a publication per cell.
     pub(crate) fn sent(&self, edge: EdgeId) -> Vec<f64> {
         let cells = self.mission.activity.cells.iter();
@@ -176,7 +186,7 @@ impl<'a> Source<'a> {
     }
 
     /// The number of the phase, 0.., that a moment lies in.
-    pub(crate) fn phase_at(&self, at: crate::base::time::Stamp) -> usize {
+    pub(crate) fn phase_at(&self, at: Stamp) -> usize {
         let next = self.phases.partition_point(|p| p.span.start <= at);
         next.saturating_sub(1)
     }

@@ -115,9 +115,10 @@ fn topic(source: &Source<'_>, id: TopicId) -> Track {
     let whole = source.span();
     let sends = merged(source.topic_sending(id), silence(whole));
     let sent = source.topic_sent(id);
+    let kept = source.topic_kept(id);
     let all = sends.first().zip(sends.last()).map(|(first, last)| Span {
         start: first.start,
-        end: last.end,
+        end: kept.map_or(last.end, |kept| kept.max(last.end)),
     });
     let life = |span: Span| capped(span, whole, false);
     Track {

@@ -36,18 +36,18 @@ impl Page {
     /// The page that is wished for, with `rows` rows of legend.
     pub(crate) fn new(style: &Style, options: &PageOptions, rows: usize) -> Self {
         let size = options.size;
-        let unit = unit(size);
+        let unit = unit(options);
         let strip = |y: f64, height: f64| Rect::new(0.0, y, size.w, height);
         let (mut title, mut caption, mut legend, mut timeline) = (0.0, 0.0, 0.0, 0.0);
         if !options.bare {
             title = style.title.height * unit;
             caption = style.caption.height * unit;
-            legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
-            timeline = if options.compares {
-                0.0
-            } else {
-                (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit
-            };
+            if options.has_legend {
+                legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
+            }
+            if !options.compares {
+                timeline = (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit;
+            }
         }
         let margin = (style.page.margin * unit)
             .min(size.w / 20.0)
@@ -87,8 +87,12 @@ impl Page {
     }
 }
 
-/// The scale of furniture on a page of this size: on a larger page it grows less than the graph.
-pub(crate) fn unit(size: Size) -> f64 {
+/// The scale of furniture on a page, of its size unless it is asked for: on a larger page it grows less than the graph.
+pub(crate) fn unit(options: &PageOptions) -> f64 {
+    if let Some(unit) = options.unit {
+        return unit;
+    }
+    let size = options.size;
     let ratio = (size.w / STANDARD.w)
         .min(size.h / STANDARD.h)
         .clamp(0.62, 4.0);

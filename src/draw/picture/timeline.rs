@@ -1,10 +1,12 @@
-//! The strip at the bottom: how busy each window is, where changes are, and where we are.
+//! The strip at the bottom: who lived when (else how busy each window is), where changes are, and where we are.
 
+use super::course::Strip;
 use super::page::Page;
 use super::title::whole;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
+use crate::draw::figure::Course;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line, polygon};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
@@ -32,6 +34,8 @@ pub(crate) struct Timeline<'a> {
     /// What the axis covers.
     span: Span,
     busiest: f64,
+    /// Who lived when; bars are drawn where nobody knows.
+    course: Option<Course>,
 }
 
 /// The narrowest bar in pixels.
@@ -72,6 +76,22 @@ impl<'a> Timeline<'a> {
             plot,
             span,
             busiest,
+            course: None,
+        }
+    }
+
+    /// The same with life lines in place of bars, if there are any.
+    pub(crate) fn with(mut self, course: Option<Course>) -> Self {
+        self.course = course.filter(|c| !c.rows.is_empty());
+        self
+    }
+
+    fn strip(&self) -> Strip<'_> {
+        Strip {
+            style: self.style,
+            plot: self.plot,
+            span: self.span,
+            unit: self.page.unit,
         }
     }
 
@@ -83,11 +103,19 @@ impl<'a> Timeline<'a> {
             Form::Rect(self.page.timeline, 0.0),
             self.style.legend.fill,
         ));
-        bars.shape(Shape::filled(self.bars(0, self.bars.len()), style.future));
+        if let Some(course) = &self.course {
+            let top = self.page.timeline.y + 2.0 * self.page.unit;
+            self.strip().phases(&mut bars, course, top);
+        }
+        match &self.course {
+            None => bars.shape(Shape::filled(self.bars(0, self.bars.len()), style.future)),
+            Some(course) => bars.shape(self.strip().bars(course, self.span, style.future)),
+        }
         let y = self.plot.bottom();
         let axis = line(Point::new(self.plot.x, y), Point::new(self.plot.right(), y));
         bars.shape(Shape::line(axis, Stroke::solid(style.axis, self.page.unit)));
         let mut groups = vec![bars, self.axis()];
+        groups.extend(self.course.iter().map(|course| self.strip().lives(course)));
         groups.extend(self.marks(view));
         groups
     }
@@ -97,8 +125,20 @@ impl<'a> Timeline<'a> {
         let style = &self.style.timeline;
         let at = k / self.per_bar;
         let mut past = Group::named("past");
-        past.shape(Shape::filled(self.bars(0, at), style.past));
-        past.shape(Shape::filled(self.bars(at, at + 1), style.now));
+        match &self.course {
+            None => {
+                past.shape(Shape::filled(self.bars(0, at), style.past));
+                past.shape(Shape::filled(self.bars(at, at + 1), style.now));
+            }
+            Some(course) => {
+                let before = Span {
+                    start: self.span.start,
+                    end: frame.span.start,
+                };
+                past.shape(self.strip().bars(course, before, style.past));
+                past.shape(self.strip().bars(course, frame.span, style.now));
+            }
+        }
         let mut head = Group::named("playhead");
         let unit = self.page.unit;
         let (left, right) = (self.x(frame.span.start), self.x(frame.span.end));
@@ -113,8 +153,7 @@ impl<'a> Timeline<'a> {
 
     /// Where a moment lies on the axis.
     fn x(&self, at: Stamp) -> f64 {
-        let part = at.since(self.span.start) as f64 / self.span.nanos().max(1) as f64;
-        self.plot.x + self.plot.w * part.clamp(0.0, 1.0)
+        self.strip().x(at)
     }
 
     /// The bars from one place to before another as one shape.

@@ -19,6 +19,7 @@ pub(crate) fn start<'a>(
     let style = Style::builtin(BUILTIN[0].0)?;
     AtOnce::start(target, move || {
         let whole = sequence.picture.graph();
+        let overview = sequence.picture.overview();
         let nothing = Union::default();
         // Whoever chose a style gets it always; the default one has a dark side.
         let chosen = whole.as_ref().map_or(&style, |w| w.style);
@@ -29,7 +30,11 @@ pub(crate) fn start<'a>(
             union: whole.as_ref().map_or(&nothing, |w| &w.union),
             style: chosen,
             dark: dark.as_ref(),
-            title: whole.as_ref().map_or("", |w| w.title),
+            title: match (&whole, &overview) {
+                (Some(whole), _) => whole.title,
+                (None, overview) => overview.as_ref().map_or("", |o| &o.title),
+            },
+            overview: overview.as_ref(),
         };
         (page.write(), Vec::new())
     })

@@ -1,0 +1,444 @@
+//! The topic board: the picture of a mission of which hardly anybody knows who sends what. Rows are topics over the
+//! whole time, with types and the rate now; a head says which window a frame is of; nodes stand below as pills.
+
+use std::collections::BTreeSet;
+
+use crate::base::geometry::{Rect, Size};
+use crate::base::time::{Span, Stamp};
+use crate::base::words;
+use crate::draw::figure::band::Axis;
+use crate::draw::figure::canvas::{Canvas, HAIRLINE, Sizes, Type, ink};
+use crate::draw::figure::lives::{Lives, Place};
+use crate::draw::figure::source::Source;
+use crate::draw::figure::tracks::Track;
+use crate::draw::picture::PageOptions;
+use crate::draw::picture::page::{Page, unit};
+use crate::draw::picture::title::Title;
+use crate::draw::scene::{Form, Group, Piece, Scene, Shape, Stroke};
+use crate::draw::style::{Color, Style};
+use crate::draw::text::Fonts;
+use crate::graph::NodeId;
+use crate::view::View;
+
+/// Pixels per millimetre of the drawing: small text of 9 pixels at least, and not larger than titles.
+const SCALE: (f64, f64) = (4.26, 5.6);
+/// The page that a board grows to where nobody chose one.
+const LARGEST: Size = Size::new(1920.0, 1080.0);
+/// The widths of types and of rates, in millimetres, and the room between columns.
+const TYPES: f64 = 58.0;
+const RATES: f64 = 15.0;
+const BETWEEN: f64 = 2.4;
+/// What stands below the rows: nodes and the line that says why, in millimetres.
+const BELOW: f64 = 9.0;
+/// The height of a node.
+const PILL: f64 = 3.5;
+
+/// A board ready to be drawn, one scene per window.
+pub(crate) struct Board<'a> {
+    view: &'a View,
+    source: &'a Source<'a>,
+    style: &'a Style,
+    fonts: &'a Fonts,
+    options: PageOptions,
+    lives: Lives<'a>,
+    title: Title<'a>,
+    sizes: Sizes,
+    scale: f64,
+    place: Place,
+    /// The window of the mission that each frame shows.
+    windows: Vec<usize>,
+    ground: Vec<Group>,
+    /// How many topics found no row.
+    left_out: usize,
+}
+
+/// The whole board in one drawing, and where the head stands in each window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Overview {
+    /// The board with everything that was sent; no head.
+    pub scene: Scene,
+    /// The head in pixels, per window.
+    pub heads: Vec<Rect>,
+    /// Its colour.
+    pub color: Color,
+    /// The title of the picture.
+    pub title: String,
+}
+
+impl<'a> Board<'a> {
+    /// The board of what passes the filters of `source`. Where `is_sized` is false the page grows until all topics can
+    /// be read; what then finds no room is counted.
+    pub(crate) fn new(
+        source: &'a Source<'a>,
+        view: &'a View,
+        style: &'a Style,
+        fonts: &'a Fonts,
+        mut options: PageOptions,
+        is_sized: bool,
+    ) -> Self {
+        let sizes = Sizes::of_names(7.0);
+        let mut lives = Lives::new(source, true).opened();
+        if !is_sized && most_rows(&lives, style, &options, fonts) < lives.rows.len() {
+            options.size = LARGEST;
+        }
+        let mut most = most_rows(&lives, style, &options, fonts);
+        if most < lives.rows.len() {
+            lives = Lives::new(source, true).plain();
+            most = most_rows(&lives, style, &options, fonts);
+        }
+        let left_out = lives.shorten(most, &|track| messages(source, track));
+        let page = Page::new(style, &options, 0);
+        let (place, scale) = placed(&lives, &page, &options, fonts);
+        if !is_sized {
+            // A short board leaves no empty page below; an even number of rows is what videos want.
+            let canvas = Canvas::new(fonts, sizes, scale);
+            let end = (place.top + lives.height(&canvas) + BELOW) * scale;
+            options.size.h = (libm::ceil(end / 2.0) * 2.0).min(options.size.h);
+        }
+        let mission = source.mission;
+        let window = |start| mission.windows.partition_point(|w| w.span.start < start);
+        let mut board = Self {
+            title: Title::new(style, fonts, &page, view, &options),
+            windows: view.frames.iter().map(|f| window(f.span.start)).collect(),
+            ground: Vec::new(),
+            view,
+            source,
+            style,
+            fonts,
+            options,
+            lives,
+            sizes,
+            scale,
+            place,
+            left_out,
+        };
+        board.ground = board.ground();
+        board
+    }
+
+    /// What the user should know; lower case, no period.
+    pub(crate) fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.left_out > 0 {
+            let many = words::count(self.left_out, "topic");
+            remarks.push(format!(
+                "{many} with the fewest messages have no room on the board; `--topic-filter` or a larger `--size` shows them"
+            ));
+        }
+        remarks
+    }
+
+    /// The board in the window at place `k` of the view; `phase`, above 0 to 1, is how far its head has come there.
+    pub(crate) fn scene(&self, k: usize, phase: f64) -> Scene {
+        let mut scene = self.empty();
+        let Some(frame) = self.view.frames.get(k) else {
+            return scene;
+        };
+        if !self.options.bare {
+            scene.groups.push(self.title.window(self.view, frame));
+            scene.groups.push(self.title.chips(frame));
+            scene.groups.push(self.title.clock(frame));
+            let phase = self.options.phases.get(k).map_or("", String::as_str);
+            scene.groups.push(self.title.caption(frame, phase));
+        }
+        let mut span = frame.span;
+        if let Some(before) = k.checked_sub(1).and_then(|k| self.view.frames.get(k)) {
+            span.start = between(before.span.start.0, span.start.0, phase);
+            span.end = between(before.span.end.0, span.end.0, phase);
+        }
+        let window = self.windows.get(k).copied().unwrap_or(0);
+        scene.groups.extend(self.now(window, span));
+        scene.title = format!(
+            "{}, window {} of {}",
+            self.options.title,
+            frame.index + 1,
+            self.view.frames.len()
+        );
+        scene
+    }
+
+    /// All windows in one drawing.
+    pub(crate) fn overview(&self) -> Overview {
+        let mut scene = self.empty();
+        let mut canvas = self.canvas();
+        canvas.begin("past");
+        self.lives
+            .past(&mut canvas, &self.place, self.source.span().end);
+        canvas.begin("names");
+        self.lives.names(&mut canvas, &self.place, &|_| true);
+        canvas.begin("rates");
+        self.rates(&mut canvas, &|track| track.hz.map(words::rate));
+        canvas.begin("nodes");
+        self.nodes(&mut canvas, &|_| true);
+        scene.groups.extend(self.painted(canvas));
+        scene.title = format!("Topics over time of {}", self.options.title);
+        let heads = self
+            .view
+            .frames
+            .iter()
+            .map(|f| scaled(self.head(f.span), self.scale));
+        Overview {
+            scene,
+            heads: heads.collect(),
+            color: self.style.timeline.head,
+            title: self.options.title.clone(),
+        }
+    }
+
+    fn empty(&self) -> Scene {
+        Scene {
+            size: self.options.size,
+            width_mm: self.options.width_mm,
+            background: self.style.background(),
+            title: String::new(),
+            groups: self.ground.clone(),
+        }
+    }
+
+    fn canvas(&self) -> Canvas<'a> {
+        Canvas::new(self.fonts, self.sizes, self.scale)
+    }
+
+    /// What stands still: band, pale bars, starts and ends, types, axis, and why this is no graph.
+    fn ground(&self) -> Vec<Group> {
+        let mut canvas = self.canvas();
+        let end = self.lives.draw(&mut canvas, &self.place);
+        canvas.begin("why");
+        let y = end + PILL + 1.6 + self.sizes.line() / 2.0;
+        let wide = self.options.size.w / self.scale - 2.0 * self.place.left;
+        let text = canvas.cut(&self.why(), Type::Small, wide);
+        canvas.text(self.place.left, y, Type::Small, ink::QUIET, &text);
+        let mut groups = Vec::new();
+        if !self.options.bare {
+            groups.push(self.title.ground());
+        }
+        groups.extend(self.painted(canvas));
+        groups
+    }
+
+    /// Why this is no graph, and what would tell more.
+    fn why(&self) -> String {
+        let elements = &self.source.mission.elements;
+        let why = if self.source.knows_publishers() {
+            "topics over time; --view graph draws who talks to whom".to_owned()
+        } else if elements.publishes.is_empty() {
+            "no message says who publishes or subscribes: topics over time; --topology FILE adds it, bagreel info says what would have told".to_owned()
+        } else {
+            "of most messages nobody knows the publisher: topics over time; --topology FILE adds it, --view graph draws what is known".to_owned()
+        };
+        let left_out = match self.left_out {
+            0 => String::new(),
+            more => format!("{} more not drawn; ", words::count(more, "topic")),
+        };
+        format!("{left_out}{why}. Tick: first message; cross: last; frame: this window.")
+    }
+
+    /// What changes from frame to frame.
+    fn now(&self, window: usize, span: Span) -> Vec<Group> {
+        let mission = self.source.mission;
+        let graph = mission.windows.get(window).map(|w| &w.graph);
+        let seconds = mission
+            .windows
+            .get(window)
+            .map_or(0.0, |w| w.span.nanos() as f64 / 1e9);
+        let count = |track: &Track| {
+            let topics = &graph?.topics;
+            let at = topics.binary_search_by_key(&track.topic?, |t| t.id).ok()?;
+            Some(topics[at].count)
+        };
+        let mut canvas = self.canvas();
+        canvas.begin("past");
+        self.lives.past(&mut canvas, &self.place, span.end);
+        canvas.begin("names");
+        self.lives
+            .names(&mut canvas, &self.place, &|t| count(t).unwrap_or(0) > 0);
+        canvas.begin("rates");
+        self.rates(&mut canvas, &|track| {
+            let count = count(track).filter(|n| *n > 0)?;
+            Some(words::rate_of(count, seconds))
+        });
+        canvas.begin("nodes");
+        let alive: BTreeSet<NodeId> = graph
+            .iter()
+            .flat_map(|g| g.nodes.iter().map(|n| n.id))
+            .collect();
+        self.nodes(&mut canvas, &|nodes| {
+            nodes.iter().any(|n| alive.contains(n))
+        });
+        let mut groups = self.painted(canvas);
+        let mut head = Group::named("playhead");
+        let form = Form::Rect(scaled(self.head(span), self.scale), 2.0);
+        head.shape(Shape::line(
+            form,
+            Stroke::solid(self.style.timeline.head, 1.5),
+        ));
+        groups.push(head);
+        groups
+    }
+
+    fn rates(&self, canvas: &mut Canvas<'_>, told: &dyn Fn(&Track) -> Option<String>) {
+        let right = self.place.axis.right + RATES;
+        for (y, track, ..) in self.lives.lines(canvas, &self.place) {
+            let (color, text) = match told(track) {
+                Some(text) => (ink::TEXT, text),
+                None => (ink::QUIET, "–".to_owned()),
+            };
+            canvas.text_end(right, y, Type::Small, color, &text);
+        }
+    }
+
+    /// The nodes that are known, as pills in a row as far as there is room: those that are there stand out.
+    fn nodes(&self, canvas: &mut Canvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
+        let all = &self.source.roles;
+        if all.is_empty() {
+            return;
+        }
+        let y = self.lives.bottom(canvas, &self.place) + self.sizes.line() + 2.0 + PILL / 2.0;
+        canvas.text(self.place.left, y, Type::Small, ink::QUIET, "nodes known");
+        let mut x = self.place.axis.left;
+        let end = self.options.size.w / self.scale - self.place.left;
+        for (k, (role, nodes)) in all.iter().enumerate() {
+            let wide = canvas.width(role, Type::Small) + 2.4;
+            let more = format!("+{}", all.len() - k);
+            let rest = if k + 1 < all.len() { 8.0 } else { 0.0 };
+            if x + wide + rest > end {
+                canvas.text(x, y, Type::Small, ink::QUIET, &more);
+                return;
+            }
+            let (fill, color) = if is_there(nodes) {
+                (ink::BAND[1], ink::TEXT)
+            } else {
+                (ink::PAPER, ink::QUIET)
+            };
+            let place = Rect::new(x, y - PILL / 2.0, wide, PILL);
+            canvas.frame(place, PILL / 2.0, fill, &Stroke::solid(ink::RULE, HAIRLINE));
+            canvas.text(x + 1.2, y, Type::Small, color, role);
+            x += wide + 1.4;
+        }
+    }
+
+    /// The frame around the time of a window, in millimetres.
+    fn head(&self, span: Span) -> Rect {
+        let place = &self.place;
+        let (left, right) = (place.axis.x(span.start), place.axis.x(span.end));
+        let top = self.lives.top(place) - 0.4;
+        let bottom = self.lives.bottom(&self.canvas(), place);
+        Rect::new(left, top, (right - left).max(0.3), bottom - top)
+    }
+
+    /// What a canvas holds, in the colours of the style.
+    fn painted(&self, canvas: Canvas<'_>) -> Vec<Group> {
+        let mut groups = canvas.into_groups();
+        for piece in groups.iter_mut().flat_map(|g| &mut g.pieces) {
+            match piece {
+                Piece::Shape(Shape { fill, stroke, .. }) => {
+                    *fill = self.color(*fill);
+                    stroke.color = self.color(stroke.color);
+                }
+                Piece::Text(text) => text.color = self.color(text.color),
+            }
+        }
+        groups
+    }
+
+    /// The style's colour for one of a figure's, which is on white paper.
+    fn color(&self, of: Color) -> Color {
+        let style = self.style;
+        let table = [
+            (ink::PAPER, style.page.background),
+            (ink::TEXT, style.page.text),
+            (ink::QUIET, style.page.quiet),
+            (ink::BAR, style.timeline.past),
+            (ink::FOLDED, style.timeline.future),
+            (ink::LINE, style.timeline.axis),
+            (ink::RULE, style.timeline.axis),
+            (ink::TINT, style.cluster.fill),
+            (ink::BAND[0], style.cluster.stroke),
+            (ink::BAND[1], style.cluster.fill),
+            (ink::ADDED, style.added.color),
+            (ink::REMOVED, style.removed.color),
+            (ink::CHANGED, style.changed.color),
+        ];
+        let found = table.iter().find(|(ink, _)| *ink == of);
+        found.map_or(of, |(_, color)| *color)
+    }
+}
+
+fn between(from: i64, to: i64, phase: f64) -> Stamp {
+    #[expect(clippy::cast_possible_truncation, reason = "a part of an i64")]
+    let part = ((to.saturating_sub(from)) as f64 * phase.clamp(0.0, 1.0)) as i64;
+    Stamp(if phase >= 1.0 {
+        to
+    } else {
+        from.saturating_add(part)
+    })
+}
+
+fn scaled(r: Rect, by: f64) -> Rect {
+    Rect::new(r.x * by, r.y * by, r.w * by, r.h * by)
+}
+
+/// How many messages a topic carried.
+fn messages(source: &Source<'_>, track: &Track) -> u64 {
+    let windows = source.mission.windows.iter();
+    let of = |topics: &[crate::graph::TopicState]| {
+        let at = topics.binary_search_by_key(&track.topic?, |t| t.id).ok()?;
+        Some(topics[at].count)
+    };
+    windows.filter_map(|w| of(&w.graph.topics)).sum()
+}
+
+/// The part of the page that a board has.
+fn room(page: &Page, options: &PageOptions) -> Rect {
+    let margin = page.graph.x;
+    let top = page.caption.bottom().max(margin / 2.0) + margin / 4.0;
+    let size = options.size;
+    Rect::new(
+        margin,
+        top,
+        size.w - 2.0 * margin,
+        (size.h - top - margin / 2.0).max(1.0),
+    )
+}
+
+/// How many rows can be read on this page.
+fn most_rows(lives: &Lives<'_>, style: &Style, options: &PageOptions, fonts: &Fonts) -> usize {
+    let page = Page::new(style, options, 0);
+    let canvas = Canvas::new(fonts, Sizes::of_names(7.0), SCALE.0);
+    let rows = lives.rows.len() as f64 * canvas.sizes.pitch();
+    let others = lives.height(&canvas) - rows + BELOW;
+    let free = room(&page, options).h / SCALE.0 - others;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a page has few rows"
+    )]
+    let most = (free / canvas.sizes.pitch()).max(1.0) as usize;
+    most
+}
+
+/// Where everything stands, in millimetres, and how many pixels these are.
+fn placed(lives: &Lives<'_>, page: &Page, options: &PageOptions, fonts: &Fonts) -> (Place, f64) {
+    let room = room(page, options);
+    let canvas = Canvas::new(fonts, Sizes::of_names(7.0), 1.0);
+    let high = lives.height(&canvas) + BELOW;
+    let largest = SCALE.1 * unit(options).max(1.0);
+    let scale = (room.h / high).clamp(SCALE.0, largest);
+    let (left, wide) = (room.x / scale, room.w / scale);
+    let names = lives.names_width(&canvas, wide * 0.8);
+    let types = if wide > 150.0 { TYPES } else { 0.0 };
+    let right = left + wide - types - RATES - BETWEEN;
+    let place = Place {
+        top: room.y / scale,
+        left,
+        axis: Axis {
+            left: left + names,
+            right: right.max(left + names + 10.0),
+            span: lives.source.span(),
+        },
+        rates: None,
+        talk: (types > 0.0).then_some((left + wide - types + BETWEEN, types - BETWEEN)),
+        is_live: true,
+    };
+    (place, scale)
+}

@@ -1,0 +1,84 @@
+//! The course of a mission at its smallest: life lines without words, for the strip below frames.
+
+use super::groups;
+use super::lives::Lives;
+use super::rows::Row;
+use super::source::Source;
+use super::tracks::{Bar, Life};
+use crate::base::time::{Span, Stamp};
+use crate::graph::NodeId;
+
+/// Who lived when, in rows from top to bottom, and the phases.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Course {
+    /// The phases, none if there is only one.
+    pub(crate) phases: Vec<Span>,
+    pub(crate) rows: Vec<CourseRow>,
+    /// Topics that others send from a moment on: the rows of the one before and the one after.
+    pub(crate) handovers: Vec<(Stamp, usize, usize)>,
+}
+
+/// A node, a topic, some of them that come and go together, or all that live throughout.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct CourseRow {
+    pub(crate) lives: Vec<Life>,
+    pub(crate) bars: Vec<Bar>,
+}
+
+impl Course {
+    /// The course in at most `most` rows: of nodes, else of groups, of which those that change least are left out; of
+    /// topics where publishers are unknown.
+    pub(crate) fn new(source: &Source<'_>, most: usize) -> Self {
+        let by_topics = !source.knows_publishers();
+        let mut lives = Lives::new(source, by_topics);
+        // By nodes, for a group has another name.
+        let node = |at: usize| lives.tracks.get(at)?.nodes.first().copied();
+        let handed = lives.handovers.iter();
+        let handed: Vec<(Stamp, NodeId, NodeId)> = handed
+            .filter_map(|h| Some((h.at, node(h.from)?, node(h.to)?)))
+            .collect();
+        if rows(&lives).len() > most && !by_topics {
+            lives = Lives::of(source, groups::tracks(source, &lives.tracks));
+        }
+        let mut chosen = rows(&lives);
+        if chosen.len() > most {
+            let changes = |row: &CourseRow| row.lives.iter().filter(|l| l.begins || l.ends).count();
+            let mut order: Vec<usize> = (0..chosen.len()).collect();
+            order.sort_by_key(|at| (std::cmp::Reverse(changes(&chosen[*at].1)), *at));
+            let kept = &order[..most];
+            let mut at = 0..;
+            chosen.retain(|_| at.next().is_some_and(|at| kept.contains(&at)));
+        }
+        let holds =
+            |all: &[usize], node| all.iter().any(|at| lives.tracks[*at].nodes.contains(&node));
+        let place = |node| chosen.iter().position(|(all, _)| holds(all, node));
+        Self {
+            phases: source.phases.iter().map(|p| p.span).collect(),
+            handovers: handed
+                .into_iter()
+                .filter_map(|(at, from, to)| Some((at, place(from)?, place(to)?)))
+                .filter(|(_, from, to)| from != to)
+                .collect(),
+            rows: chosen.into_iter().map(|(_, row)| row).collect(),
+        }
+    }
+}
+
+/// The rows of some lives, with the tracks they stand for.
+fn rows(lives: &Lives<'_>) -> Vec<(Vec<usize>, CourseRow)> {
+    let row = |row: &Row| match row {
+        Row::Space(_) => None,
+        Row::Track(at, ..) => {
+            let track = lives.tracks.get(*at)?;
+            let (lives, bars) = (track.lives.clone(), track.bars.clone());
+            Some((vec![*at], CourseRow { lives, bars }))
+        }
+        Row::Folded(all, _) => {
+            let span = lives.source.span();
+            let bars = vec![Bar { span, share: 1.0 }];
+            let lives = Vec::new();
+            Some((all.clone(), CourseRow { lives, bars }))
+        }
+    };
+    lives.rows.iter().filter_map(row).collect()
+}

@@ -1,0 +1,101 @@
+//! Life lines as time goes: what a frame adds to rows that stand still.
+
+use super::canvas::{Canvas, Type, ink};
+use super::lives::{Lives, Place, thick};
+use super::rows::Row;
+use super::tracks::{Bar, Track};
+use crate::base::name::last_part;
+use crate::base::time::Stamp;
+
+impl Lives<'_> {
+    /// The same with a row for everything, nothing folded, nothing lettered and nothing handed over.
+    pub(crate) fn opened(mut self) -> Self {
+        let tracks = &self.tracks;
+        let open = |row: Row| match row {
+            Row::Folded(mut all, _) => {
+                all.sort_by(|a, b| tracks[*a].name.cmp(&tracks[*b].name));
+                let row = |at: usize| Row::Track(at, last_part(&tracks[at].name).to_owned(), true);
+                all.into_iter().map(row).collect()
+            }
+            row => vec![row],
+        };
+        self.rows = std::mem::take(&mut self.rows)
+            .into_iter()
+            .flat_map(open)
+            .collect();
+        self.plain()
+    }
+
+    /// The same without letters and arrows.
+    pub(crate) fn plain(mut self) -> Self {
+        self.incidents.clear();
+        self.handovers.clear();
+        self
+    }
+
+    /// Keeps the rows of the busiest tracks, at most `most` rows; answers how many tracks are left out.
+    pub(crate) fn shorten(&mut self, most: usize, messages: &dyn Fn(&Track) -> u64) -> usize {
+        let mut order: Vec<usize> = (0..self.tracks.len()).collect();
+        order.sort_by_key(|at| std::cmp::Reverse(messages(&self.tracks[*at])));
+        let mut left = 0;
+        while self.rows.len() > most {
+            let Some(least) = order.pop() else { break };
+            self.rows.retain(|row| !row.holds(least));
+            left += 1;
+            let rows = std::mem::take(&mut self.rows);
+            let titles = rows.iter().zip(rows.iter().skip(1).map(Some).chain([None]));
+            let is_empty = |(row, next): &(&Row, Option<&Row>)| {
+                matches!(row, Row::Space(_))
+                    && !matches!(next, Some(Row::Track(_, _, true) | Row::Folded(..)))
+            };
+            let kept = titles.filter(|pair| !is_empty(pair));
+            self.rows = kept.map(|(row, _)| row.clone()).collect();
+        }
+        left
+    }
+
+    /// The rows of single tracks with the middles of their lines.
+    pub(crate) fn lines<'l>(
+        &'l self,
+        canvas: &Canvas<'_>,
+        place: &Place,
+    ) -> Vec<(f64, &'l Track, &'l str, bool)> {
+        let (top, pitch) = (self.top(place), canvas.sizes.pitch());
+        let rows = self.rows.iter().enumerate();
+        let line = |(k, row): (usize, &'l Row)| match row {
+            Row::Track(at, label, inside) => {
+                let y = top + (k as f64 + 0.5) * pitch;
+                Some((y, self.tracks.get(*at)?, label.as_str(), *inside))
+            }
+            _ => None,
+        };
+        rows.filter_map(line).collect()
+    }
+
+    /// The names of the rows: those for which `is_now` holds stand out.
+    pub(crate) fn names(
+        &self,
+        canvas: &mut Canvas<'_>,
+        place: &Place,
+        is_now: &dyn Fn(&Track) -> bool,
+    ) {
+        let room = place.axis.left - place.left - 1.2;
+        for (y, track, label, inside) in self.lines(canvas, place) {
+            let indent = if inside { 1.2 } else { 0.0 };
+            let label = canvas.cut(label, Type::Name, room - indent);
+            let color = if is_now(track) { ink::TEXT } else { ink::QUIET };
+            canvas.text(place.left + indent, y, Type::Name, color, &label);
+        }
+    }
+
+    /// What was sent until a moment.
+    pub(crate) fn past(&self, canvas: &mut Canvas<'_>, place: &Place, until: Stamp) {
+        for (y, track, ..) in self.lines(canvas, place) {
+            for bar in track.bars.iter().filter(|b| b.span.start < until) {
+                let mut bar: Bar = *bar;
+                bar.span.end = bar.span.end.min(until);
+                thick(canvas, place, y, &bar, ink::BAR);
+            }
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Where a picture will be seen, and what page that asks for: its text must be read there.
+
+use crate::base::error::{Error, Result};
+use crate::base::geometry::Size;
+use crate::draw::picture::PageOptions;
+
+/// Where the picture will be seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// On a repository's front page, which is at most 830 pixels wide.
+    Readme,
+    /// On a screen or a wall, 1280 × 720.
+    Slide,
+    /// In a column of a paper, 88 mm.
+    Column,
+    /// On a page of a paper, 181 mm.
+    Page,
+}
+
+/// Pixels per millimetre on paper, 96 to the inch.
+const PX_PER_MM: f64 = 96.0 / 25.4;
+/// The highest that a drawing may be on paper, in millimetres.
+const HIGHEST: f64 = 225.0;
+/// The smallest text of the style's furniture, in its pixels.
+const FURNITURE: f64 = 10.5;
+
+impl Purpose {
+    /// The purposes by the words of the command line.
+    pub(crate) const ALL: [(&'static str, Self); 4] = [
+        ("readme", Self::Readme),
+        ("slide", Self::Slide),
+        ("column", Self::Column),
+        ("page", Self::Page),
+    ];
+
+    /// The purpose of this word.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another word.
+    pub(crate) fn parse(word: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|(name, _)| *name == word);
+        found.map(|(_, purpose)| *purpose).ok_or_else(|| {
+            Error::usage(
+                format!("`{word}` is no place where pictures are seen"),
+                "places: readme, slide, column, page",
+            )
+        })
+    }
+
+    /// The width on paper in millimetres, if it is seen there.
+    fn width_mm(self) -> Option<f64> {
+        match self {
+            Self::Readme | Self::Slide => None,
+            Self::Column => Some(88.0),
+            Self::Page => Some(181.0),
+        }
+    }
+
+    /// The smallest text that can be read there, in pixels: 9, or 6 pt.
+    pub(crate) fn readable(self) -> f64 {
+        match self.width_mm() {
+            None => 9.0,
+            Some(_) => 8.0,
+        }
+    }
+
+    /// The pages to try, the lowest first.
+    pub(crate) fn sizes(self) -> Vec<Size> {
+        let of = |w: f64, heights: &[f64]| heights.iter().map(|h| Size::new(w, *h)).collect();
+        match (self, self.width_mm()) {
+            (_, Some(mm)) => {
+                let (w, most) = (mm * PX_PER_MM, HIGHEST * PX_PER_MM);
+                of(w, &[most * 0.4, most * 0.6, most * 0.8, most])
+            }
+            (Self::Readme, _) => of(830.0, &[467.0, 560.0, 680.0, 830.0]),
+            _ => of(1280.0, &[720.0]),
+        }
+    }
+
+    /// The page with furniture that can be read there: only a slide has room for a legend.
+    pub(crate) fn page(self, page: PageOptions) -> PageOptions {
+        let is_slide = self == Self::Slide;
+        PageOptions {
+            size: self.sizes().first().copied().unwrap_or(page.size),
+            width_mm: self.width_mm(),
+            unit: (!is_slide).then(|| self.readable() / FURNITURE),
+            has_legend: is_slide,
+            ..page
+        }
+    }
+
+    /// What to do where the graph cannot be made readable.
+    pub(crate) fn advice(self) -> &'static str {
+        match self {
+            Self::Readme | Self::Slide => {
+                "`--ns-filter`, `--hide dead,leaf` or `--mode nodes` leave less to draw"
+            }
+            Self::Column | Self::Page => {
+                "`--figure lives`, `map` or `steps` are made for paper; `--ns-filter` or `--mode nodes` leave less to draw"
+            }
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! The topic board, and pages for where they are seen: what is drawn, what is refused, what can be read.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples")
+        .join(name)
+}
+
+/// Renders an example into a folder of its own.
+fn rendered(name: &str, flags: &[&str], outputs: &[&str]) -> (tempfile::TempDir, Output) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command.arg("render").arg(example(name)).args(flags);
+    for output in outputs {
+        command.arg("-o").arg(folder.path().join(output));
+    }
+    let done = command.output().unwrap();
+    (folder, done)
+}
+
+fn said(done: &Output) -> String {
+    String::from_utf8_lossy(&done.stderr).into_owned()
+}
+
+fn text(folder: &tempfile::TempDir, name: &str) -> String {
+    std::fs::read_to_string(folder.path().join(name)).unwrap()
+}
+
+/// The smallest font of a drawing, in pixels.
+fn smallest(svg: &str) -> f64 {
+    let all = svg.split("font-size=\"").skip(1);
+    let px = all.map(|rest| rest.split('"').next().unwrap().parse::<f64>().unwrap());
+    px.fold(f64::MAX, f64::min)
+}
+
+/// The x and the width of the head of a frame.
+fn head(svg: &str) -> (f64, f64) {
+    let head = svg.split("id=\"playhead\"").nth(1).unwrap();
+    let of = |name: &str| -> f64 {
+        let from = head.find(&format!(" {name}=\"")).unwrap() + name.len() + 3;
+        head[from..].split('"').next().unwrap().parse().unwrap()
+    };
+    (of("x"), of("width"))
+}
+
+#[test]
+fn a_mission_without_known_publishers_is_a_board_of_topics() {
+    let (folder, done) = rendered(
+        "courier.mcap",
+        &[],
+        &[
+            "{n}.svg", "all.svg", "all.html", "all.gif", "all.pdf", "all.png",
+        ],
+    );
+    assert!(done.status.success(), "{}", said(&done));
+    assert!(said(&done).contains("`--view graph`"), "{}", said(&done));
+    let frames: Vec<String> = (0..6).map(|n| text(&folder, &format!("{n}.svg"))).collect();
+    for svg in &frames {
+        assert!(svg.contains(">cmd_vel</text>") && svg.contains("geometry_msgs/msg/Twist"));
+        assert!(svg.contains("nobody knows the publisher"), "it says why");
+        assert!(smallest(svg) >= 9.0);
+    }
+    // The head goes on by a window from frame to frame, and all have the width of one.
+    let heads: Vec<(f64, f64)> = frames.iter().map(|svg| head(svg)).collect();
+    for pair in heads.windows(2) {
+        assert!((pair[1].0 - pair[0].0 - pair[0].1).abs() < 1.0, "{heads:?}");
+    }
+    // The rate now: the scan is silent at 1:10, and drives on.
+    assert!(frames[0].contains("5 Hz"));
+    assert!(text(&folder, "all.svg").contains("attributeName=\"x\" calcMode=\"discrete\""));
+    let page = text(&folder, "all.html");
+    assert!(page.contains("id=\"head\" data-x=") && page.contains(">amcl_pose</text>"));
+}
+
+#[test]
+fn the_user_chooses_between_graph_and_board() {
+    let (folder, done) = rendered("courier.mcap", &["--view", "graph"], &["{n}.svg"]);
+    assert!(done.status.success());
+    assert!(!said(&done).contains("board"));
+    assert!(
+        text(&folder, "0.svg").contains("class=\"node"),
+        "a graph has nodes"
+    );
+    // What only a graph has asks for one, and is refused beside a board.
+    let (_folder, done) = rendered("courier.mcap", &["--orientation", "TB"], &["{n}.svg"]);
+    assert!(done.status.success() && !said(&done).contains("board"));
+    for flags in [
+        &["--view", "board", "--orientation", "TB"][..],
+        &["--view", "board", "--collapse", "/nav"],
+        &["--view", "board", "--strip", "changes"],
+        &["--view", "board", "--figure", "lives"],
+    ] {
+        let (_folder, done) = rendered("courier.mcap", flags, &["x.svg"]);
+        assert_eq!(done.status.code(), Some(2), "{flags:?}");
+    }
+}
+
+#[test]
+fn a_picture_for_a_readme_can_be_read_there() {
+    let (folder, done) = rendered("warehouse.bag", &["--for", "readme"], &["{n}.svg"]);
+    assert!(done.status.success(), "{}", said(&done));
+    assert!(!said(&done).contains("too small"), "{}", said(&done));
+    let svg = text(&folder, "3.svg");
+    assert!(svg.contains("width=\"830\""));
+    assert!(smallest(&svg) >= 8.95, "{}", smallest(&svg));
+    assert!(!svg.contains("id=\"legend\""), "furniture is reduced");
+}
+
+#[test]
+fn a_picture_for_paper_is_as_wide_as_a_column_and_says_what_cannot_be_read() {
+    let (folder, done) = rendered(
+        "warehouse.bag",
+        &["--for", "column", "--fit", "none"],
+        &["{n}.svg"],
+    );
+    assert!(done.status.success(), "{}", said(&done));
+    assert!(text(&folder, "0.svg").contains("width=\"88mm\""));
+    assert!(
+        said(&done).contains(" pt where it is seen") || smallest(&text(&folder, "0.svg")) >= 7.95
+    );
+    for other in [
+        &["--size", "800x600"][..],
+        &["--width", "88mm"],
+        &["--figure", "lives"],
+    ] {
+        let flags = [&["--for", "page"], other].concat();
+        let (_folder, done) = rendered("warehouse.bag", &flags, &["x.pdf"]);
+        assert_eq!(done.status.code(), Some(2), "{other:?}");
+    }
+}
+
+#[test]
+fn frames_show_who_lived_when_below_the_graph() {
+    let (folder, done) = rendered("warehouse.bag", &[], &["{n}.svg"]);
+    assert!(done.status.success(), "{}", said(&done));
+    let svg = text(&folder, "2.svg");
+    let lives = svg
+        .split("id=\"lives\"")
+        .nth(1)
+        .unwrap()
+        .split("</g>")
+        .next()
+        .unwrap();
+    for (what, color) in [
+        ("starts", "#00795C"),
+        ("ends", "#C44900"),
+        ("hand-overs", "#6A35C9"),
+    ] {
+        assert!(lives.to_uppercase().contains(color), "{what}: {lives}");
+    }
+}
