@@ -29,8 +29,8 @@ use crate::graph::window::{Division, Length};
 use crate::mission::info::{SurveyRow, json, survey_text};
 use crate::mission::{Mission, events};
 use crate::pipeline::{
-    Drawing, Phases, Purpose, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey, read,
-    survey, survey_file,
+    Drawing, Phases, Purpose, Reading, Render, Rendered, Survey, Watch as _, explain, is_survey,
+    read, survey, survey_file,
 };
 use applies::Given;
 use args::{

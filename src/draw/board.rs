@@ -17,7 +17,7 @@ use crate::draw::picture::title::Title;
 use crate::draw::scene::{Form, Group, Piece, Scene, Shape, Stroke};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::Fonts;
-use crate::graph::NodeId;
+use crate::graph::{Element, NodeId};
 use crate::view::View;
 
 /// Pixels per millimetre of the drawing: small text of 9 pixels at least, and not larger than titles.
@@ -236,13 +236,13 @@ impl<'a> Board<'a> {
     /// What changes from frame to frame.
     fn now(&self, window: usize, span: Span) -> Vec<Group> {
         let mission = self.source.mission;
-        let graph = mission.windows.get(window).map(|w| &w.graph);
+        let graph = mission.graphs.get(window);
         let seconds = mission
             .windows
             .get(window)
             .map_or(0.0, |w| w.span.nanos() as f64 / 1e9);
         let count = |track: &Track| {
-            let topics = &graph?.topics;
+            let topics = &graph.as_ref()?.topics;
             let at = topics.binary_search_by_key(&track.topic?, |t| t.id).ok()?;
             Some(topics[at].count)
         };
@@ -380,12 +380,9 @@ fn scaled(r: Rect, by: f64) -> Rect {
 
 /// How many messages a topic carried.
 fn messages(source: &Source<'_>, track: &Track) -> u64 {
-    let windows = source.mission.windows.iter();
-    let of = |topics: &[crate::graph::TopicState]| {
-        let at = topics.binary_search_by_key(&track.topic?, |t| t.id).ok()?;
-        Some(topics[at].count)
-    };
-    windows.filter_map(|w| of(&w.graph.topics)).sum()
+    let Some(topic) = track.topic else { return 0 };
+    let rows = source.mission.graphs.rows(Element::Topic(topic));
+    rows.map(|(_, row)| row.count.unwrap_or(0)).sum()
 }
 
 /// The part of the page that a board has.
