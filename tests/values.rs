@@ -170,7 +170,7 @@ fn captions_that_cannot_be_are_refused() {
             "-o",
             "-",
             "--format",
-            "svg",
+            "json",
         ],
         b"",
     );

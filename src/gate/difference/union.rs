@@ -120,8 +120,12 @@ pub(crate) fn union(
         Side::Both => vec![(span(SECOND), &b)],
     };
     let windows = shown.iter().enumerate();
-    let windows: Vec<Window> = windows.map(|(at, (span, seen))| window(at, *span, seen)).collect();
-    let graphs = shown.iter().map(|(span, seen)| (*span, graph(&elements, seen)));
+    let windows: Vec<Window> = windows
+        .map(|(at, (span, seen))| window(at, *span, seen))
+        .collect();
+    let graphs = shown
+        .iter()
+        .map(|(span, seen)| (*span, graph(&elements, seen)));
     let graphs = graphs.collect();
     let whole = Span {
         start: windows.first().map_or(at, |w| w.span.start),
