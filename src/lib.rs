@@ -55,6 +55,15 @@
 //! The library is silent and repeatable: it never prints (but for `cli`), reads no clock, and writes the same bytes
 //! for the same bag.
 
+#![cfg_attr(
+    not(feature = "cli"),
+    allow(
+        dead_code,
+        unused_imports,
+        reason = "some of it serves the command only"
+    )
+)]
+
 // In the order of the line, which is why they stand apart: sorted they would tell nothing.
 mod base;
 

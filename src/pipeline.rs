@@ -16,7 +16,6 @@ pub(crate) use draw::Body;
 pub use draw::Drawing;
 pub(crate) use export::render;
 pub use export::{Render, Rendered};
-#[cfg(feature = "cli")]
 pub(crate) use export::{check, show};
 pub use extract::{Extract, Extracted, extract};
 pub use phases::Phases;

@@ -58,7 +58,7 @@ fn rendered(bag: &str, period: &str, folder: &Path) {
     command
         .arg("render")
         .arg(input)
-        .args(["-q", "--period", period]);
+        .args(["-q", "--view", "graph", "--period", period]);
     for name in ["x.json", "x{n}.svg", "x.html", "x.md"] {
         command.arg("-o").arg(folder.join(name));
     }

@@ -26,6 +26,7 @@ mod layout;
 mod options;
 mod pages;
 mod phases;
+mod pictures;
 mod properties;
 mod reading;
 mod ros2_example;

@@ -43,7 +43,7 @@ pub struct Built {
 }
 
 /// Concludes, and builds the graph of each window. Windows are sorted by start, none inside another; they may overlap.
-/// `grace` is that of [`graphs`].
+/// `grace` is that of `graphs`.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.

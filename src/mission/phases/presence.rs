@@ -88,8 +88,12 @@ pub(crate) fn knows_publishers(elements: &Elements, activity: &Activity) -> bool
     for cell in &activity.cells {
         let mut sent = vec![false; elements.topics.len()];
         for edge in &cell.graph.publishes {
-            let topic = elements.publishes.get(edge.id as usize).map(|e| e.topic);
-            if let Some(is) = topic.and_then(|t| sent.get_mut(t as usize)) {
+            let edge = elements.publishes.get(edge.id as usize);
+            let known = edge.filter(|e| !e.evidence.is_guess());
+            if let Some(is) = known
+                .map(|e| e.topic)
+                .and_then(|t| sent.get_mut(t as usize))
+            {
                 *is = true;
             }
         }
