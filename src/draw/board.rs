@@ -289,7 +289,13 @@ impl<'a> Board<'a> {
 
     /// The nodes that are known, as pills in a row as far as there is room: those that are there stand out.
     fn nodes(&self, canvas: &mut Canvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
-        let all = &self.source.roles;
+        let elements = &self.source.mission.elements;
+        let is_known = |id: &NodeId| {
+            let node = elements.nodes.get(*id as usize);
+            node.is_some_and(|n| !n.evidence.is_guess())
+        };
+        let roles = self.source.roles.iter();
+        let all: Vec<_> = roles.filter(|(_, n)| n.iter().any(is_known)).collect();
         if all.is_empty() {
             return;
         }
@@ -297,7 +303,7 @@ impl<'a> Board<'a> {
         canvas.text(self.place.left, y, Type::Small, ink::QUIET, "nodes known");
         let mut x = self.place.axis.left;
         let end = self.options.size.w / self.scale - self.place.left;
-        for (k, (role, nodes)) in all.iter().enumerate() {
+        for (k, &(role, nodes)) in all.iter().enumerate() {
             let wide = canvas.width(role, Type::Small) + 2.4;
             let more = format!("+{}", all.len() - k);
             let rest = if k + 1 < all.len() { 8.0 } else { 0.0 };
