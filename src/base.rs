@@ -8,6 +8,7 @@ pub(crate) mod file;
 pub mod geometry;
 pub(crate) mod leftovers;
 pub mod name;
+pub(crate) mod nearest;
 pub mod notice;
 pub(crate) mod role;
 pub(crate) mod table;

@@ -18,7 +18,7 @@ const STATIONS: &[&str] = &[
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
         &["budget", "leftovers", "words"],
-        &["digest", "error", "geometry", "name", "notice", "time", "yaml"],
+        &["digest", "error", "geometry", "name", "nearest", "notice", "time", "yaml"],
         &["file", "role", "table"],
         &["csv"],
     ]),

@@ -104,3 +104,24 @@ impl Rect {
         Self::new(x, y, right - x, bottom - y)
     }
 }
+/// The points of a way of cubic Bézier curves, each with its two controls and its end: the start, and then so many
+/// points along each curve, the last of them its end.
+pub(crate) fn polyline(start: Point, curves: &[[Point; 3]], pieces: u32) -> Vec<Point> {
+    let mut points = vec![start];
+    let mut here = start;
+    for [a, b, end] in curves {
+        for piece in 1..=pieces {
+            let t = f64::from(piece) / f64::from(pieces);
+            let u = 1.0 - t;
+            let mix = |p: f64, q: f64, r: f64, s: f64| {
+                u * u * u * p + 3.0 * u * u * t * q + 3.0 * u * t * t * r + t * t * t * s
+            };
+            points.push(Point::new(
+                mix(here.x, a.x, b.x, end.x),
+                mix(here.y, a.y, b.y, end.y),
+            ));
+        }
+        here = *end;
+    }
+    points
+}

@@ -176,7 +176,7 @@ pub(super) fn check(args: &CheckArgs, terminal: &mut Terminal) -> Result<u8> {
 
 fn unknown_kind(word: &str) -> Error {
     let words = || crate::gate::Kind::words();
-    let near = crate::evidence::topology::nearest::nearest(word, words());
+    let near = crate::base::nearest::nearest(word, words());
     let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
     let all: Vec<&str> = words().collect();
     Error::usage(

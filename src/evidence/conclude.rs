@@ -9,6 +9,7 @@ use super::collector::{Recorded, spool_error};
 use super::restarts::{Restarts, restarts};
 use super::values::Values;
 use crate::base::error::Result;
+use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::role::role;
 use crate::base::time::Stamp;
@@ -16,7 +17,6 @@ use crate::evidence::claim::{Claims, Name};
 use crate::evidence::code::{Code, matching};
 use crate::evidence::proof::{Conclusions, Key, Proof, Stream, Validity, offers};
 use crate::evidence::times::Stamps;
-use crate::evidence::topology::nearest::nearest;
 use crate::evidence::topology::{Element, Entry, Topology};
 use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
 

@@ -6,7 +6,6 @@
 mod csv;
 mod dot;
 pub(crate) mod launch;
-pub(crate) mod nearest;
 mod python;
 mod substitution;
 mod tree;

@@ -12,8 +12,8 @@ use super::expectation::{Closed, Expectation, Place};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, Severity};
 use super::pattern::Pattern;
+use crate::base::nearest::nearest;
 use crate::base::words::visible;
-use crate::evidence::topology::nearest::nearest;
 use crate::mission::Mission;
 
 /// One fact of the file, judged.

@@ -118,7 +118,6 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     if matches!(job.reading.phases, Phases::Captions(_)) {
         drawing.page.phases = captions(&mission);
     }
-    drawing.page.course = Some(course(&mission, &drawing));
     let figure = drawn_figure(job, &mission)?;
     // What is not drawn, or drawn as a figure, needs no places.
     let is_graph = |o: &Output| {
@@ -126,6 +125,9 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     };
     let is_drawn = job.outputs.iter().any(is_graph);
     let is_board = is_drawn && drawing.body.is_board(&mission);
+    if is_drawn && !is_board {
+        drawing.page.course = Some(course(&mission, &drawing));
+    }
     let Composed {
         view,
         options,

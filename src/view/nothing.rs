@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use super::ViewOptions;
 use crate::base::error::Error;
 use crate::base::name::namespace;
+use crate::base::nearest::nearest;
 use crate::base::words;
-use crate::evidence::topology::nearest::nearest;
 use crate::graph::Elements;
 
 /// The error of a view in which nothing of these elements is left.

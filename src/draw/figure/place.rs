@@ -3,7 +3,7 @@
 use super::canvas::{Canvas, Type, ink};
 use super::labels::{self, Room, Spot};
 use super::parts::{PARTED, Part, parts, shelves};
-use crate::base::geometry::{Point, Rect, Size};
+use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Step, Stroke};
 use crate::draw::style::Color;
 use crate::layout::{Engine, Layout, Options, Orientation, Plan, Route, lay_out};
@@ -18,7 +18,7 @@ const SHORTEST: f64 = 3.4;
 /// The height of the page that the engine is to fill, in widths: low.
 const ASPECT: f64 = 0.45;
 /// Pieces that a curve is measured in.
-const PIECES: usize = 8;
+const PIECES: u32 = 8;
 /// A drawing in millimetres, its top left corner at (0, 0).
 #[derive(Clone, Debug)]
 pub(crate) struct Placed {
@@ -387,23 +387,7 @@ pub(crate) fn rooms(canvas: &Canvas<'_>, alternatives: &[Vec<String>]) -> Vec<Si
 }
 
 fn sampled(route: &Route) -> Vec<Point> {
-    let mut points = vec![route.start];
-    let mut from = route.start;
-    for [a, b, to] in &route.curves {
-        for k in 1..=PIECES {
-            let t = k as f64 / PIECES as f64;
-            let u = 1.0 - t;
-            let mix = |p: f64, q: f64, r: f64, s: f64| {
-                u * u * u * p + 3.0 * u * u * t * q + 3.0 * u * t * t * r + t * t * t * s
-            };
-            points.push(Point::new(
-                mix(from.x, a.x, b.x, to.x),
-                mix(from.y, a.y, b.y, to.y),
-            ));
-        }
-        from = *to;
-    }
-    points
+    polyline(route.start, &route.curves, PIECES)
 }
 
 fn distance(a: Point, b: Point) -> f64 {

@@ -5,12 +5,15 @@ use super::measured::arrow_label;
 use super::options::{self, ArrowLook};
 use super::page::Fit;
 use super::{badge, chips};
-use crate::base::geometry::{Point, Rect, Size};
+use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::layout::Route;
 use crate::view::{Arrow, Mark, Shown};
+
+/// Straight pieces that a curve is measured in.
+const PIECES: u32 = 10;
 
 /// What arrows are drawn with.
 pub(crate) struct Arrows<'a> {
@@ -50,7 +53,7 @@ impl ArrowPath {
             .map(|c| c.map(|p| fit.point(p)))
             .collect();
         let start = fit.point(route.start);
-        let points = points_along(start, &curves);
+        let points = polyline(start, &curves, PIECES);
         let length = points.windows(2).map(|w| distance(w[0], w[1])).sum();
         let middle = at_part(&points, length, 0.5);
         let label = room.and(route.label.map(|p| fit.point(p)));
@@ -236,28 +239,6 @@ fn direction(controls: &[Point], end: Point) -> Point {
 
 fn distance(a: Point, b: Point) -> f64 {
     libm::hypot(a.x - b.x, a.y - b.y)
-}
-
-/// The route as short straight pieces.
-fn points_along(start: Point, curves: &[[Point; 3]]) -> Vec<Point> {
-    const PIECES: usize = 10;
-    let mut points = vec![start];
-    let mut here = start;
-    for [a, b, end] in curves {
-        for piece in 1..=PIECES {
-            let t = piece as f64 / PIECES as f64;
-            let u = 1.0 - t;
-            let mix = |p: f64, q: f64, r: f64, s: f64| {
-                u * u * u * p + 3.0 * u * u * t * q + 3.0 * u * t * t * r + t * t * t * s
-            };
-            points.push(Point::new(
-                mix(here.x, a.x, b.x, end.x),
-                mix(here.y, a.y, b.y, end.y),
-            ));
-        }
-        here = *end;
-    }
-    points
 }
 
 /// The point at `part` (0..=1) of the way.

@@ -6,9 +6,9 @@ use super::super::pattern::Pattern;
 use super::super::range::{During, Range};
 use super::{At, Place};
 use crate::base::error::{Error, Result};
+use crate::base::nearest::nearest;
 use crate::base::time::parse_nanos;
 use crate::base::yaml::{Data, Placed};
-use crate::evidence::topology::nearest::nearest;
 
 /// The document under way.
 #[derive(Clone, Copy)]
