@@ -330,11 +330,6 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
     let reading = reading(&args.inputs, &args.time, &args.change, &args.graph)?;
     let phases = look::phases(&args.figure.phases, args.look.captions.as_deref())?;
     let reading = reading.with_phases(phases);
-    let title = args
-        .look
-        .title
-        .clone()
-        .unwrap_or_else(|| title(&reading.inputs));
     let mut outputs = match &args.outputs[..] {
         [] => vec![Output::parse(
             &default_output(&reading.inputs, args.figure.figure.is_some()),
@@ -352,7 +347,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .as_deref()
         .map(Purpose::parse)
         .transpose()?;
-    let page = look::options(&args.look, title, args.change.rate_change);
+    let page = look::options(&args.look, args.change.rate_change);
     Ok(Render {
         drawing: Drawing {
             body: look::body(args)?,
@@ -394,14 +389,6 @@ fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     let topologies = args.graph.topology.iter();
     let all = named.chain(files.chain(topologies).cloned());
     all.filter(|path| path.exists()).collect()
-}
-
-fn title(inputs: &[Input]) -> String {
-    match inputs {
-        [] => String::new(),
-        [one] => one.name(),
-        [first, rest @ ..] => format!("{} and {} more", first.name(), rest.len()),
-    }
 }
 
 /// The file that collects what a job of GitHub's wants to say; its name has no extension.

@@ -62,7 +62,7 @@ pub struct Mission {
     pub graphs: Graphs,
     /// What happened, in continuous time.
     pub ledger: Ledger,
-    /// What was alive and how busy on a grid of its own; made when the mission is read, not part of its file.
+    /// What was alive and how busy on a grid of its own.
     pub activity: Activity,
     /// Where everything was drawn, if it was.
     pub layout: Option<Places>,
@@ -137,6 +137,15 @@ impl Mission {
         let all = &self.elements;
         all.topics.iter().any(|t| !t.runs.is_empty())
             || all.nodes.iter().any(|n| !n.runs.is_empty())
+    }
+
+    /// The name of its bag, or of the first of several and how many more there are.
+    pub fn title(&self) -> String {
+        match &self.bags[..] {
+            [] => String::new(),
+            [one] => one.name.clone(),
+            [first, rest @ ..] => format!("{} and {} more", first.name, rest.len()),
+        }
     }
 
     /// Nanoseconds from the mission's start to `at`.

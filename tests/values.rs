@@ -7,9 +7,6 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use bagreel::values::{Length, Period};
-use bagreel::{Output, Reading, Render, render};
-
 use crate::support::{ORIGIN, Recording, rosbag1};
 
 fn example(name: &str) -> PathBuf {
@@ -17,31 +14,31 @@ fn example(name: &str) -> PathBuf {
     examples.join(name)
 }
 
-/// The formats that hold the mission: graphs, tables, data.
-const DATA: [&str; 7] = [
+/// Everything that comes out quickly enough; animations are made of the frames.
+const FORMATS: [&str; 13] = [
+    "x.svg",
+    "x{n}.svg",
+    "x.png",
+    "x.pdf",
+    "x.html",
     "x.md",
     "x.dot",
     "x.mmd",
     "x.json",
     "x.csv",
+    "x.parquet",
     "x.gexf",
     "x.graphml",
 ];
-/// Those that draw it. The life lines below frames, and the board, are drawn of more than the file holds.
-const DRAWN: [&str; 4] = ["x.svg", "x{n}.svg", "x.json", "x.png"];
-
-/// Every file that a rendering of `input` makes, by name.
-fn files(input: &Path, period: Option<Period>, formats: &[&str]) -> BTreeMap<String, Vec<u8>> {
+/// Every file that `bagreel render` makes of `input`, by name.
+fn files(input: &Path, formats: &[&str], options: &[&str]) -> BTreeMap<String, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
-    let name = |n: &&str| folder.path().join(n).display().to_string();
-    let outputs = formats
-        .iter()
-        .map(|n| Output::parse(&name(n), None).unwrap());
-    let mut reading = Reading::of([input]);
-    reading.division.length = period.map_or(Length::Auto, Length::Fixed);
-    let mut job = Render::new(reading, outputs.collect()).unwrap();
-    job.drawing.page.bare = true;
-    render(&job).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command.arg("render").arg(input).arg("-q").args(options);
+    for name in formats {
+        command.arg("-o").arg(folder.path().join(name));
+    }
+    assert!(command.status().unwrap().success(), "{input:?} {options:?}");
     let files = fs::read_dir(folder.path()).unwrap().map(|entry| {
         let entry = entry.unwrap();
         let name = entry.file_name().into_string().unwrap();
@@ -52,20 +49,63 @@ fn files(input: &Path, period: Option<Period>, formats: &[&str]) -> BTreeMap<Str
 
 #[test]
 fn its_own_json_renders_to_the_same_bytes() {
-    let twenty = Period::parse("20");
-    for (bag, period, formats) in [
-        ("courier.mcap", None, &DATA[..]),
-        ("warehouse.bag", twenty, &DATA[..]),
-        ("warehouse.bag", twenty, &DRAWN[..]),
-    ] {
-        let first = files(&example(bag), period, formats);
+    let frames = ["x.svg", "x.html", "x.md", "x.json", "x.png"];
+    let twenty = ["--period", "20"];
+    // How the bag is read, and drawn as what; the form of its JSON.
+    let cases: [(&str, &[&str], &[&str], &[&str], &str); 8] = [
+        ("courier.mcap", &[], &FORMATS, &[], "windows"),
+        ("courier.mcap", &[], &FORMATS, &[], "runs"),
+        ("warehouse.bag", &twenty, &frames, &[], "windows"),
+        (
+            "warehouse.bag",
+            &[],
+            &["x{n}.svg"],
+            &["--view", "board"],
+            "runs",
+        ),
+        (
+            "warehouse.bag",
+            &[],
+            &["x.json", "x.csv"],
+            &["--filtered"],
+            "windows",
+        ),
+        (
+            "warehouse.bag",
+            &[],
+            &["x.svg"],
+            &["--figure", "lives"],
+            "windows",
+        ),
+        (
+            "warehouse.bag",
+            &[],
+            &["x.pdf"],
+            &["--figure", "map"],
+            "windows",
+        ),
+        (
+            "warehouse.bag",
+            &[],
+            &["x.svg"],
+            &["--figure", "steps"],
+            "runs",
+        ),
+    ];
+    for (bag, reading, formats, drawing, form) in cases {
+        let bag = example(bag);
+        let first = files(&bag, formats, &[reading, drawing].concat());
+        let data = files(&bag, &["y.json"], &[reading, &["--json", form]].concat());
         let folder = tempfile::tempdir().unwrap();
-        let json = folder.path().join("x.json");
-        fs::write(&json, &first["x.json"]).unwrap();
-        let second = files(&json, None, formats);
-        assert!(first.keys().eq(second.keys()), "{bag}: other files");
+        let mission = folder.path().join("y.json");
+        fs::write(&mission, &data["y.json"]).unwrap();
+        let second = files(&mission, formats, drawing);
+        assert!(first.keys().eq(second.keys()), "{bag:?}: other files");
         for (name, bytes) in &first {
-            assert!(second[name] == *bytes, "{bag}: another {name}");
+            assert!(
+                second[name] == *bytes,
+                "{bag:?} {form} {drawing:?}: another {name}"
+            );
         }
     }
 }

@@ -69,7 +69,7 @@ fn diff_job(args: &DiffArgs) -> Result<Diff> {
         second: name(&args.second),
     };
     drawing.page.compares = true;
-    drawing.page.title = format!("{} → {}", subject.first, subject.second);
+    drawing.page.title = Some(format!("{} → {}", subject.first, subject.second));
     Ok(Diff {
         readings: [one(&args.first)?, one(&args.second)?],
         rate_change: args.rate_change,

@@ -71,7 +71,7 @@ pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
     Fonts::bundled().with(data, path)
 }
 
-pub(super) fn options(args: &LookArgs, title: String, rate_change: f64) -> PageOptions {
+pub(super) fn options(args: &LookArgs, rate_change: f64) -> PageOptions {
     let default = PageOptions::default();
     let size = args
         .size
@@ -81,7 +81,7 @@ pub(super) fn options(args: &LookArgs, title: String, rate_change: f64) -> PageO
         width_mm: args.width,
         bare: args.bare,
         compares: false,
-        title,
+        title: args.title.clone(),
         orientation: match args.orientation.as_str() {
             "LR" => Some(Orientation::LeftRight),
             "TB" => Some(Orientation::TopBottom),

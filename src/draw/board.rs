@@ -150,7 +150,7 @@ impl<'a> Board<'a> {
         scene.groups.extend(self.now(window, span));
         scene.title = format!(
             "{}, window {} of {}",
-            self.options.title,
+            self.options.title(),
             frame.index + 1,
             self.view.frames.len()
         );
@@ -171,7 +171,7 @@ impl<'a> Board<'a> {
         canvas.begin("nodes");
         self.nodes(&mut canvas, &|_| true);
         scene.groups.extend(self.painted(canvas));
-        scene.title = format!("Topics over time of {}", self.options.title);
+        scene.title = format!("Topics over time of {}", self.options.title());
         let heads = self
             .view
             .frames
@@ -181,7 +181,7 @@ impl<'a> Board<'a> {
             scene,
             heads: heads.collect(),
             color: self.style.timeline.head,
-            title: self.options.title.clone(),
+            title: self.options.title().to_owned(),
         }
     }
 

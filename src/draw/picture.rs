@@ -46,8 +46,8 @@ pub struct PageOptions {
     pub bare: bool,
     /// Whether two missions are compared, so that no time, no window and no timeline means anything.
     pub compares: bool,
-    /// The title, such as the bag's name.
-    pub title: String,
+    /// The title, if not the names of the bags.
+    pub title: Option<String>,
     /// Which way the edges run; `None` takes what fits better.
     pub orientation: Option<Orientation>,
     /// The mission's phase in each window, by place among the view's frames; empty for none.
@@ -69,7 +69,7 @@ impl Default for PageOptions {
             width_mm: None,
             bare: false,
             compares: false,
-            title: String::new(),
+            title: None,
             orientation: None,
             phases: Vec::new(),
             unit: None,
@@ -77,6 +77,13 @@ impl Default for PageOptions {
             course: None,
             rate_change: 0.25,
         }
+    }
+}
+
+impl PageOptions {
+    /// What stands on top.
+    pub(crate) fn title(&self) -> &str {
+        self.title.as_deref().unwrap_or_default()
     }
 }
 
@@ -240,7 +247,7 @@ impl<'a> Picture<'a> {
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
-        scene.title.clone_from(&measured.options.title);
+        measured.options.title().clone_into(&mut scene.title);
         if !measured.options.compares {
             let (window, all) = (frame.index + 1, self.len());
             scene.title = format!("{}, window {window} of {all}", scene.title);

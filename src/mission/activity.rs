@@ -42,6 +42,19 @@ pub struct Cell {
     pub graph: Graph,
 }
 
+impl Cell {
+    /// Without what only windows tell: sizes, the spacing of messages, the states of lifecycles.
+    pub(crate) fn new(span: Span, mut graph: Graph) -> Self {
+        for topic in &mut graph.topics {
+            (topic.bytes, topic.median_period_s, topic.max_gap_s) = (None, None, None);
+        }
+        for node in &mut graph.nodes {
+            node.lifecycle = None;
+        }
+        Self { span, graph }
+    }
+}
+
 /// The mission as a finely divided sequence; ids are those of the mission's elements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Activity {
@@ -74,13 +87,11 @@ impl Activity {
             let last = chunk.last().map_or(mission.span.end, |w| w.span.end);
             let busy = chunk.iter().zip(graphs.by_ref());
             let (_, graph) = busy.max_by_key(|(w, _)| (w.messages, Reverse(w.index)))?;
-            Some(Cell {
-                span: Span {
-                    start: start(k)?,
-                    end: start(k + 1).unwrap_or(last),
-                },
-                graph,
-            })
+            let span = Span {
+                start: start(k)?,
+                end: start(k + 1).unwrap_or(last),
+            };
+            Some(Cell::new(span, graph))
         };
         Self {
             cells: chunks.iter().enumerate().filter_map(cell).collect(),

@@ -1,5 +1,6 @@
 //! A mission as JSON, written as a stream and read back.
 
+mod activity;
 pub(crate) mod changes;
 pub(crate) mod entries;
 pub(crate) mod lines;

@@ -115,6 +115,7 @@ fn check_figure(job: &Render) -> Result<()> {
 /// As [`render`].
 pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
+    drawing.page.title.get_or_insert_with(|| mission.title());
     if matches!(job.reading.phases, Phases::Captions(_)) {
         drawing.page.phases = captions(&mission);
     }

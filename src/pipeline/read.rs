@@ -173,22 +173,17 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         );
         return Err(Error::usage(what, "give the bag itself"));
     }
-    let activity = Activity::of_windows(&mission);
+    if mission.activity.cells.is_empty() {
+        mission.activity = Activity::of_windows(&mission);
+    }
     let basis = Basis {
         elements: &mission.elements,
-        activity: &activity,
+        activity: &mission.activity,
         texts: &[],
-        earlier: mission.ledger.phases,
+        earlier: std::mem::take(&mut mission.ledger.phases),
     };
-    let phases = wanted(reading, basis)?;
-    Ok(Mission {
-        ledger: Ledger {
-            phases,
-            ..mission.ledger
-        },
-        activity,
-        ..mission
-    })
+    mission.ledger.phases = wanted(reading, basis)?;
+    Ok(mission)
 }
 
 /// What follows from what was read, with the source code as it was on the recording's day.
@@ -280,7 +275,7 @@ fn activity(
     let graphs = graphs(&spans)?.graphs;
     let cells = spans.into_iter().zip(&graphs);
     Ok(Activity {
-        cells: cells.map(|(span, graph)| Cell { span, graph }).collect(),
+        cells: cells.map(|(span, graph)| Cell::new(span, graph)).collect(),
         sending: history.sending.clone(),
     })
 }

@@ -4,7 +4,9 @@ use super::items::Viewed;
 use super::state::{shows_node, shows_topic};
 use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
+use crate::graph::sending::Sending;
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph, NodeId};
+use crate::mission::activity::Cell;
 use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Activity, EntryId, Ledger, Mission, Window};
 
@@ -22,8 +24,7 @@ pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
         windows: windows.map(|w| keep.window(w)).collect(),
         graphs: graphs.collect(),
         ledger,
-        // By ids of elements that are others here.
-        activity: Activity::default(),
+        activity: keep.activity(&mission.activity, options, &viewed),
         ..mission.clone()
     }
 }
@@ -163,6 +164,20 @@ impl Keep {
             topics,
             publishes,
             subscribes,
+        }
+    }
+
+    fn activity(&self, all: &Activity, options: &ViewOptions, viewed: &Viewed) -> Activity {
+        let cells = all.cells.iter().map(|cell| Cell {
+            span: cell.span,
+            graph: self.graph(&cell.graph, options, viewed),
+        });
+        Activity {
+            cells: cells.collect(),
+            sending: Sending {
+                publishes: kept(&all.sending.publishes, &self.publishes),
+                topics: kept(&all.sending.topics, &self.topics),
+            },
         }
     }
 

@@ -45,7 +45,7 @@ fn main() {
     let (style, fonts) = (Style::builtin("light").unwrap(), Fonts::bundled());
     let title = path.file_name().unwrap().to_string_lossy().into_owned();
     let options = picture::PageOptions {
-        title,
+        title: Some(title),
         ..picture::PageOptions::default()
     };
     let measured = picture::Measured::new(&view, &style, &fonts, options);

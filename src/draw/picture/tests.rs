@@ -239,7 +239,7 @@ fn pages_of_any_size_hold_their_furniture() {
     ] {
         let options = PageOptions {
             size: Size::new(w, h),
-            title: "a bag with a long name.bag".to_owned(),
+            title: Some("a bag with a long name.bag".to_owned()),
             ..PageOptions::default()
         };
         with_picture(&MISSION, "light", options, |p| {

@@ -66,7 +66,7 @@ impl<'a> Title<'a> {
             style,
             fonts,
             page: page.clone(),
-            name: fonts.shown(&options.title).into_owned(),
+            name: fonts.shown(options.title()).into_owned(),
             chips,
             end,
             phase,

@@ -66,7 +66,7 @@ impl Picture<'_> {
 
     /// Its title, such as the bag's name.
     pub fn title_text(&self) -> &str {
-        &self.measured.options.title
+        self.measured.options.title()
     }
 
     /// Everything that is ever in the picture.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::raw::{RawEdge, RawNode, RawTopic, RawWindow};
+use super::runs::RawElements;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Evidence;
@@ -60,6 +61,17 @@ impl Names {
             .subscribes
             .iter()
             .for_each(|raw| self.take_subscribe(raw));
+    }
+
+    pub(crate) fn whole(&mut self, all: &RawElements) {
+        let nodes = all.nodes.iter();
+        nodes.for_each(|raw| self.take_node(&raw.element));
+        let topics = all.topics.iter();
+        topics.for_each(|raw| self.take_topic(&raw.element));
+        let publishes = all.publishes.iter();
+        publishes.for_each(|raw| self.take_publish(&raw.element));
+        let subscribes = all.subscribes.iter();
+        subscribes.for_each(|raw| self.take_subscribe(&raw.element));
     }
 
     pub(crate) fn take_node(&mut self, raw: &RawNode) {
@@ -201,6 +213,16 @@ impl Ids {
     /// The place of a subscription.
     pub(crate) fn of_subscribe(&self, raw: &RawEdge) -> u32 {
         self.subscribes[&(Arc::from(raw.topic.as_str()), Arc::from(raw.node.as_str()))]
+    }
+
+    /// How many topics there are.
+    pub(crate) fn topics(&self) -> usize {
+        self.topics.len()
+    }
+
+    /// How many publications there are.
+    pub(crate) fn publishes(&self) -> usize {
+        self.publishes.len()
     }
 
     /// The graph of a window; an element listed twice counts once, and the ends of an edge are there.

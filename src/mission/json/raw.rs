@@ -27,6 +27,7 @@ pub(crate) struct Raw {
     pub(crate) publishes: Vec<RawWhole<RawEdge>>,
     #[serde(default)]
     pub(crate) subscribes: Vec<RawWhole<RawEdge>>,
+    pub(crate) activity: Option<RawActivity>,
     pub(crate) form: Option<String>,
     pub(crate) ledger: Option<Vec<RawEntry>>,
     #[serde(default)]
@@ -34,6 +35,19 @@ pub(crate) struct Raw {
     pub(crate) layout: Option<RawLayout>,
     #[serde(default)]
     pub(crate) notices: Vec<RawNotice>,
+}
+
+#[derive(Deserialize)]
+pub(crate) struct RawActivity {
+    pub(crate) bounds_ns: Vec<i64>,
+    #[serde(default)]
+    pub(crate) nodes: Vec<RawWhole<RawNode>>,
+    #[serde(default)]
+    pub(crate) topics: Vec<RawWhole<RawTopic>>,
+    #[serde(default)]
+    pub(crate) publishes: Vec<RawWhole<RawEdge>>,
+    #[serde(default)]
+    pub(crate) subscribes: Vec<RawWhole<RawEdge>>,
 }
 
 #[derive(Deserialize)]
@@ -110,6 +124,7 @@ pub(crate) struct RawState {
     pub(crate) last_ns: Option<i64>,
     #[serde(default)]
     pub(crate) runs: Vec<[i64; 2]>,
+    pub(crate) sending: Option<Vec<[i64; 2]>>,
     pub(crate) count: Option<u64>,
     pub(crate) hz: Option<f64>,
 }
@@ -165,11 +180,11 @@ impl RawState {
     }
 
     pub(crate) fn runs(&self) -> Vec<Span> {
-        let run = |[start, end]: &[i64; 2]| Span {
-            start: Stamp(*start),
-            end: Stamp(*end.max(start)),
-        };
-        self.runs.iter().map(run).collect()
+        spans(&self.runs)
+    }
+
+    pub(crate) fn sending(&self) -> Option<Vec<Span>> {
+        self.sending.as_deref().map(spans)
     }
 
     pub(crate) fn edge(&self, id: u32) -> EdgeState {
@@ -181,6 +196,14 @@ impl RawState {
             hz: self.hz,
         }
     }
+}
+
+fn spans(raw: &[[i64; 2]]) -> Vec<Span> {
+    let span = |[start, end]: &[i64; 2]| Span {
+        start: Stamp(*start),
+        end: Stamp(*end.max(start)),
+    };
+    raw.iter().map(span).collect()
 }
 
 /// The state of this word; active for another, or none.

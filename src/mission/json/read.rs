@@ -5,8 +5,9 @@
 
 use std::path::Path;
 
+use super::activity;
 use super::names::Names;
-use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice};
+use super::raw::{Raw, RawActivity, RawBag, RawBox, RawLayout, RawNotice};
 use super::runs::RawElements;
 use super::write::{OLD_SCHEMA, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
@@ -35,7 +36,7 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     let spans = spans(&raw).map_err(|reason| bad(0, reason))?;
     let ledger = raw.ledger.take();
     let phases = super::entries::phases(std::mem::take(&mut raw.phases));
-    let mut mission = build(raw, &spans);
+    let mut mission = build(raw, &spans).map_err(|reason| bad(0, reason))?;
     if let Some(rows) = ledger {
         let entries = super::entries::read(&rows, &mission.elements);
         let nothing = || {
@@ -77,7 +78,7 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
     Ok(spans)
 }
 
-fn build(raw: Raw, spans: &[Span]) -> Mission {
+fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
     let mut names = Names::default();
     raw.windows.iter().for_each(|w| names.window(w));
     let runs = RawElements {
@@ -86,16 +87,9 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
         publishes: raw.publishes,
         subscribes: raw.subscribes,
     };
-    runs.nodes.iter().for_each(|n| names.take_node(&n.element));
-    runs.topics
-        .iter()
-        .for_each(|t| names.take_topic(&t.element));
-    runs.publishes
-        .iter()
-        .for_each(|e| names.take_publish(&e.element));
-    runs.subscribes
-        .iter()
-        .for_each(|e| names.take_subscribe(&e.element));
+    names.whole(&runs);
+    let (bounds, cells) = raw.activity.map(parts).unwrap_or_default();
+    names.whole(&cells);
     let (elements, places) = names.elements();
     let start = spans.iter().map(|s| s.start).min().unwrap_or_default();
     let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
@@ -141,7 +135,7 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
             .map(|(span, window)| (*span, places.graph(window)))
             .collect()
     };
-    Mission {
+    Ok(Mission {
         graphs,
         bags: raw.bags.into_iter().map(report).collect(),
         span,
@@ -156,11 +150,22 @@ fn build(raw: Raw, spans: &[Span]) -> Mission {
         elements,
         windows,
         ledger: crate::mission::Ledger::default(),
-        activity: crate::mission::Activity::default(),
+        activity: activity::read(&bounds, &cells, &places)?,
         undrawn: Vec::new(),
         layout: raw.layout.map(layout),
         notices: notices(raw.notices),
-    }
+    })
+}
+
+/// The bounds of the cells, and what is in them.
+fn parts(raw: RawActivity) -> (Vec<i64>, RawElements) {
+    let elements = RawElements {
+        nodes: raw.nodes,
+        topics: raw.topics,
+        publishes: raw.publishes,
+        subscribes: raw.subscribes,
+    };
+    (raw.bounds_ns, elements)
 }
 
 const ONE: Period = match Period::from_nanos(1) {
@@ -273,5 +278,30 @@ mod tests {
         let back =
             r#"{"schema": "bagreel.evolution/1", "windows": [{"start_ns": 5, "end_ns": 5}]}"#;
         assert!(said(back).contains("window 0 ends before it starts"));
+    }
+    #[test]
+    fn an_activity_that_cannot_be_is_refused() {
+        let said = |activity: &str| {
+            let text = SMALL.replace("\"future\": 1", &format!("\"activity\": {activity}"));
+            read(&text).map_err(|e| e.to_string())
+        };
+        let good =
+            r#"{"bounds_ns": [0, 5, 15], "topics": [{"name": "/t", "sending": [[1, 3], [4, 9]]}]}"#;
+        let activity = said(good).unwrap().activity;
+        assert_eq!(activity.cells.len(), 2);
+        assert_eq!(activity.sending.topics[0].len(), 2);
+        assert!(
+            said(&good.replace("5, 15", "5, 5"))
+                .unwrap_err()
+                .contains("ascend")
+        );
+        assert!(
+            said(&good.replace("[4, 9]", "[2, 9]"))
+                .unwrap_err()
+                .contains("overlap")
+        );
+        let many: Vec<String> = (0..300).map(|k| k.to_string()).collect();
+        let many = good.replace("0, 5, 15", &many.join(", "));
+        assert!(said(&many).unwrap_err().contains("299 cells"));
     }
 }

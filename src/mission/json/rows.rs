@@ -7,7 +7,8 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::{Edge, EdgeState, Elements, Node, NodeState, Topic, TopicState};
 
 /// When an element is there, as pairs of nanoseconds.
-struct Runs<'a>(&'a [Span]);
+#[derive(Clone, Copy)]
+pub(crate) struct Runs<'a>(pub(crate) &'a [Span]);
 
 impl Serialize for Runs<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

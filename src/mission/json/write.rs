@@ -5,6 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 
+use super::activity::ActivityOf;
 use super::changes::ChangeRow;
 use super::entries::{PhaseRow, entries};
 use super::lines::Lines;
@@ -115,6 +116,9 @@ impl Serialize for Json<'_> {
                 elements,
             });
             map.serialize_entry("windows", &List(windows))?;
+        }
+        if !mission.activity.cells.is_empty() {
+            map.serialize_entry("activity", &ActivityOf::new(&mission.activity, elements))?;
         }
         if let Some(places) = places {
             map.serialize_entry("layout", &LayoutRow::new(places))?;

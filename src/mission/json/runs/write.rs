@@ -40,16 +40,17 @@ pub(crate) fn elements<M: SerializeMap>(mission: &Mission, map: &mut M) -> Resul
 
 /// An element, and what it says in which windows.
 #[derive(Serialize)]
-struct Whole<'a, E> {
+pub(crate) struct Whole<'a, E> {
     #[serde(flatten)]
-    element: E,
+    pub(crate) element: E,
     #[serde(rename = "in")]
-    seen: In<'a>,
+    pub(crate) seen: In<'a>,
 }
 
-struct In<'a> {
-    what: Element,
-    graphs: &'a Graphs,
+/// The windows in which an element is there, with what it says in them.
+pub(crate) struct In<'a> {
+    pub(crate) what: Element,
+    pub(crate) graphs: &'a Graphs,
 }
 
 impl Serialize for In<'_> {

@@ -1,0 +1,184 @@
+//! The activity of a mission as JSON, so that phases and figures of a file are those of its bag.
+//!
+//! ```text
+//! "activity": {"bounds_ns": [0, 2000000000, …],
+//!   "topics": [{"name": "/scan", "sending": [[17, 90000000], …], "in": {"windows": [[0, 44]], …}}, …], …}
+//! ```
+//!
+//! `bounds_ns` are the starts of the cells and the end of the last. `sending` are the stretches of sending, first
+//! message to last plus 1 ns; it is there where messages were heard one by one. `in` is what an element says in the
+//! cells, in the columns of the form `runs`: its `windows` are cells.
+
+use serde::Serialize;
+use serde::ser::{SerializeMap as _, Serializer};
+
+use super::names::Ids;
+use super::raw::RawState;
+use super::rows::{Runs, ends};
+use super::runs::{self, In, RawElements, Whole};
+use super::write::List;
+use crate::base::time::{Span, Stamp};
+use crate::graph::sending::Sending;
+use crate::graph::{Edge, Element, Elements, Graphs};
+use crate::mission::activity::{Activity, Cell, MOST_CELLS};
+
+/// The activity as it is written.
+pub(super) struct ActivityOf<'a> {
+    activity: &'a Activity,
+    elements: &'a Elements,
+    graphs: Graphs,
+}
+
+impl<'a> ActivityOf<'a> {
+    pub(super) fn new(activity: &'a Activity, elements: &'a Elements) -> Self {
+        let cells = activity.cells.iter();
+        Self {
+            activity,
+            elements,
+            graphs: cells.map(|cell| (cell.span, cell.graph.clone())).collect(),
+        }
+    }
+
+    fn seen<E>(&self, what: Element, element: E) -> Whole<'_, E> {
+        let seen = In {
+            what,
+            graphs: &self.graphs,
+        };
+        Whole { element, seen }
+    }
+}
+
+#[derive(Serialize)]
+struct Named<'a> {
+    name: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sending: Option<Runs<'a>>,
+}
+
+#[derive(Serialize)]
+struct Joined<'a> {
+    node: &'a str,
+    topic: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sending: Option<Runs<'a>>,
+}
+
+impl<'a> Joined<'a> {
+    fn new(edge: &Edge, elements: &'a Elements, sending: Option<&'a Vec<Span>>) -> Self {
+        let (node, topic) = ends(edge, elements);
+        let sending = sending.map(|spans| Runs(spans));
+        Self {
+            node,
+            topic,
+            sending,
+        }
+    }
+}
+
+impl Serialize for ActivityOf<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self {
+            activity: Activity { cells, sending },
+            elements,
+            ..
+        } = self;
+        let mut map = serializer.serialize_map(None)?;
+        let starts = cells.iter().map(|cell| cell.span.start.0);
+        let end = cells.last().map(|cell| cell.span.end.0);
+        map.serialize_entry("bounds_ns", &List(starts.chain(end)))?;
+        let nodes = (0..).zip(&elements.nodes).map(|(id, node)| {
+            let named = Named {
+                name: node.name.as_str(),
+                sending: None,
+            };
+            self.seen(Element::Node(id), named)
+        });
+        map.serialize_entry("nodes", &List(nodes))?;
+        let topics = (0..).zip(&elements.topics).map(|(id, topic)| {
+            let spans = sending.topics.get(id as usize);
+            let sending = spans.map(|spans| Runs(spans));
+            let named = Named {
+                name: topic.name.as_str(),
+                sending,
+            };
+            self.seen(Element::Topic(id), named)
+        });
+        map.serialize_entry("topics", &List(topics))?;
+        let publishes = (0..).zip(&elements.publishes).map(|(id, edge)| {
+            let spans = sending.publishes.get(id as usize);
+            self.seen(Element::Publish(id), Joined::new(edge, elements, spans))
+        });
+        map.serialize_entry("publishes", &List(publishes))?;
+        let subscribes = (0..)
+            .zip(&elements.subscribes)
+            .map(|(id, edge)| self.seen(Element::Subscribe(id), Joined::new(edge, elements, None)));
+        map.serialize_entry("subscribes", &List(subscribes))?;
+        map.end()
+    }
+}
+
+/// The activity that was read, of a mission with these names.
+///
+/// # Errors
+/// What is wrong with the cells, or with the stretches of sending.
+pub(super) fn read(bounds: &[i64], raw: &RawElements, ids: &Ids) -> Result<Activity, String> {
+    let spans = cells(bounds)?;
+    let graphs = runs::graphs(raw, ids, &spans);
+    let cell = |(span, graph)| Cell { span, graph };
+    Ok(Activity {
+        cells: spans.into_iter().zip(&graphs).map(cell).collect(),
+        sending: sending(raw, ids)?,
+    })
+}
+
+fn cells(bounds: &[i64]) -> Result<Vec<Span>, String> {
+    let pairs = bounds.windows(2);
+    let cells = pairs.map(|pair| Span {
+        start: Stamp(pair[0]),
+        end: Stamp(pair[1]),
+    });
+    let cells: Vec<Span> = cells.collect();
+    if cells.iter().any(|cell| cell.start >= cell.end) {
+        return Err("the bounds of its activity do not ascend".to_owned());
+    }
+    if i64::try_from(cells.len()).is_ok_and(|many| many > MOST_CELLS) {
+        return Err(format!(
+            "its activity has {} cells, and may have {MOST_CELLS}",
+            cells.len()
+        ));
+    }
+    Ok(cells)
+}
+
+fn sending(raw: &RawElements, ids: &Ids) -> Result<Sending, String> {
+    let topics = raw
+        .topics
+        .iter()
+        .map(|t| (ids.of_topic(&t.element.name), &t.element.rest));
+    let publishes = raw
+        .publishes
+        .iter()
+        .map(|e| (ids.of_publish(&e.element), &e.element.rest));
+    Ok(Sending {
+        topics: stretches(topics, ids.topics())?,
+        publishes: stretches(publishes, ids.publishes())?,
+    })
+}
+
+/// The stretches by id; none at all where none are told.
+fn stretches<'a>(
+    raw: impl Iterator<Item = (u32, &'a RawState)>,
+    many: usize,
+) -> Result<Vec<Vec<Span>>, String> {
+    let told = raw.filter_map(|(id, state)| Some((id, state.sending()?)));
+    let mut all = Vec::new();
+    for (id, spans) in told {
+        let disjoint = |pair: &[Span]| pair[0].end <= pair[1].start;
+        if !spans.windows(2).all(disjoint) {
+            return Err("stretches of sending in its activity overlap".to_owned());
+        }
+        all.resize(many, Vec::new());
+        all[id as usize] = spans;
+    }
+    Ok(all)
+}
