@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use crate::base::error::Result;
 
 pub(crate) use deferred::open_each;
-pub(crate) use input::Place;
+pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{head, place};
 pub use model::{
@@ -43,7 +43,7 @@ pub const FORMATS: &[FormatRow] = &[
 
 /// What an input is, from its first bytes.
 #[derive(Clone, Copy)]
-pub enum Kind {
+pub enum InputKind {
     /// A bag of this format. Standard input is not looked into and counts as a ROS 1 bag here.
     Bag(&'static FormatRow),
     /// JSON text, such as an evolution of ours: no bag.
@@ -54,17 +54,17 @@ pub enum Kind {
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag) with a hint if it is none of ours.
-pub fn sniff(input: &Input) -> Result<Kind> {
+pub fn sniff(input: &Input) -> Result<InputKind> {
     let path = match input {
         Input::Path(path) if !input.is_pipe() => path,
-        _ => return Ok(Kind::Bag(&FORMATS[0])),
+        _ => return Ok(InputKind::Bag(&FORMATS[0])),
     };
     let mut place = place(input)?;
     let head = head(&mut place)?;
     let json = head.trim_ascii_start().first() == Some(&b'{');
     match FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {
-        Some(row) => Ok(Kind::Bag(row)),
-        None if json => Ok(Kind::Json),
+        Some(row) => Ok(InputKind::Bag(row)),
+        None if json => Ok(InputKind::Json),
         None => Err(explain(path, &head, path.is_dir())),
     }
 }
@@ -84,6 +84,6 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         Input::Path(path) => path.clone(),
         Input::Stdin => PathBuf::from(input.name()),
     };
-    let folder = matches!(place, Place::Folder(_));
+    let folder = matches!(place, BagPlace::Folder(_));
     Err(explain(&path, &head, folder))
 }

@@ -162,17 +162,17 @@ fn reading(
             cut: time.cut,
         },
         skip_unchanged: time.skip_unchanged,
-        collect: collector::Options {
+        collect: collector::CollectOptions {
             infer_stamps: infers("stamps"),
             payload_bytes: if infers("payloads") {
                 u64::MAX
             } else {
                 collector::PAYLOAD_BYTES
             },
-            ..collector::Options::default()
+            ..collector::CollectOptions::default()
         },
         grace: change.grace as usize,
-        conclude: conclude::Options {
+        conclude: conclude::ConcludeOptions {
             roles: graph.roles,
             topology: topology::read_all(&graph.topology)?,
             code: None,
@@ -364,7 +364,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
             engine: crate::layout::engine(&args.look.layout)?,
             kept: look::kept(args.look.layout_from.as_deref())?,
         },
-        sequence: crate::export::sequence::Options {
+        sequence: crate::export::sequence::SequenceOptions {
             append_to: summary(),
             figure: look::figure(&args.figure, &args.look)?,
             ..look::sequence(&args.sequence)?

@@ -38,52 +38,52 @@ use crate::base::error::{Error, Result};
 pub use encoder::Written;
 use encoder::{ANIMATION, DATA, IMAGE, PICTURE};
 pub(crate) use encoder::{AtOnce, Single, single};
-pub(crate) use encoder::{Encoder, Format, Frame, Needs, OneDrawing, Pack, Packet};
+pub(crate) use encoder::{DrawnFrame, Encoder, Needs, OneDrawing, OutputFormat, Pack, Packet};
 use sequence::Sequence;
 use target::Target;
 pub(crate) use tex::needs_figure;
 
 /// All formats.
-pub const FORMATS: &[Format] = &[
-    Format {
+pub const FORMATS: &[OutputFormat] = &[
+    OutputFormat {
         word: "gif",
         what: "the animation",
         start: gif::start,
         ..ANIMATION
     },
-    Format {
+    OutputFormat {
         word: "apng",
         what: "the animation, lossless for all but antialiasing",
         start: apng::start,
         ..ANIMATION
     },
-    Format {
+    OutputFormat {
         word: "svg",
         what: "a drawing per window with `{n}`, the only window, the `--strip`, or an animation",
         start: start_svg,
         whole: OneDrawing::Asked,
         ..PICTURE
     },
-    Format {
+    OutputFormat {
         word: "png",
         what: "an image per window with `{n}`, the only window, or a film strip",
         start: png::start_png,
         ..IMAGE
     },
-    Format {
+    OutputFormat {
         word: "webp",
         what: "an image per window with `{n}`, the only window, or a film strip",
         start: png::start_webp,
         ..IMAGE
     },
-    Format {
+    OutputFormat {
         word: "dot",
         what: "a graph that `rqt_graph` loads, per window with `{n}`, else the union",
         start: dot::start,
         is_viewed: true,
         ..DATA
     },
-    Format {
+    OutputFormat {
         word: "mmd",
         what: "a Mermaid flow chart, per window with `{n}`, else the union",
         start: mermaid::encoder::start,
@@ -91,14 +91,14 @@ pub const FORMATS: &[Format] = &[
         ..DATA
     },
     #[cfg(feature = "pdf")]
-    Format {
+    OutputFormat {
         word: "pdf",
         what: "a page per window as vectors, or the `--strip`",
         start: pdf::start,
         whole: OneDrawing::Asked,
         ..PICTURE
     },
-    Format {
+    OutputFormat {
         word: "tex",
         what: "the lines that put a `--figure` into LaTeX, with a caption",
         start: tex::start,
@@ -106,7 +106,7 @@ pub const FORMATS: &[Format] = &[
         ..PICTURE
     },
     #[cfg(feature = "video")]
-    Format {
+    OutputFormat {
         word: "mp4",
         what: "a video, through `ffmpeg`",
         check: Some(video::check),
@@ -114,32 +114,32 @@ pub const FORMATS: &[Format] = &[
         ..PICTURE
     },
     #[cfg(feature = "video")]
-    Format {
+    OutputFormat {
         word: "webm",
         what: "a video, through `ffmpeg`",
         check: Some(video::check),
         start: video::start_webm,
         ..PICTURE
     },
-    Format {
+    OutputFormat {
         word: "html",
         what: "one page that plays the mission, with everything in it",
         start: html::encoder::start,
         ..PICTURE
     },
-    Format {
+    OutputFormat {
         word: "md",
         what: "a report for a pull request or a job summary",
         start: report::encoder::start,
         ..PICTURE
     },
-    Format {
+    OutputFormat {
         word: "json",
         what: "the evolution as data, which can be read again",
         start: json::start,
         ..DATA
     },
-    Format {
+    OutputFormat {
         word: "csv",
         what: "tidy tables: `x.edges.csv`, `x.topics.csv`, `x.nodes.csv`, changes, ledger, phases, bags",
         check: Some(tables::check),
@@ -147,20 +147,20 @@ pub const FORMATS: &[Format] = &[
         ..DATA
     },
     #[cfg(feature = "parquet")]
-    Format {
+    OutputFormat {
         word: "parquet",
         what: "the same tables as Apache Parquet: `x.edges.parquet` and others",
         check: Some(tables::check),
         start: tables::start_parquet,
         ..DATA
     },
-    Format {
+    OutputFormat {
         word: "gexf",
         what: "one dynamic graph for Gephi: who is there from when to when",
         start: gexf::start,
         ..DATA
     },
-    Format {
+    OutputFormat {
         word: "graphml",
         what: "the union graph for yEd, networkx and others",
         start: graphml::start,
@@ -169,7 +169,7 @@ pub const FORMATS: &[Format] = &[
 ];
 
 /// A single image of the first window, beside an animation.
-const POSTER: &Format = &Format {
+const POSTER: &OutputFormat = &OutputFormat {
     word: "png",
     what: "the first window as an image",
     start: png::start_poster,
@@ -190,7 +190,7 @@ fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn 
 #[derive(Clone, Debug)]
 pub struct Output {
     /// What.
-    pub format: &'static Format,
+    pub format: &'static OutputFormat,
     /// Where.
     pub target: Target,
 }

@@ -18,7 +18,7 @@ use crate::evidence::{Degree, Evidence};
 
 #[cfg(test)]
 pub(crate) use graphs::tests as graphs_for_tests;
-pub(crate) use graphs::{Column, ColumnWriter, Cursor, GraphsWriter, Number, Row};
+pub(crate) use graphs::{Column, ColumnCursor, ColumnWriter, GraphsWriter, Number, Row};
 pub use graphs::{Graphs, Iter as GraphsIter};
 
 pub use build::{Built, build};

@@ -34,8 +34,8 @@ pub mod view {
 /// See `src/layout.rs`.
 pub mod layout {
     pub use crate::layout::{
-        Cluster, ENGINES, Layout, Link, Options, Orientation, Outline, Plan, Route, Vertex, engine,
-        extend, lay_out,
+        Cluster, ENGINES, Layout, LayoutOptions, Link, Orientation, Outline, Plan, Route, Vertex,
+        engine, extend, lay_out,
     };
 }
 

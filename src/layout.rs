@@ -90,7 +90,7 @@ impl Orientation {
 
 /// What the caller wants of a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+pub struct LayoutOptions {
     /// The page to fill, in pixels: its aspect steers packing and the choice of orientation.
     pub page: Size,
     /// The orientation; `None` takes the better one.
@@ -132,7 +132,7 @@ pub trait Engine {
     ///
     /// # Errors
     /// Where the engine cannot do this plan; the caller may then take another.
-    fn lay_out(&self, plan: &Plan, options: &Options) -> Result<Layout>;
+    fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout>;
 }
 
 /// Clusters are nested at most this deep; what is deeper is drawn in its ancestor.
@@ -166,7 +166,7 @@ pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
 /// The layout of this plan by this engine; where the engine cannot, by the default one with a remark.
 ///
 /// Impossible numbers are taken for zero, links and clusters that name nothing are left out.
-pub fn lay_out(plan: &Plan, options: &Options, engine: &dyn Engine) -> Layout {
+pub fn lay_out(plan: &Plan, options: &LayoutOptions, engine: &dyn Engine) -> Layout {
     let (plan, options) = (plan.sane(), options.sane());
     engine.lay_out(&plan, &options).unwrap_or_else(|error| {
         let mut layout = layered::lay_out(&plan, &options);
@@ -181,7 +181,7 @@ pub fn lay_out(plan: &Plan, options: &Options, engine: &dyn Engine) -> Layout {
 /// Where nothing moved and nothing is new, this is the layout of [`lay_out`].
 pub fn extend(
     plan: &Plan,
-    options: &Options,
+    options: &LayoutOptions,
     engine: &dyn Engine,
     known: &[Option<Rect>],
 ) -> Layout {
@@ -304,7 +304,7 @@ impl Route {
     }
 }
 
-impl Options {
+impl LayoutOptions {
     fn sane(&self) -> Self {
         let page = sane_size(self.page);
         Self {
@@ -329,7 +329,7 @@ fn sane_size(size: Size) -> Size {
 /// Vertices that belong together, by links or by a shared namespace. Everything in it is told by places in `vertices`;
 /// cluster `i + 1` is `clusters[i]` of the plan, and 0 is the outside.
 #[derive(Clone, Debug, Default)]
-struct Part {
+struct Component {
     /// The places of its vertices in the plan, growing.
     vertices: Vec<usize>,
     /// The places of its links in the plan, growing.
@@ -348,7 +348,7 @@ struct Part {
 
 /// What an item of a layer stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum LayerItem {
     /// A vertex of the plan.
     Vertex,
     /// A long edge on its way through a layer.
@@ -360,7 +360,7 @@ enum Kind {
 }
 
 /// The items of each layer, in order across.
-type Rows = Vec<Vec<usize>>;
+type LayerRows = Vec<Vec<usize>>;
 
 /// One part cut into layers: what the steps of the layered engine hand on. `along` is the way the edges run, `across`
 /// the way along a layer. Items `0..vertices` are the vertices; bends and borders follow.
@@ -369,7 +369,7 @@ struct Layers {
     /// How many items are vertices.
     vertices: usize,
     /// What each item is.
-    kind: Vec<Kind>,
+    kind: Vec<LayerItem>,
     /// The layer of each item.
     rank: Vec<usize>,
     /// The innermost cluster of each item; 0 is the outside.
@@ -393,7 +393,7 @@ struct Layers {
 impl Layers {
     /// The same layers without borders and as if no cluster were there.
     fn without_clusters(&self) -> Self {
-        let border = |kind: &Kind| matches!(kind, Kind::Top | Kind::Bottom);
+        let border = |kind: &LayerItem| matches!(kind, LayerItem::Top | LayerItem::Bottom);
         let n = self.kind.iter().position(border).unwrap_or(self.kind.len());
         Self {
             vertices: self.vertices,

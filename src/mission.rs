@@ -9,7 +9,7 @@ pub mod phases;
 mod json;
 pub use json::read::read_json;
 pub(crate) use json::write::Json;
-pub use json::write::{Form, write_json};
+pub use json::write::{JsonForm, write_json};
 
 use crate::bag::Report;
 use crate::base::geometry::Rect;

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use bagreel::bag::{Connection, ConnectionId, Encoding, Message, Sink as _};
 use bagreel::internals::base::time::{Span, Stamp};
-use bagreel::internals::evidence::collector::{Collector, Options, Recorded};
+use bagreel::internals::evidence::collector::{CollectOptions, Collector, Recorded};
 use bagreel::internals::evidence::conclude;
-use bagreel::internals::evidence::topology::{Element, Entry, Topology};
+use bagreel::internals::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use bagreel::internals::evidence::{Degree, EvidenceLine};
 use bagreel::internals::graph::{self, Built};
 
@@ -16,7 +16,7 @@ use crate::support::{ORIGIN, Recording};
 const SECOND: i64 = 1_000_000_000;
 
 /// Everything that is recorded in a recording.
-fn recorded(bag: &Recording, options: Options) -> Recorded {
+fn recorded(bag: &Recording, options: CollectOptions) -> Recorded {
     let mut collector = Collector::new(options);
     let mut progress = |_, _| ();
     let mut sink = collector.bag(&mut progress);
@@ -53,16 +53,16 @@ fn recorded(bag: &Recording, options: Options) -> Recorded {
 }
 
 /// What is concluded from a recording, with the pieces of evidence on `why`.
-fn concluded(bag: &Recording, options: Options) -> (Built, Vec<EvidenceLine>) {
+fn concluded(bag: &Recording, options: CollectOptions) -> (Built, Vec<EvidenceLine>) {
     let recorded = recorded(bag, options);
     let span = recorded.span.unwrap();
-    let built = graph::build(&recorded, &[span], &conclude::Options::default(), 0).unwrap();
+    let built = graph::build(&recorded, &[span], &conclude::ConcludeOptions::default(), 0).unwrap();
     let lines = built.lines.clone();
     (built, lines)
 }
 
 /// Every edge that a kind of evidence proves: `/node > /topic degree` or `/topic > /node degree`.
-fn proved(bag: &Recording, by: &str, options: Options) -> Vec<String> {
+fn proved(bag: &Recording, by: &str, options: CollectOptions) -> Vec<String> {
     let (built, _) = concluded(bag, options);
     let all = &built.elements;
     let by =
@@ -98,7 +98,7 @@ fn proved(bag: &Recording, by: &str, options: Options) -> Vec<String> {
 }
 
 fn edges(bag: &Recording, by: &str) -> Vec<String> {
-    proved(bag, by, Options::default())
+    proved(bag, by, CollectOptions::default())
 }
 
 impl Recording {
@@ -183,9 +183,9 @@ fn who_sends_copies_subscribes_the_originals() {
 
 #[test]
 fn payloads_are_not_read_where_none_may_be_compared() {
-    let options = Options {
+    let options = CollectOptions {
         payload_bytes: 0,
-        ..Options::default()
+        ..CollectOptions::default()
     };
     assert!(proved(&throttled(), "payload", options).is_empty());
 }
@@ -386,7 +386,7 @@ fn publishers_that_nobody_names_are_counted() {
     let offer =
         "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: volatile\n";
     bag.publishers[1].qos = offer.repeat(3);
-    let (built, _) = concluded(&bag, Options::default());
+    let (built, _) = concluded(&bag, CollectOptions::default());
     let unknown: Vec<_> = built
         .elements
         .topics
@@ -401,7 +401,7 @@ fn publishers_that_nobody_names_are_counted() {
     bag.publishers[scan].qos = offer.to_owned();
     bag.at(scan, 30_000, vec![0, 1, 0, 0, 9]);
     assert_eq!(edges(&bag, "unknown"), ["/scan ? > /scan declared"]);
-    let (built, _) = concluded(&bag, Options::default());
+    let (built, _) = concluded(&bag, CollectOptions::default());
     let begins = |id: usize| built.lives.topics[id].lives[0].span.start;
     assert_eq!(begins(1), Stamp(ORIGIN + 30 * SECOND));
 }
@@ -518,7 +518,7 @@ fn an_anonymous_node_lives_since_the_moment_in_its_name() {
     let found = bag.publisher(&format!("/probe_77_{start}"), "/found", "std_msgs/Empty");
     bag.send(beat, (0, 9000), 100, &[]);
     bag.send(found, (8000, 9000), 100, &[]);
-    let (built, _) = concluded(&bag, Options::default());
+    let (built, _) = concluded(&bag, CollectOptions::default());
     let mut nodes = built.elements.nodes.iter();
     let probe = nodes
         .find(|n| n.name.as_str().starts_with("/probe"))
@@ -571,7 +571,7 @@ fn diagnostics_speak_before_lists_are_read() {
         let rest = [text1(""), text1(""), 0_u32.to_le_bytes().to_vec()];
         bag.at(diagnostics, 60, [status.concat(), rest.concat()].concat());
     }
-    let (built, _) = concluded(&bag, Options::default());
+    let (built, _) = concluded(&bag, CollectOptions::default());
     let topics = &built.elements.topics;
     let subscribed = built
         .elements
@@ -584,16 +584,16 @@ fn diagnostics_speak_before_lists_are_read() {
 #[test]
 fn every_degree_but_measured_stays_what_it_is_while_messages_come() {
     let bag = logging(&[("/arm", "a.cpp")], &[("/arm/state", "a/msg/State")]);
-    let (built, _) = concluded(&bag, Options::default());
+    let (built, _) = concluded(&bag, CollectOptions::default());
     let degrees: Vec<_> = built.graphs[0].publishes.iter().map(|s| s.degree).collect();
     assert_eq!(degrees, [Degree::Inferred, Degree::Stated]);
 }
 
 #[test]
 fn conclusions_are_among_the_evidence_of_those_who_ask_why() {
-    let options = Options {
+    let options = CollectOptions {
         why: vec!["/throttle".to_owned(), "/image".to_owned()],
-        ..Options::default()
+        ..CollectOptions::default()
     };
     let (_, pieces) = concluded(&throttled(), options);
     let texts: Vec<_> = pieces.iter().map(|p| (p.source, p.text.as_str())).collect();
@@ -607,11 +607,11 @@ fn conclusions_are_among_the_evidence_of_those_who_ask_why() {
 }
 
 /// A robot of two nodes, with what the user tells of it besides.
-fn told(entries: Vec<Entry>, windows: &[(i64, i64)]) -> Built {
+fn told(entries: Vec<TopologyEntry>, windows: &[(i64, i64)]) -> Built {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
     bag.send(scan, (0, 10_001), 100, &[1; 8]);
-    let recorded = recorded(&bag, Options::default());
+    let recorded = recorded(&bag, CollectOptions::default());
     let second = |s: i64| recorded.span.unwrap().start.plus(s * SECOND);
     let windows: Vec<Span> = windows
         .iter()
@@ -624,15 +624,15 @@ fn told(entries: Vec<Entry>, windows: &[(i64, i64)]) -> Built {
         entries,
         notices: Vec::new(),
     };
-    let options = conclude::Options {
+    let options = conclude::ConcludeOptions {
         topology,
-        ..conclude::Options::default()
+        ..conclude::ConcludeOptions::default()
     };
     graph::build(&recorded, &windows, &options, 0).unwrap()
 }
 
-fn entry(element: Element, to_s: Option<i64>) -> Entry {
-    Entry {
+fn entry(element: NamedElement, to_s: Option<i64>) -> TopologyEntry {
+    TopologyEntry {
         element,
         from_ns: to_s.map(|_| 0),
         to_ns: to_s.map(|s| s * SECOND),
@@ -643,7 +643,7 @@ fn entry(element: Element, to_s: Option<i64>) -> Entry {
 
 #[test]
 fn the_end_that_the_user_gives_is_exclusive() {
-    let node = || Element::Node("/slam".to_owned());
+    let node = || NamedElement::Node("/slam".to_owned());
     let there = |end| {
         let built = told(vec![entry(node(), Some(end))], &[(0, 5), (5, 10)]);
         let nodes = built.graphs.iter().map(|g| g.nodes.len());
@@ -658,12 +658,12 @@ fn the_end_that_the_user_gives_is_exclusive() {
 fn names_of_the_users_that_the_bag_does_not_know_are_told_with_the_nearest() {
     let entries = vec![
         entry(
-            Element::Subscribe("/slam".to_owned(), "/scna".to_owned()),
+            NamedElement::Subscribe("/slam".to_owned(), "/scna".to_owned()),
             None,
         ),
-        entry(Element::Node("/lidra".to_owned()), None),
+        entry(NamedElement::Node("/lidra".to_owned()), None),
         entry(
-            Element::Subscribe("/viewer".to_owned(), "/scan".to_owned()),
+            NamedElement::Subscribe("/viewer".to_owned(), "/scan".to_owned()),
             None,
         ),
     ];
@@ -683,22 +683,22 @@ fn what_the_user_states_and_headers_say_is_among_the_evidence() {
     let mut bag = Recording::default();
     let scan = bag.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
     bag.send(scan, (0, 1000), 100, &[1; 8]);
-    let options = Options {
+    let options = CollectOptions {
         why: vec!["/scan".to_owned()],
-        ..Options::default()
+        ..CollectOptions::default()
     };
     let recorded = recorded(&bag, options);
     let whole = recorded.span.unwrap();
     let topology = Topology {
         entries: vec![entry(
-            Element::Subscribe("/slam".to_owned(), "/scan".to_owned()),
+            NamedElement::Subscribe("/slam".to_owned(), "/scan".to_owned()),
             None,
         )],
         notices: Vec::new(),
     };
-    let options = conclude::Options {
+    let options = conclude::ConcludeOptions {
         topology,
-        ..conclude::Options::default()
+        ..conclude::ConcludeOptions::default()
     };
     let built = graph::build(&recorded, &[whole], &options, 0).unwrap();
     let sources: BTreeSet<_> = built.lines.into_iter().map(|piece| piece.source).collect();

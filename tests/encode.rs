@@ -13,7 +13,7 @@ use bagreel::internals::draw::scene::{Form, Group, Scene, Shape};
 use bagreel::internals::draw::style::Style;
 use bagreel::internals::draw::text::Fonts;
 use bagreel::internals::export::run;
-use bagreel::internals::export::sequence::{Drawings, Options, Sequence};
+use bagreel::internals::export::sequence::{Drawings, Sequence, SequenceOptions};
 use bagreel::internals::export::{Output, Written};
 use bagreel::internals::graph::Element;
 use bagreel::internals::mission::ledger::Kind;
@@ -94,7 +94,7 @@ fn mission(windows: usize) -> (Mission, View) {
 }
 
 /// Shows a mission of eight windows to these outputs, all in `folder`.
-fn show(folder: &Path, names: &[&str], options: Options) -> Result<Vec<Written>> {
+fn show(folder: &Path, names: &[&str], options: SequenceOptions) -> Result<Vec<Written>> {
     let output = |name: &&str| Output::parse(&folder.join(name).to_string_lossy(), None);
     shown(
         &names.iter().map(output).collect::<Result<Vec<_>>>()?,
@@ -102,13 +102,13 @@ fn show(folder: &Path, names: &[&str], options: Options) -> Result<Vec<Written>>
     )
 }
 
-fn shown(outputs: &[Output], options: Options) -> Result<Vec<Written>> {
+fn shown(outputs: &[Output], options: SequenceOptions) -> Result<Vec<Written>> {
     run(outputs, options, &mut |_, _| ControlFlow::Continue(()))
 }
 
 fn run(
     outputs: &[Output],
-    options: Options,
+    options: SequenceOptions,
     progress: &mut run::Progress<'_>,
 ) -> Result<Vec<Written>> {
     let (mission, view) = mission(8);
@@ -205,7 +205,7 @@ fn names(folder: &Path) -> Vec<String> {
 fn every_animation_shows_what_the_images_show() {
     let folder = tempfile::tempdir().unwrap();
     let outputs = ["a.gif", "b.apng", "p{n}.png", "w{n}.webp", "s/{n}.svg"];
-    let written = show(folder.path(), &outputs, Options::default()).unwrap();
+    let written = show(folder.path(), &outputs, SequenceOptions::default()).unwrap();
     assert_eq!(
         written.iter().map(|w| w.files).collect::<Vec<_>>(),
         [1, 1, 8, 8, 8]
@@ -243,7 +243,7 @@ fn two_runs_write_the_same_bytes() {
         "h.graphml",
     ];
     for folder in &folders {
-        show(folder.path(), &outputs, Options::default()).unwrap();
+        show(folder.path(), &outputs, SequenceOptions::default()).unwrap();
     }
     let files = names(folders[0].path());
     assert_eq!(files.len(), 3 + 3 * 8 + 1 + 7 + 2);
@@ -259,9 +259,9 @@ fn two_runs_write_the_same_bytes() {
 #[test]
 fn staged_frames_are_played_and_not_kept_as_images() {
     let folder = tempfile::tempdir().unwrap();
-    let options = Options {
+    let options = SequenceOptions {
         tween: 3,
-        ..Options::default()
+        ..SequenceOptions::default()
     };
     let written = show(folder.path(), &["a.gif", "p{n}.png"], options).unwrap();
     assert_eq!(written[1].files, 8);
@@ -273,14 +273,14 @@ fn staged_frames_are_played_and_not_kept_as_images() {
 #[test]
 fn a_limit_in_bytes_is_kept_and_what_was_given_up_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let whole = Options {
+    let whole = SequenceOptions {
         tween: 3,
-        ..Options::default()
+        ..SequenceOptions::default()
     };
     let bytes = show(folder.path(), &["a.gif"], whole.clone()).unwrap()[0].bytes;
     for part in [10, 9, 4] {
         let most = bytes * part / 10;
-        let options = Options {
+        let options = SequenceOptions {
             max_bytes: Some(most),
             ..whole.clone()
         };
@@ -292,7 +292,7 @@ fn a_limit_in_bytes_is_kept_and_what_was_given_up_is_said() {
         );
         assert_eq!(written[0].remarks.is_empty(), part == 10);
     }
-    let options = Options {
+    let options = SequenceOptions {
         max_bytes: Some(100),
         ..whole
     };
@@ -308,7 +308,7 @@ fn an_interrupted_run_leaves_nothing_behind() {
         |name: &str| Output::parse(&folder.path().join(name).to_string_lossy(), None).unwrap();
     let outputs = [output("a.gif"), output("b.apng"), output("d.json")];
     let at_once = &mut |_: usize, _: usize| ControlFlow::Break(());
-    let result = run(&outputs, Options::default(), at_once);
+    let result = run(&outputs, SequenceOptions::default(), at_once);
     assert!(matches!(result, Err(Error::Interrupted)));
     assert_eq!(names(folder.path()), Vec::<String>::new());
 }
@@ -319,7 +319,12 @@ fn a_full_disk_ends_the_run_and_names_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let link: PathBuf = folder.path().join("full.gif");
     std::os::unix::fs::symlink("/dev/full", &link).unwrap();
-    let error = show(folder.path(), &["a.apng", "full.gif"], Options::default()).unwrap_err();
+    let error = show(
+        folder.path(),
+        &["a.apng", "full.gif"],
+        SequenceOptions::default(),
+    )
+    .unwrap_err();
     assert!(error.to_string().contains("full.gif"), "{error}");
     // The other one was whole before.
     assert_eq!(names(folder.path()), ["a.apng", "full.gif"]);
@@ -329,7 +334,7 @@ fn a_full_disk_ends_the_run_and_names_the_file() {
 fn formats_that_hold_all_windows_refuse_a_number() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["{n}.gif", "{n}.apng", "{n}.json", "{n}.csv"] {
-        let result = show(folder.path(), &[name], Options::default());
+        let result = show(folder.path(), &[name], SequenceOptions::default());
         assert!(result.is_err_and(|e| e.is_usage()), "{name}");
     }
 }
@@ -360,7 +365,12 @@ fn a_pdf_has_a_page_per_window_that_looks_like_the_image() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    show(folder.path(), &["a.pdf", "p{n}.png"], Options::default()).unwrap();
+    show(
+        folder.path(),
+        &["a.pdf", "p{n}.png"],
+        SequenceOptions::default(),
+    )
+    .unwrap();
     let at = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     output_of("pdftoppm", &["-r", "96", "-png", &at("a.pdf"), &at("page")]);
     for k in 0..8 {
@@ -380,9 +390,9 @@ fn a_video_shows_every_window_as_long_as_it_lasts() {
     show(
         folder.path(),
         &["a.mp4", "b.webm"],
-        Options {
+        SequenceOptions {
             tween: 2,
-            ..Options::default()
+            ..SequenceOptions::default()
         },
     )
     .unwrap();
@@ -412,9 +422,9 @@ fn a_video_shows_every_window_as_long_as_it_lasts() {
 #[test]
 fn a_poster_is_the_first_image_alone() {
     let folder = tempfile::tempdir().unwrap();
-    show(folder.path(), &["p{n}.png"], Options::default()).unwrap();
+    show(folder.path(), &["p{n}.png"], SequenceOptions::default()).unwrap();
     let poster = Output::poster(&folder.path().join("poster.png"));
-    let written = shown(&[poster], Options::default()).unwrap();
+    let written = shown(&[poster], SequenceOptions::default()).unwrap();
     assert_eq!(written[0].files, 1);
     assert_eq!(
         png(&folder.path().join("poster.png")),
@@ -431,7 +441,7 @@ fn a_folder_that_vanishes_is_told_and_nothing_is_left() {
         let _ = fs::remove_dir_all(&inside);
         ControlFlow::Continue(())
     };
-    let error = run(&outputs, Options::default(), vanish).unwrap_err();
+    let error = run(&outputs, SequenceOptions::default(), vanish).unwrap_err();
     assert!(error.to_string().contains("a.gif"), "{error}");
     assert_eq!(names(folder.path()), Vec::<String>::new());
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
 use bagreel::internals::base::notice::Notice;
 use bagreel::internals::base::time::{Span, Stamp};
-use bagreel::internals::evidence::collector::{Collector, Options};
+use bagreel::internals::evidence::collector::{CollectOptions, Collector};
 use bagreel::internals::evidence::conclude;
 use bagreel::internals::graph::{self, Built};
 
@@ -40,7 +40,7 @@ fn windows(span: Span, period: i64) -> Vec<Span> {
 
 /// The graphs of a bag in windows of ten seconds.
 fn graphs(path: &Path) -> (Built, Vec<Span>) {
-    let mut collector = Collector::new(Options::default());
+    let mut collector = Collector::new(CollectOptions::default());
     let mut progress = |_, _| ();
     let mut reader = bag::open(&Input::Path(path.to_owned()), &OpenOptions::default()).unwrap();
     reader
@@ -52,7 +52,7 @@ fn graphs(path: &Path) -> (Built, Vec<Span>) {
 fn built(collector: Collector) -> (Built, Vec<Span>) {
     let recorded = collector.finish().unwrap();
     let windows = windows(recorded.span.unwrap(), 10 * SECOND);
-    let options = conclude::Options::default();
+    let options = conclude::ConcludeOptions::default();
     (
         graph::build(&recorded, &windows, &options, 0).unwrap(),
         windows,
@@ -367,7 +367,7 @@ fn the_order_of_messages_in_the_file_does_not_matter() {
     reader.read(None, &mut tape).unwrap();
     shuffle(&mut tape.stamps);
     shuffle(&mut tape.messages);
-    let mut collector = Collector::new(Options::default());
+    let mut collector = Collector::new(CollectOptions::default());
     let mut progress = |_, _| ();
     let mut sink = collector.bag(&mut progress);
     for connection in &tape.connections {

@@ -7,8 +7,8 @@ use bagreel::internals::base::geometry::{Point, Rect, Size};
 use bagreel::internals::layout::{self, Cluster, Layout, Link, Orientation, Outline, Plan, Vertex};
 use proptest::prelude::*;
 
-fn options(orientation: Option<Orientation>) -> layout::Options {
-    layout::Options {
+fn options(orientation: Option<Orientation>) -> layout::LayoutOptions {
+    layout::LayoutOptions {
         page: Size::new(1280.0, 560.0),
         orientation,
     }
@@ -250,7 +250,7 @@ fn a_broken_plan_is_laid_out_all_the_same() {
         ],
     };
     for (word, _) in layout::ENGINES {
-        let page = layout::Options {
+        let page = layout::LayoutOptions {
             page: odd,
             orientation: None,
         };

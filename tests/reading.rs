@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use bagreel::bag::{self, FORMATS, Input, Kind, OpenOptions, Tier, Want};
+use bagreel::bag::{self, FORMATS, Input, InputKind, OpenOptions, Tier, Want};
 use bagreel::internals::base::error::Error;
 use bagreel::internals::base::notice::NoticeKind;
 use bagreel::internals::base::time::{Span, Stamp};
@@ -458,7 +458,10 @@ fn what_is_no_bag_is_named_with_a_way_out() {
         assert!(!error.hint().is_empty(), "{error}");
     }
     let (dir, path) = placed("x.json", b" {\"schema\": 1}");
-    assert!(matches!(bag::sniff(&Input::Path(path)), Ok(Kind::Json)));
+    assert!(matches!(
+        bag::sniff(&Input::Path(path)),
+        Ok(InputKind::Json)
+    ));
     assert!(matches!(
         bag::sniff(&Input::Path(dir.path().to_owned())),
         Err(Error::UnknownBag { .. })

@@ -38,7 +38,11 @@ fn files(input: &Path, formats: &[&str], options: &[&str]) -> BTreeMap<String, V
     for name in formats {
         command.arg("-o").arg(folder.path().join(name));
     }
-    assert!(command.status().unwrap().success(), "{input:?} {options:?}");
+    assert!(
+        command.status().unwrap().success(),
+        "{} {options:?}",
+        input.display()
+    );
     let files = fs::read_dir(folder.path()).unwrap().map(|entry| {
         let entry = entry.unwrap();
         let name = entry.file_name().into_string().unwrap();
@@ -47,15 +51,23 @@ fn files(input: &Path, formats: &[&str], options: &[&str]) -> BTreeMap<String, V
     files.collect()
 }
 
+/// A bag, how it is read, the files, how it is drawn, the form of its JSON.
+type Case = (
+    &'static str,
+    &'static [&'static str],
+    &'static [&'static str],
+    &'static [&'static str],
+    &'static str,
+);
+
 #[test]
 fn its_own_json_renders_to_the_same_bytes() {
-    let frames = ["x.svg", "x.html", "x.md", "x.json", "x.png"];
-    let twenty = ["--period", "20"];
-    // How the bag is read, and drawn as what; the form of its JSON.
-    let cases: [(&str, &[&str], &[&str], &[&str], &str); 8] = [
+    const FRAMES: [&str; 5] = ["x.svg", "x.html", "x.md", "x.json", "x.png"];
+    const TWENTY: [&str; 2] = ["--period", "20"];
+    let cases: [Case; 8] = [
         ("courier.mcap", &[], &FORMATS, &[], "windows"),
         ("courier.mcap", &[], &FORMATS, &[], "runs"),
-        ("warehouse.bag", &twenty, &frames, &[], "windows"),
+        ("warehouse.bag", &TWENTY, &FRAMES, &[], "windows"),
         (
             "warehouse.bag",
             &[],

@@ -166,7 +166,7 @@ impl Gather {
 
 /// What one thread found, to be told to a sink on another.
 #[derive(Default)]
-struct Batch {
+struct Delivery {
     runs: Vec<(ConnectionId, usize, bool)>,
     stamps: Vec<Stamp>,
     sizes: Vec<u32>,
@@ -175,7 +175,7 @@ struct Batch {
     notices: Vec<Notice>,
 }
 
-impl Batch {
+impl Delivery {
     fn is_full(&self) -> bool {
         self.stamps.len() > 1 << 14 || self.bytes.len() > 1 << 17
     }
@@ -205,18 +205,18 @@ impl Batch {
 
 /// The end of a thread's work on one part, or some of it.
 enum Sent {
-    Some(Batch),
+    Some(Delivery),
     Done,
 }
 
-struct Sender {
-    batch: Batch,
+struct BatchSender {
+    batch: Delivery,
     to: SyncSender<Sent>,
     /// Nobody listens any more.
     deaf: bool,
 }
 
-impl Sender {
+impl BatchSender {
     fn flush(&mut self) {
         let batch = std::mem::take(&mut self.batch);
         self.deaf |= self.to.send(Sent::Some(batch)).is_err();
@@ -234,7 +234,7 @@ impl Sender {
     }
 }
 
-impl Sink for Sender {
+impl Sink for BatchSender {
     fn connection(&mut self, _: &Connection) -> Want {
         Want::Stamps
     }
@@ -309,8 +309,8 @@ fn work_on(
     work: &(dyn Fn(usize, &mut dyn Sink) + Sync),
     to: SyncSender<Sent>,
 ) {
-    let mut sender = Sender {
-        batch: Batch::default(),
+    let mut sender = BatchSender {
+        batch: Delivery::default(),
         to,
         deaf: false,
     };

@@ -18,17 +18,17 @@ use std::sync::Arc;
 
 use crate::bag::adapters::{Clip, GROUP, in_order};
 use crate::bag::decompress::Compression;
-use crate::bag::input::{Place, file_name};
+use crate::bag::input::{BagPlace, file_name};
 use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
-use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
 use index::Query;
-pub(crate) use index::{Body, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
-pub(crate) use plan::{Chunk, MOST_CHUNKS, Plan, Unindexed, Used};
-pub(crate) use record::{ChunkHead, Connections, Record, Stop, pass};
+pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
+pub(crate) use plan::{Chunk, ChunkPlan, MOST_CHUNKS, Unindexed, Used};
+pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass};
 
 /// What tells one format of chunked bags from another. Its values remember what one description says of the next.
 pub(crate) trait Grammar: Default + Send + 'static {
@@ -47,10 +47,10 @@ pub(crate) trait Grammar: Default + Send + 'static {
     fn accept(path: &Path, head: &[u8]) -> Result<()>;
 
     /// Goes to the first record.
-    fn begin(stream: &mut Stream<'_>);
+    fn begin(stream: &mut ByteStream<'_>);
 
     /// Takes the head of the next record.
-    fn next(stream: &mut Stream<'_>) -> Result<Record<Self::Description>, Stop>;
+    fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Self::Description>, NoRecord>;
 
     /// The connection that a description announces, with the bag's number for it; `None` if it announces none, or one
     /// that is known.
@@ -71,18 +71,22 @@ pub(crate) trait Grammar: Default + Send + 'static {
     fn index_stamps(data: &[u8]) -> Vec<Stamp>;
 
     /// Reads the tail.
-    fn plan(source: &Source) -> std::io::Result<Result<Plan, Unindexed>>;
+    fn plan(source: &FileSource) -> std::io::Result<Result<ChunkPlan, Unindexed>>;
 
     /// Stored facts worth telling, from the first bytes.
     fn facts(head: &[u8]) -> Vec<(String, String)>;
 
     /// Tells `sink` all that somebody else's reader finds.
-    fn verify(source: &Source, plan: &Result<Plan, Unindexed>, sink: &mut dyn Sink) -> Verified;
+    fn verify(
+        source: &FileSource,
+        plan: &Result<ChunkPlan, Unindexed>,
+        sink: &mut dyn Sink,
+    ) -> SecondReading;
 }
 
 /// What a second reader did.
 #[derive(Default)]
-pub(crate) struct Verified {
+pub(crate) struct SecondReading {
     pub(crate) compression: BTreeSet<Compression>,
     /// Why it did not get to the end.
     pub(crate) stopped: Option<String>,
@@ -92,8 +96,8 @@ pub(crate) struct Verified {
 
 /// A bag in a file, with its tail if that can be relied on.
 struct Indexed<G> {
-    source: Source,
-    plan: Result<Plan, Unindexed>,
+    source: FileSource,
+    plan: Result<ChunkPlan, Unindexed>,
     facts: Vec<(String, String)>,
     verify: bool,
     grammar: PhantomData<fn() -> G>,
@@ -102,7 +106,7 @@ struct Indexed<G> {
 /// A bag from a pipe.
 struct Piped<G> {
     name: String,
-    stream: Stream<'static>,
+    stream: ByteStream<'static>,
     grammar: PhantomData<fn() -> G>,
 }
 
@@ -110,10 +114,10 @@ struct Piped<G> {
 const HEAD: usize = 32;
 
 /// Opens a bag of this grammar.
-pub(crate) fn open<G: Grammar>(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let grammar = PhantomData;
     match place {
-        Place::File(source) => {
+        BagPlace::File(source) => {
             let path = source.path().to_owned();
             let mut head = vec![0; NEAR];
             let got = source
@@ -130,7 +134,7 @@ pub(crate) fn open<G: Grammar>(place: Place, options: &OpenOptions) -> Result<Bo
                 grammar,
             }))
         }
-        Place::Pipe(name, mut stream) => {
+        BagPlace::Pipe(name, mut stream) => {
             let path = Path::new(&name);
             let head = stream.peek(HEAD).map_err(Error::io("read", path))?;
             G::accept(path, head)?;
@@ -140,7 +144,7 @@ pub(crate) fn open<G: Grammar>(place: Place, options: &OpenOptions) -> Result<Bo
                 grammar,
             }))
         }
-        Place::Folder(path) => Err(super::explain(&path, &[], true)),
+        BagPlace::Folder(path) => Err(super::explain(&path, &[], true)),
     }
 }
 
@@ -171,7 +175,12 @@ impl<G: Grammar> Reader for Indexed<G> {
 }
 
 impl<G: Grammar> Indexed<G> {
-    fn query<'a>(&'a self, plan: &'a Plan, wants: &'a [Want], range: Option<Span>) -> Query<'a, G> {
+    fn query<'a>(
+        &'a self,
+        plan: &'a ChunkPlan,
+        wants: &'a [Want],
+        range: Option<Span>,
+    ) -> Query<'a, G> {
         Query {
             source: &self.source,
             allowance: Arc::default(),
@@ -182,7 +191,7 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    fn by_index(&self, plan: &Plan, range: Option<Span>, sink: &mut Clip<'_>) -> Report {
+    fn by_index(&self, plan: &ChunkPlan, range: Option<Span>, sink: &mut Clip<'_>) -> Report {
         let connections = plan.connections.list().iter();
         let wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
         plan.notices.iter().for_each(|n| sink.notice(n.clone()));
@@ -253,8 +262,8 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    fn forward(&self, sink: &mut dyn Sink) -> forward::Found {
-        let mut stream = Stream::of_file(&self.source, 0, self.source.len(), FAR);
+    fn forward(&self, sink: &mut dyn Sink) -> forward::ForwardScan {
+        let mut stream = ByteStream::of_file(&self.source, 0, self.source.len(), FAR);
         G::begin(&mut stream);
         forward::read::<G>(&mut stream, self.source.len(), sink)
     }

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::model::{OpenOptions, Reader};
-use super::source::{Source, Stream};
+use super::source::{ByteStream, FileSource};
 use crate::base::error::{Error, Result};
 
 /// One bag to read: a path, or standard input (`-`).
@@ -61,9 +61,9 @@ pub struct FormatRow {
     /// What it is read from.
     pub(crate) medium: Medium,
     /// Whether a bag begins so.
-    pub(crate) sniff: fn(&Place, &[u8]) -> bool,
+    pub(crate) sniff: fn(&BagPlace, &[u8]) -> bool,
     /// Makes a reader.
-    pub(crate) open: fn(Place, &OpenOptions) -> Result<Box<dyn Reader>>,
+    pub(crate) open: fn(BagPlace, &OpenOptions) -> Result<Box<dyn Reader>>,
 }
 
 /// What a format is read from.
@@ -80,45 +80,48 @@ pub(crate) enum Medium {
 }
 
 /// Where a bag lies.
-pub(crate) enum Place {
+pub(crate) enum BagPlace {
     /// A folder.
     Folder(PathBuf),
     /// A regular file.
-    File(Source),
+    File(FileSource),
     /// A pipe: its name and its bytes.
-    Pipe(String, Stream<'static>),
+    Pipe(String, ByteStream<'static>),
 }
 
 /// How many first bytes tell a format.
 pub(crate) const HEAD: usize = 512;
 
 /// Opens what lies there, without reading more than its kind.
-pub(crate) fn place(input: &Input) -> Result<Place> {
+pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     let Input::Path(path) = input else {
-        return Ok(Place::Pipe(input.name(), Stream::of_reader(io::stdin())));
+        return Ok(BagPlace::Pipe(
+            input.name(),
+            ByteStream::of_reader(io::stdin()),
+        ));
     };
     let meta = path.metadata().map_err(Error::io("read", path))?;
     if meta.is_dir() {
-        return Ok(Place::Folder(path.clone()));
+        return Ok(BagPlace::Folder(path.clone()));
     }
     if meta.is_file() {
-        return Source::open(path).map(Place::File);
+        return FileSource::open(path).map(BagPlace::File);
     }
     let pipe = File::open(path).map_err(Error::io("read", path))?;
-    Ok(Place::Pipe(file_name(path), Stream::of_reader(pipe)))
+    Ok(BagPlace::Pipe(file_name(path), ByteStream::of_reader(pipe)))
 }
 
 /// The first bytes; none for a folder.
-pub(crate) fn head(place: &mut Place) -> Result<Vec<u8>> {
+pub(crate) fn head(place: &mut BagPlace) -> Result<Vec<u8>> {
     match place {
-        Place::Folder(_) => Ok(Vec::new()),
-        Place::File(source) => {
+        BagPlace::Folder(_) => Ok(Vec::new()),
+        BagPlace::File(source) => {
             let mut head = vec![0; HEAD];
             let got = source.read_at(0, &mut head);
             head.truncate(got.map_err(Error::io("read", source.path()))?);
             Ok(head)
         }
-        Place::Pipe(name, stream) => {
+        BagPlace::Pipe(name, stream) => {
             let head = stream.peek(HEAD).map(<[u8]>::to_vec);
             head.map_err(Error::io("read", Path::new(name)))
         }

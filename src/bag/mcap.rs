@@ -14,14 +14,15 @@ use mcap::MAGIC;
 use mcap::records::{Record as Parsed, op};
 
 use crate::bag::chunked::{
-    self, Connections, Grammar, Index, IndexSum, Plan, Record, Stop, Unindexed, Verified,
+    self, ChunkPlan, Connections, Grammar, Index, IndexSum, NoRecord, RecordHead, SecondReading,
+    Unindexed,
 };
 use crate::bag::input::{FormatRow, Medium};
 use crate::bag::model::{Connection, Sink};
-use crate::bag::source::{Source, Stream};
+use crate::bag::source::{ByteStream, FileSource};
 use crate::base::error::Result;
 use crate::base::time::Stamp;
-use records::{Cursor, Schema};
+use records::{FieldCursor, SchemaRecord};
 
 /// MCAP files.
 pub(crate) const FORMAT: FormatRow = FormatRow {
@@ -36,7 +37,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
 /// Remembers schemas, which channels refer to.
 #[derive(Default)]
 struct Mcap {
-    schemas: HashMap<u16, Schema>,
+    schemas: HashMap<u16, SchemaRecord>,
     held: usize,
 }
 
@@ -58,13 +59,13 @@ impl Grammar for Mcap {
         Ok(())
     }
 
-    fn begin(stream: &mut Stream<'_>) {
+    fn begin(stream: &mut ByteStream<'_>) {
         if stream.peek(MAGIC.len()).is_ok() {
             stream.advance(MAGIC.len());
         }
     }
 
-    fn next(stream: &mut Stream<'_>) -> Result<Record<Described>, Stop> {
+    fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>, NoRecord> {
         records::next(stream)
     }
 
@@ -90,16 +91,16 @@ impl Grammar for Mcap {
     fn index(bytes: &[u8], promised: &IndexSum) -> Option<Index> {
         let mut found = IndexSum::default();
         let mut index = Index::default();
-        let mut rest = Cursor(bytes);
+        let mut rest = FieldCursor(bytes);
         // The crate reads these into a vector of pairs each, which takes several times as long.
         while let Some(kind) = rest.u8() {
             let len = usize::try_from(rest.u64()?).ok()?;
             let (record, after) = rest.0.split_at_checked(len)?;
-            rest = Cursor(after);
+            rest = FieldCursor(after);
             if kind != op::MESSAGE_INDEX {
                 continue;
             }
-            let mut cursor = Cursor(record);
+            let mut cursor = FieldCursor(record);
             let channel = u32::from(cursor.u16()?);
             let entries = cursor.bytes()?.chunks_exact(records::ENTRY);
             found.add(channel, u32::try_from(entries.len()).ok()?);
@@ -114,13 +115,13 @@ impl Grammar for Mcap {
         entries.filter_map(|e| Some(entry(e)?.0)).collect()
     }
 
-    fn plan(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
+    fn plan(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
         summary::read(source)
     }
 
     /// What the file's header says of itself.
     fn facts(head: &[u8]) -> Vec<(String, String)> {
-        let mut cursor = Cursor(head.get(MAGIC.len()..).unwrap_or_default());
+        let mut cursor = FieldCursor(head.get(MAGIC.len()..).unwrap_or_default());
         let (kind, len) = (cursor.u8(), cursor.u64().unwrap_or(0));
         let record = usize::try_from(len)
             .ok()
@@ -139,16 +140,20 @@ impl Grammar for Mcap {
     }
 
     /// The crate reads from the front, with or without a summary.
-    fn verify(source: &Source, _plan: &Result<Plan, Unindexed>, sink: &mut dyn Sink) -> Verified {
-        Verified {
+    fn verify(
+        source: &FileSource,
+        _plan: &Result<ChunkPlan, Unindexed>,
+        sink: &mut dyn Sink,
+    ) -> SecondReading {
+        SecondReading {
             stopped: verify::read(source, sink).err(),
-            ..Verified::default()
+            ..SecondReading::default()
         }
     }
 }
 
 /// The time and the offset in an entry of a message index.
 fn entry(bytes: &[u8]) -> Option<(Stamp, u64)> {
-    let mut cursor = Cursor(bytes);
+    let mut cursor = FieldCursor(bytes);
     Some((Stamp::from_nanos(cursor.u64()?), cursor.u64()?))
 }

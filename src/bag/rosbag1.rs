@@ -12,11 +12,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::bag::chunked::{
-    self, Connections, Grammar, Index, IndexSum, Plan, Stop, Unindexed, Verified,
+    self, ChunkPlan, Connections, Grammar, Index, IndexSum, NoRecord, SecondReading, Unindexed,
 };
 use crate::bag::input::{FormatRow, Medium};
 use crate::bag::model::{Connection, Sink};
-use crate::bag::source::{Source, Stream};
+use crate::bag::source::{ByteStream, FileSource};
 use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 use records::{ENTRY, Header};
@@ -67,14 +67,14 @@ impl Grammar for Rosbag1 {
     }
 
     /// The first line names the version.
-    fn begin(stream: &mut Stream<'_>) {
+    fn begin(stream: &mut ByteStream<'_>) {
         if let Ok(head) = stream.peek(32) {
             let line = head.iter().position(|b| *b == b'\n');
             stream.advance(line.map_or(0, |at| at + 1));
         }
     }
 
-    fn next(stream: &mut Stream<'_>) -> Result<chunked::Record<Described>, Stop> {
+    fn next(stream: &mut ByteStream<'_>) -> Result<chunked::RecordHead<Described>, NoRecord> {
         records::next(stream)
     }
 
@@ -118,7 +118,7 @@ impl Grammar for Rosbag1 {
         entries.filter_map(|e| Some(entry(e)?.0)).collect()
     }
 
-    fn plan(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
+    fn plan(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
         tail::read(source)
     }
 
@@ -126,16 +126,20 @@ impl Grammar for Rosbag1 {
         Vec::new()
     }
 
-    fn verify(source: &Source, plan: &Result<Plan, Unindexed>, sink: &mut dyn Sink) -> Verified {
+    fn verify(
+        source: &FileSource,
+        plan: &Result<ChunkPlan, Unindexed>,
+        sink: &mut dyn Sink,
+    ) -> SecondReading {
         match plan {
             Ok(plan) => verify::read(source, plan, sink),
-            Err(reason) => Verified {
+            Err(reason) => SecondReading {
                 stopped: Some(format!(
                     "the crate `rosbag` needs an index, and {}",
                     reason.why
                 )),
                 refused: true,
-                ..Verified::default()
+                ..SecondReading::default()
             },
         }
     }

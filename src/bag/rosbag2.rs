@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::bag::deferred::open_each;
-use crate::bag::input::{FormatRow, Input, Medium, Place, file_name};
+use crate::bag::input::{BagPlace, FormatRow, Input, Medium, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Want,
 };
@@ -26,29 +26,29 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     extensions: &[],
     medium: Medium::Folder,
     sniff: |place, _| match place {
-        Place::Folder(path) => path.join("metadata.yaml").is_file() || holds_storage(path),
+        BagPlace::Folder(path) => path.join("metadata.yaml").is_file() || holds_storage(path),
         _ => false,
     },
     open,
 };
 
 /// A folder's storage files.
-struct Folder {
+struct BagFolder {
     name: String,
     parts: Vec<Box<dyn Reader>>,
     metadata: Metadata,
     notices: Vec<Notice>,
 }
 
-fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
-    let Place::Folder(path) = place else {
+fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+    let BagPlace::Folder(path) = place else {
         return Err(Error::Unsupported {
             path: PathBuf::new(),
             what: "it is no folder".to_owned(),
             hint: String::new(),
         });
     };
-    let mut folder = Folder {
+    let mut folder = BagFolder {
         name: file_name(&path),
         parts: Vec::new(),
         metadata: Metadata::default(),
@@ -108,7 +108,7 @@ fn storage_and_links(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     files.partition(|file| metadata::is_inside(folder, file))
 }
 
-impl Folder {
+impl BagFolder {
     fn say(&mut self, kind: NoticeKind, text: String) {
         self.notices.push(Notice::new(kind, text));
     }
@@ -175,7 +175,7 @@ impl Folder {
     }
 }
 
-impl Reader for Folder {
+impl Reader for BagFolder {
     fn span(&mut self) -> Result<Option<Span>> {
         let mut whole: Option<Span> = None;
         let mut parts = 0;
@@ -198,7 +198,7 @@ impl Reader for Folder {
             sink.notice(notice.clone());
         }
         let mut complete = !self.notices.iter().any(|n| n.kind.is_loss());
-        let mut joined = Joined::new(&self.metadata, sink);
+        let mut joined = PartsAdapter::new(&self.metadata, sink);
         let mut reports = Vec::new();
         for part in &mut self.parts {
             joined.part.clear();
@@ -218,7 +218,7 @@ impl Reader for Folder {
     }
 }
 
-impl Folder {
+impl BagFolder {
     fn report(&self, parts: &[Report], complete: bool) -> Report {
         let compression: BTreeSet<&String> = parts.iter().flat_map(|r| &r.compression).collect();
         let worst = parts
@@ -250,18 +250,18 @@ impl Folder {
 }
 
 /// Connections that are one across the parts of a recording.
-type Key = (Arc<str>, Arc<str>, Option<NodeName>);
+type ConnectionKey = (Arc<str>, Arc<str>, Option<NodeName>);
 
 /// Gives the parts' connections ids that are the same in all parts.
-struct Joined<'a> {
+struct PartsAdapter<'a> {
     metadata: &'a Metadata,
     sink: &'a mut dyn Sink,
-    known: BTreeMap<Key, (ConnectionId, Want)>,
+    known: BTreeMap<ConnectionKey, (ConnectionId, Want)>,
     /// The ids of this part's connections in the whole.
     part: Vec<ConnectionId>,
 }
 
-impl<'a> Joined<'a> {
+impl<'a> PartsAdapter<'a> {
     fn new(metadata: &'a Metadata, sink: &'a mut dyn Sink) -> Self {
         Self {
             metadata,
@@ -271,7 +271,7 @@ impl<'a> Joined<'a> {
         }
     }
 
-    fn announce(&mut self, key: Key, mut connection: Connection) -> (ConnectionId, Want) {
+    fn announce(&mut self, key: ConnectionKey, mut connection: Connection) -> (ConnectionId, Want) {
         let id = ConnectionId(u32::try_from(self.known.len()).unwrap_or(u32::MAX));
         connection.id = id;
         if let Some(topic) = self.metadata.topics.get(connection.topic.as_str()) {
@@ -309,7 +309,7 @@ impl<'a> Joined<'a> {
     }
 }
 
-impl Sink for Joined<'_> {
+impl Sink for PartsAdapter<'_> {
     fn connection(&mut self, connection: &Connection) -> Want {
         let publisher = connection.publisher.clone();
         let key = (

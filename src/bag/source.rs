@@ -10,14 +10,14 @@ use crate::base::leftovers::Leftover;
 
 /// A regular file that several threads read at any place at once. Counts the bytes it hands out.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub(crate) struct FileSource {
     path: PathBuf,
     file: File,
     len: u64,
     read: AtomicU64,
 }
 
-impl Source {
+impl FileSource {
     /// Opens the file at `path` for reading.
     ///
     /// # Errors
@@ -119,13 +119,13 @@ impl Temporary {
 
 enum From<'a> {
     /// Part of a file, up to byte `end`.
-    File { source: &'a Source, end: u64 },
+    File { source: &'a FileSource, end: u64 },
     /// Anything that can only be read on.
     Reader(Box<dyn Read + Send + 'a>),
 }
 
 /// Bytes in order, with a look ahead; skipping costs nothing in a file.
-pub(crate) struct Stream<'a> {
+pub(crate) struct ByteStream<'a> {
     from: From<'a>,
     /// Where `buffer[used]` stands.
     at: u64,
@@ -140,9 +140,9 @@ pub(crate) const FAR: usize = 256 * 1024;
 /// For picking small records here and there.
 pub(crate) const NEAR: usize = 4096;
 
-impl<'a> Stream<'a> {
+impl<'a> ByteStream<'a> {
     /// The bytes `start..end` of a file, `step` at a time.
-    pub(crate) fn of_file(source: &'a Source, start: u64, end: u64, step: usize) -> Self {
+    pub(crate) fn of_file(source: &'a FileSource, start: u64, end: u64, step: usize) -> Self {
         let end = end.min(source.len());
         Self::new(From::File { source, end }, start, step)
     }
@@ -228,7 +228,7 @@ impl<'a> Stream<'a> {
     /// right without reading.
     ///
     /// # Errors
-    /// As [`Stream::peek`].
+    /// As [`ByteStream::peek`].
     pub(crate) fn skip(&mut self, n: u64) -> io::Result<u64> {
         let mut left = n;
         loop {
@@ -252,7 +252,7 @@ impl<'a> Stream<'a> {
     }
 }
 
-impl Read for Stream<'_> {
+impl Read for ByteStream<'_> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         if self.ahead() == 0 {
             self.peek(1)?;
@@ -292,10 +292,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("bytes");
         std::fs::write(&path, &bytes).unwrap();
-        let source = Source::open(&path).unwrap();
+        let source = FileSource::open(&path).unwrap();
         let streams = [
-            Stream::of_file(&source, 0, u64::MAX, 16),
-            Stream::of_reader(io::Cursor::new(bytes.clone())),
+            ByteStream::of_file(&source, 0, u64::MAX, 16),
+            ByteStream::of_reader(io::Cursor::new(bytes.clone())),
         ];
         for mut stream in streams {
             assert_eq!(stream.peek(4).unwrap(), &bytes[..4]);

@@ -12,18 +12,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::bag::adapters::{Clip, in_order};
-use crate::bag::input::{FormatRow, Medium, Place, file_name};
+use crate::bag::input::{BagPlace, FormatRow, Medium, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Encoding, MOST_PAYLOAD, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
-use crate::bag::source::Source;
+use crate::bag::source::FileSource;
 use crate::base::budget::CONNECTIONS;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 use db::{Db, Refusal};
 use place::Ready;
-use rows::{Part, Rows, ZSTD};
+use rows::{RowRange, RowReader, ZSTD};
 
 /// ROS 2 bags in SQLite.
 pub(crate) const FORMAT: FormatRow = FormatRow {
@@ -36,7 +36,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
 };
 
 /// A database with its topics.
-struct Bag {
+struct Sqlite3Bag {
     path: PathBuf,
     file_bytes: u64,
     ready: Ready,
@@ -50,11 +50,11 @@ struct Bag {
     facts: Vec<(String, String)>,
 }
 
-fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let source = match place {
-        Place::File(source) => source,
-        Place::Folder(path) => return Err(super::explain(&path, &[], true)),
-        Place::Pipe(name, _) => {
+        BagPlace::File(source) => source,
+        BagPlace::Folder(path) => return Err(super::explain(&path, &[], true)),
+        BagPlace::Pipe(name, _) => {
             return Err(Error::Unsupported {
                 path: name.into(),
                 what: "a database cannot be read from a pipe".to_owned(),
@@ -80,7 +80,7 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         tables = self::tables(&ready, &path).or(tables);
     }
     let (db, columns) = tables?;
-    let mut bag = Bag {
+    let mut bag = Sqlite3Bag {
         notices,
         file_bytes: source.len(),
         topics: Vec::new(),
@@ -106,7 +106,7 @@ fn tables(ready: &Ready, path: &Path) -> Result<(Db, Vec<String>)> {
 /// Says so if the file is shorter than its own head has it.
 ///
 /// The head: <https://www.sqlite.org/fileformat2.html>, sections 1.3.2 and 1.3.7.
-fn cut(source: &Source) -> Option<String> {
+fn cut(source: &FileSource) -> Option<String> {
     let mut head = [0; 100];
     source.read_at(0, &mut head).ok().filter(|n| *n == 100)?;
     let number = |at: usize| {
@@ -158,7 +158,7 @@ fn has(columns: &[String], names: &[&str]) -> bool {
     names.iter().all(|name| is(name))
 }
 
-impl Bag {
+impl Sqlite3Bag {
     fn read_topics(&mut self, db: &Db, columns: &[String]) -> Result<(), Refusal> {
         let or_null = |name| if has(columns, &[name]) { name } else { "NULL" };
         let definitions = definitions(db).unwrap_or_default();
@@ -269,9 +269,9 @@ const BIG: u64 = 128 << 20;
 /// Parts of a big bag.
 const PARTS: i64 = 64;
 
-impl Bag {
+impl Sqlite3Bag {
     /// The rows in parts: one unless the bag is big. With a range SQLite's own index finds the rows.
-    fn parts(&self, db: &Db, range: Option<Span>) -> Vec<Part> {
+    fn parts(&self, db: &Db, range: Option<Span>) -> Vec<RowRange> {
         let whole = vec![(i64::MIN, i64::MAX)];
         if self.file_bytes < BIG || range.is_some() || self.verify {
             return whole;
@@ -303,7 +303,7 @@ fn check(db: &Db, sink: &mut dyn Sink) {
     }
 }
 
-impl Reader for Bag {
+impl Reader for Sqlite3Bag {
     fn span(&mut self) -> Result<Option<Span>> {
         // What cannot be told now shows when the rows are read.
         Ok(self.ends().unwrap_or(None))
@@ -321,7 +321,7 @@ impl Reader for Bag {
         if self.verify {
             check(&db, &mut clip);
         }
-        let rows = Rows::new(self, &wants, range);
+        let rows = RowReader::new(self, &wants, range);
         let parts = self.parts(&db, range);
         drop(db);
         let threads = if parts.len() > 1 { 8 } else { 1 };

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use crate::bag::FORMATS;
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::input::{FormatRow, HEAD, Medium, Place, file_name};
+use crate::bag::input::{BagPlace, FormatRow, HEAD, Medium, file_name};
 use crate::bag::model::{OpenOptions, Reader, Report, Sink};
-use crate::bag::source::{Source, Stream, Temporary};
+use crate::bag::source::{ByteStream, FileSource, Temporary};
 use crate::bag::unknown::explain;
 use crate::base::budget::{UNPACKED_COPY, UNPACKED_FOLD};
 use crate::base::error::{Error, Result};
@@ -34,9 +34,9 @@ struct Unpacked {
     file_bytes: u64,
 }
 
-fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let (name, file_bytes, packed): (String, u64, Box<dyn Read + Send>) = match place {
-        Place::File(source) => {
+        BagPlace::File(source) => {
             let path = source.path().to_owned();
             let file = File::open(&path).map_err(Error::io("read", &path))?;
             (
@@ -45,17 +45,17 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
                 Box::new(file),
             )
         }
-        Place::Pipe(name, stream) => (name, 0, Box::new(stream)),
-        Place::Folder(path) => return Err(explain(&path, &[], true)),
+        BagPlace::Pipe(name, stream) => (name, 0, Box::new(stream)),
+        BagPlace::Folder(path) => return Err(explain(&path, &[], true)),
     };
     let path = Path::new(&name);
     let fail = || Error::io("decompress", path);
     let allowance: Arc<Allowance> = Arc::default();
     let plain = allowance.open(Compression::Zstd, packed).map_err(fail())?;
-    let mut stream = Stream::of_reader(plain);
+    let mut stream = ByteStream::of_reader(plain);
     let head = stream.peek(HEAD).map_err(fail())?.to_vec();
     let inside = |row: &&FormatRow| {
-        row.name != FORMAT.name && (row.sniff)(&Place::Folder(path.into()), &head)
+        row.name != FORMAT.name && (row.sniff)(&BagPlace::Folder(path.into()), &head)
     };
     let Some(row) = FORMATS.iter().find(inside) else {
         return Err(explain(path, &head, false));
@@ -64,9 +64,9 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
         let copy = Temporary::new()?;
         let limit = file_bytes.saturating_mul(UNPACKED_FOLD).max(UNPACKED_COPY);
         let source = unpack(&mut stream, &copy, limit).map_err(fail())?;
-        (Place::File(Source::open(&source)?), Some(copy))
+        (BagPlace::File(FileSource::open(&source)?), Some(copy))
     } else {
-        (Place::Pipe(file_name(path), stream), None)
+        (BagPlace::Pipe(file_name(path), stream), None)
     };
     let inner = (row.open)(place, options)?;
     Ok(Box::new(Unpacked {
@@ -78,7 +78,11 @@ fn open(place: Place, options: &OpenOptions) -> Result<Box<dyn Reader>> {
 }
 
 /// Writes what `stream` holds into a file of ours.
-fn unpack(stream: &mut Stream<'_>, to: &Temporary, limit: u64) -> io::Result<std::path::PathBuf> {
+fn unpack(
+    stream: &mut ByteStream<'_>,
+    to: &Temporary,
+    limit: u64,
+) -> io::Result<std::path::PathBuf> {
     let path = to.path().join("unpacked");
     let mut file = File::create(&path)?;
     let most = limit.saturating_add(1);

@@ -5,17 +5,17 @@ use std::io::{self, Write};
 
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
-use super::table::{Batch, Column, Kind, Texts, Values, span};
+use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
 use super::words::visible;
 
 /// A table being written: the names of its columns, then a row a line. A list is written as JSON, with `NaN` and
 /// `Infinity` as Python's and JavaScript's readers take them; what is unknown is empty.
-pub(crate) struct Rows<W: Write> {
+pub(crate) struct CsvRows<W: Write> {
     writer: csv::Writer<W>,
     field: Vec<u8>,
 }
 
-impl<W: Write> Rows<W> {
+impl<W: Write> CsvRows<W> {
     /// Begins a table with the columns of `batch`.
     pub(crate) fn new(to: W, batch: &Batch) -> io::Result<Self> {
         let mut writer = WriterBuilder::new()
@@ -52,7 +52,7 @@ impl<W: Write> Rows<W> {
 }
 
 /// The value at place `at` of a level: a list, or below all lists what stands in it.
-fn field(column: &Column, level: usize, at: usize, to: &mut Vec<u8>) -> io::Result<()> {
+fn field(column: &TableColumn, level: usize, at: usize, to: &mut Vec<u8>) -> io::Result<()> {
     let in_list = level > 0;
     let Some(ends) = column.lists.get(level) else {
         return value(column, at, in_list, to);
@@ -68,24 +68,24 @@ fn field(column: &Column, level: usize, at: usize, to: &mut Vec<u8>) -> io::Resu
     Ok(())
 }
 
-fn value(column: &Column, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
+fn value(column: &TableColumn, at: usize, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
     match &column.values {
-        Values::Flag(v) => write!(to, "{}", v[at]),
-        Values::I8(v) => write!(to, "{}", v[at]),
-        Values::U8(v) => write!(to, "{}", v[at]),
-        Values::I16(v) => write!(to, "{}", v[at]),
-        Values::U16(v) => write!(to, "{}", v[at]),
-        Values::I32(v) => write!(to, "{}", v[at]),
-        Values::U32(v) => write!(to, "{}", v[at]),
-        Values::I64(v) => write!(to, "{}", v[at]),
-        Values::U64(v) => write!(to, "{}", v[at]),
-        Values::F32(v) if v[at].is_finite() => write!(to, "{:?}", v[at]),
-        Values::F32(v) => odd(f64::from(v[at]), in_list, to),
-        Values::F64(v) if v[at].is_finite() => number(v[at], to),
-        Values::F64(v) => odd(v[at], in_list, to),
-        Values::Texts(v) if column.kind == Kind::Bytes => bytes(v.get(at), to),
+        ColumnValues::Flag(v) => write!(to, "{}", v[at]),
+        ColumnValues::I8(v) => write!(to, "{}", v[at]),
+        ColumnValues::U8(v) => write!(to, "{}", v[at]),
+        ColumnValues::I16(v) => write!(to, "{}", v[at]),
+        ColumnValues::U16(v) => write!(to, "{}", v[at]),
+        ColumnValues::I32(v) => write!(to, "{}", v[at]),
+        ColumnValues::U32(v) => write!(to, "{}", v[at]),
+        ColumnValues::I64(v) => write!(to, "{}", v[at]),
+        ColumnValues::U64(v) => write!(to, "{}", v[at]),
+        ColumnValues::F32(v) if v[at].is_finite() => write!(to, "{:?}", v[at]),
+        ColumnValues::F32(v) => odd(f64::from(v[at]), in_list, to),
+        ColumnValues::F64(v) if v[at].is_finite() => number(v[at], to),
+        ColumnValues::F64(v) => odd(v[at], in_list, to),
+        ColumnValues::Texts(v) if column.kind == ColumnKind::Bytes => bytes(v.get(at), to),
         // Columns in which nothing is unknown are a message's fields.
-        Values::Texts(v) => text(v, at, in_list, column.valid.is_none(), to),
+        ColumnValues::Texts(v) => text(v, at, in_list, column.valid.is_none(), to),
     }
 }
 
@@ -119,7 +119,7 @@ fn bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
 }
 
 fn text(
-    texts: &Texts,
+    texts: &TextColumn,
     at: usize,
     in_list: bool,
     is_data: bool,
@@ -171,13 +171,13 @@ pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
 }
 
 /// A row with its line, 1...
-pub(crate) type Record = (usize, Vec<String>);
+pub(crate) type CsvRow = (usize, Vec<String>);
 
 /// Every row of a text with its line, 1.., the head among them; rows may differ in length, and empty lines are none.
 ///
 /// # Errors
 /// The line, and what is wrong there.
-pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
+pub(crate) fn records(text: &str) -> Result<Vec<CsvRow>, (usize, String)> {
     let mut reader = ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -198,7 +198,7 @@ pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::table::Cell;
+    use crate::base::table::TableCell;
 
     #[test]
     fn no_cell_is_a_formula() {
@@ -218,10 +218,22 @@ mod tests {
 
     #[test]
     fn cells_are_quoted_where_they_must_be() {
-        let mut batch = Batch::new(&[("a", Kind::Text), ("b", Kind::Text), ("c", Kind::F64)]);
-        batch.push(&[Cell::text("x,y"), Cell::text("say \"hi\""), Cell::Null]);
-        batch.push(&[Cell::Null, Cell::text(""), Cell::Float(1e300)]);
-        let mut rows = Rows::new(Vec::new(), &batch).unwrap();
+        let mut batch = Batch::new(&[
+            ("a", ColumnKind::Text),
+            ("b", ColumnKind::Text),
+            ("c", ColumnKind::F64),
+        ]);
+        batch.push(&[
+            TableCell::text("x,y"),
+            TableCell::text("say \"hi\""),
+            TableCell::Null,
+        ]);
+        batch.push(&[
+            TableCell::Null,
+            TableCell::text(""),
+            TableCell::Float(1e300),
+        ]);
+        let mut rows = CsvRows::new(Vec::new(), &batch).unwrap();
         rows.write(&batch).unwrap();
         let text = String::from_utf8(rows.finish().unwrap()).unwrap();
         assert_eq!(text, "a,b,c\n\"x,y\",\"say \"\"hi\"\"\",\n,,1e300\n");

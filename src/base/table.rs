@@ -6,7 +6,7 @@ use super::time::Stamp;
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum ColumnKind {
     /// True or false.
     Flag,
     I8,
@@ -29,13 +29,13 @@ pub(crate) enum Kind {
 
 /// Texts, or strings of bytes, one behind the other.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Texts {
+pub(crate) struct TextColumn {
     pub(crate) bytes: Vec<u8>,
     /// Where each ends.
     pub(crate) ends: Vec<i32>,
 }
 
-impl Texts {
+impl TextColumn {
     /// Adds one. What is longer than 2 GB in all would not fit; a batch is written long before.
     pub(crate) fn push(&mut self, text: &[u8]) {
         self.bytes.extend_from_slice(text);
@@ -56,7 +56,7 @@ impl Texts {
 
 /// The values of a column, the elements of its lists if it holds lists.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Values {
+pub(crate) enum ColumnValues {
     Flag(Vec<bool>),
     I8(Vec<i8>),
     U8(Vec<u8>),
@@ -69,24 +69,24 @@ pub(crate) enum Values {
     U64(Vec<u64>),
     F32(Vec<f32>),
     F64(Vec<f64>),
-    Texts(Texts),
+    Texts(TextColumn),
 }
 
-impl Values {
-    fn new(kind: Kind) -> Self {
+impl ColumnValues {
+    fn new(kind: ColumnKind) -> Self {
         match kind {
-            Kind::Flag => Self::Flag(Vec::new()),
-            Kind::I8 => Self::I8(Vec::new()),
-            Kind::U8 => Self::U8(Vec::new()),
-            Kind::I16 => Self::I16(Vec::new()),
-            Kind::U16 => Self::U16(Vec::new()),
-            Kind::I32 => Self::I32(Vec::new()),
-            Kind::U32 => Self::U32(Vec::new()),
-            Kind::I64 | Kind::Time => Self::I64(Vec::new()),
-            Kind::U64 => Self::U64(Vec::new()),
-            Kind::F32 => Self::F32(Vec::new()),
-            Kind::F64 => Self::F64(Vec::new()),
-            Kind::Text | Kind::Bytes => Self::Texts(Texts::default()),
+            ColumnKind::Flag => Self::Flag(Vec::new()),
+            ColumnKind::I8 => Self::I8(Vec::new()),
+            ColumnKind::U8 => Self::U8(Vec::new()),
+            ColumnKind::I16 => Self::I16(Vec::new()),
+            ColumnKind::U16 => Self::U16(Vec::new()),
+            ColumnKind::I32 => Self::I32(Vec::new()),
+            ColumnKind::U32 => Self::U32(Vec::new()),
+            ColumnKind::I64 | ColumnKind::Time => Self::I64(Vec::new()),
+            ColumnKind::U64 => Self::U64(Vec::new()),
+            ColumnKind::F32 => Self::F32(Vec::new()),
+            ColumnKind::F64 => Self::F64(Vec::new()),
+            ColumnKind::Text | ColumnKind::Bytes => Self::Texts(TextColumn::default()),
         }
     }
 
@@ -128,10 +128,10 @@ impl Values {
 
 /// One column.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Column {
+pub(crate) struct TableColumn {
     pub(crate) name: Cow<'static, str>,
-    pub(crate) kind: Kind,
-    pub(crate) values: Values,
+    pub(crate) kind: ColumnKind,
+    pub(crate) values: ColumnValues,
     /// Where each list ends among the lists of the next level, or among the values; the rows' own lists first. None
     /// for a column of single values.
     pub(crate) lists: Vec<Vec<i32>>,
@@ -139,9 +139,9 @@ pub(crate) struct Column {
     pub(crate) valid: Option<Vec<bool>>,
 }
 
-impl Column {
+impl TableColumn {
     /// A column of single values, some of which may be unknown.
-    pub(crate) fn known(name: impl Into<Cow<'static, str>>, kind: Kind) -> Self {
+    pub(crate) fn known(name: impl Into<Cow<'static, str>>, kind: ColumnKind) -> Self {
         Self {
             valid: Some(Vec::new()),
             ..Self::full(name, kind, 0)
@@ -149,11 +149,15 @@ impl Column {
     }
 
     /// A column in which every row has a value: a list of lists `levels` deep, 0 for a single value.
-    pub(crate) fn full(name: impl Into<Cow<'static, str>>, kind: Kind, levels: usize) -> Self {
+    pub(crate) fn full(
+        name: impl Into<Cow<'static, str>>,
+        kind: ColumnKind,
+        levels: usize,
+    ) -> Self {
         Self {
             name: name.into(),
             kind,
-            values: Values::new(kind),
+            values: ColumnValues::new(kind),
             lists: vec![Vec::new(); levels],
             valid: None,
         }
@@ -179,21 +183,21 @@ impl Column {
         }
     }
 
-    fn push(&mut self, cell: &Cell<'_>) {
+    fn push(&mut self, cell: &TableCell<'_>) {
         let is_known = match (&mut self.values, cell) {
-            (Values::Flag(to), Cell::Flag(value)) => {
+            (ColumnValues::Flag(to), TableCell::Flag(value)) => {
                 to.push(*value);
                 true
             }
-            (Values::I64(to), Cell::Int(value) | Cell::Time(Stamp(value))) => {
+            (ColumnValues::I64(to), TableCell::Int(value) | TableCell::Time(Stamp(value))) => {
                 to.push(*value);
                 true
             }
-            (Values::F64(to), Cell::Float(value)) if value.is_finite() => {
+            (ColumnValues::F64(to), TableCell::Float(value)) if value.is_finite() => {
                 to.push(*value);
                 true
             }
-            (Values::Texts(to), Cell::Text(value)) => {
+            (ColumnValues::Texts(to), TableCell::Text(value)) => {
                 to.push(value.as_bytes());
                 true
             }
@@ -210,7 +214,7 @@ impl Column {
 
 /// One value of a row.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Cell<'a> {
+pub(crate) enum TableCell<'a> {
     /// Unknown.
     Null,
     Flag(bool),
@@ -220,7 +224,7 @@ pub(crate) enum Cell<'a> {
     Time(Stamp),
 }
 
-impl<'a> Cell<'a> {
+impl<'a> TableCell<'a> {
     /// A text.
     pub(crate) fn text(text: impl Into<Cow<'a, str>>) -> Self {
         Self::Text(text.into())
@@ -240,22 +244,22 @@ impl<'a> Cell<'a> {
 /// Rows of a table, in columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Batch {
-    pub(crate) columns: Vec<Column>,
+    pub(crate) columns: Vec<TableColumn>,
     pub(crate) rows: usize,
 }
 
 impl Batch {
     /// No rows yet, of columns of these names and kinds.
-    pub(crate) fn new(columns: &[(&'static str, Kind)]) -> Self {
+    pub(crate) fn new(columns: &[(&'static str, ColumnKind)]) -> Self {
         Self::of(
             columns
                 .iter()
-                .map(|(name, kind)| Column::known(*name, *kind)),
+                .map(|(name, kind)| TableColumn::known(*name, *kind)),
         )
     }
 
     /// No rows yet, of these columns.
-    pub(crate) fn of(columns: impl IntoIterator<Item = Column>) -> Self {
+    pub(crate) fn of(columns: impl IntoIterator<Item = TableColumn>) -> Self {
         Self {
             columns: columns.into_iter().collect(),
             rows: 0,
@@ -263,7 +267,7 @@ impl Batch {
     }
 
     /// Adds a row: a cell per column, unknown where it is of another kind than the column.
-    pub(crate) fn push(&mut self, row: &[Cell<'_>]) {
+    pub(crate) fn push(&mut self, row: &[TableCell<'_>]) {
         for (column, cell) in self.columns.iter_mut().zip(row) {
             column.push(cell);
         }
@@ -304,14 +308,14 @@ mod tests {
     #[test]
     fn a_half_filled_row_is_taken_back() {
         let mut batch = Batch::of([
-            Column::full("a", Kind::I64, 0),
-            Column::full("b", Kind::Text, 1),
+            TableColumn::full("a", ColumnKind::I64, 0),
+            TableColumn::full("b", ColumnKind::Text, 1),
         ]);
         let add = |batch: &mut Batch, texts: &[&str]| {
-            if let Values::I64(to) = &mut batch.columns[0].values {
+            if let ColumnValues::I64(to) = &mut batch.columns[0].values {
                 to.push(1);
             }
-            if let Values::Texts(to) = &mut batch.columns[1].values {
+            if let ColumnValues::Texts(to) = &mut batch.columns[1].values {
                 for text in texts {
                     to.push(text.as_bytes());
                 }
@@ -329,10 +333,10 @@ mod tests {
 
     #[test]
     fn a_cell_of_another_kind_is_unknown() {
-        let mut batch = Batch::new(&[("a", Kind::F64)]);
-        batch.push(&[Cell::Float(f64::NAN)]);
-        batch.push(&[Cell::Int(1)]);
-        batch.push(&[Cell::Float(2.0)]);
+        let mut batch = Batch::new(&[("a", ColumnKind::F64)]);
+        batch.push(&[TableCell::Float(f64::NAN)]);
+        batch.push(&[TableCell::Int(1)]);
+        batch.push(&[TableCell::Float(2.0)]);
         assert_eq!(batch.columns[0].valid, Some(vec![false, false, true]));
     }
 }

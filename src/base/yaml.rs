@@ -33,8 +33,8 @@ pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
 ///
 /// # Errors
 /// As [`parse`], and for keys that are not text or stand twice in one mapping.
-pub(crate) fn parse_placed(text: &str) -> Result<Placed, BadYaml> {
-    read::<Spanned<Plain>>(text).map(Placed::from)
+pub(crate) fn parse_placed(text: &str) -> Result<YamlPart, BadYaml> {
+    read::<Spanned<Plain>>(text).map(YamlPart::from)
 }
 
 fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
@@ -53,7 +53,7 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
         },
     };
     serde_saphyr::from_str_with_options(text, options).map_err(|e| {
-        let at = e.location().map_or(Place::default(), Place::from);
+        let at = e.location().map_or(YamlPlace::default(), YamlPlace::from);
         BadYaml {
             line: at.line,
             column: at.column,
@@ -64,14 +64,14 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
 
 /// Where something stands in a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Place {
+pub(crate) struct YamlPlace {
     /// The line, 1..; 0 where none can be named.
     pub(crate) line: usize,
     /// The character in it, 1...
     pub(crate) column: usize,
 }
 
-impl From<Location> for Place {
+impl From<Location> for YamlPlace {
     fn from(at: Location) -> Self {
         Self {
             line: usize::try_from(at.line()).unwrap_or(0),
@@ -82,22 +82,22 @@ impl From<Location> for Place {
 
 /// A part of a document, with its place.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Placed {
-    pub(crate) at: Place,
-    pub(crate) data: Data,
+pub(crate) struct YamlPart {
+    pub(crate) at: YamlPlace,
+    pub(crate) data: YamlData,
 }
 
 /// What stands there.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Data {
+pub(crate) enum YamlData {
     /// A scalar as text: `true`, `2.5`, `/scan`; empty for null.
     Scalar(String),
-    List(Vec<Placed>),
+    List(Vec<YamlPart>),
     /// In the document's order: the key, its place, the value.
-    Map(Vec<(String, Place, Placed)>),
+    Map(Vec<(String, YamlPlace, YamlPart)>),
 }
 
-impl From<Spanned<Plain>> for Placed {
+impl From<Spanned<Plain>> for YamlPart {
     fn from(part: Spanned<Plain>) -> Self {
         Self {
             at: part.referenced.into(),
@@ -106,8 +106,8 @@ impl From<Spanned<Plain>> for Placed {
     }
 }
 
-/// [`Data`] as the parser gives it.
-struct Plain(Data);
+/// [`YamlData`] as the parser gives it.
+struct Plain(YamlData);
 
 impl<'de> Deserialize<'de> for Plain {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -119,7 +119,7 @@ struct PlainVisitor;
 
 impl PlainVisitor {
     fn scalar(text: impl fmt::Display) -> Plain {
-        Plain(Data::Scalar(text.to_string()))
+        Plain(YamlData::Scalar(text.to_string()))
     }
 }
 
@@ -167,7 +167,7 @@ impl<'de> Visitor<'de> for PlainVisitor {
         while let Some(part) = parts.next_element::<Spanned<Plain>>()? {
             list.push(part.into());
         }
-        Ok(Plain(Data::List(list)))
+        Ok(Plain(YamlData::List(list)))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut parts: A) -> Result<Plain, A::Error> {
@@ -176,7 +176,7 @@ impl<'de> Visitor<'de> for PlainVisitor {
             let value = parts.next_value::<Spanned<Plain>>()?;
             map.push((key.value, key.referenced.into(), value.into()));
         }
-        Ok(Plain(Data::Map(map)))
+        Ok(Plain(YamlData::Map(map)))
     }
 }
 
@@ -218,19 +218,21 @@ mod tests {
     #[test]
     fn every_part_knows_its_place() {
         let parts = parse_placed("a:\n  - {b: 1.5, c: ''}\n").unwrap();
-        let Data::Map(map) = parts.data else { panic!() };
+        let YamlData::Map(map) = parts.data else {
+            panic!()
+        };
         let (key, _, value) = &map[0];
-        let Data::List(list) = &value.data else {
+        let YamlData::List(list) = &value.data else {
             panic!()
         };
-        let Data::Map(inner) = &list[0].data else {
+        let YamlData::Map(inner) = &list[0].data else {
             panic!()
         };
-        let place = |line, column| Place { line, column };
+        let place = |line, column| YamlPlace { line, column };
         assert_eq!((key.as_str(), list[0].at), ("a", place(2, 5)));
         assert_eq!((inner[0].1, inner[0].2.at), (place(2, 6), place(2, 9)));
-        assert_eq!(inner[0].2.data, Data::Scalar("1.5".to_owned()));
-        assert_eq!(inner[1].2.data, Data::Scalar(String::new()));
+        assert_eq!(inner[0].2.data, YamlData::Scalar("1.5".to_owned()));
+        assert_eq!(inner[1].2.data, YamlData::Scalar(String::new()));
         let twice = parse_placed("a: 1\na: 2\n").unwrap_err();
         assert_eq!(twice.line, 2, "{twice:?}");
     }

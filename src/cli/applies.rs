@@ -34,7 +34,7 @@ impl Given {
 }
 
 /// Options that only say something to some outputs.
-struct Rule {
+struct AppliesTo {
     options: &'static [&'static str],
     /// Whether they say something to this output.
     takes: fn(&Asked<'_>, &Output) -> bool,
@@ -79,8 +79,8 @@ fn plays(output: &Output) -> bool {
     ["gif", "apng", "mp4", "webm"].contains(&output.format.word)
 }
 
-const RULES: &[Rule] = &[
-    Rule {
+const RULES: &[AppliesTo] = &[
+    AppliesTo {
         options: &[
             "style",
             "view",
@@ -97,7 +97,7 @@ const RULES: &[Rule] = &[
         takes: |_, output| is_picture(output),
         what: "pictures take it, such as `x.gif`",
     },
-    Rule {
+    AppliesTo {
         options: &["title"],
         takes: |asked, output| {
             let is_plain =
@@ -106,12 +106,12 @@ const RULES: &[Rule] = &[
         },
         what: "pictures, reports and `--dot-profile plain` take it, such as `x.gif`",
     },
-    Rule {
+    AppliesTo {
         options: &["bare"],
         takes: |asked, output| asked.is_window(output) || is_figure(asked.args, output),
         what: "animations, pages, figures and single windows take it: `x.gif`, `x.pdf`, `x{n}.svg`",
     },
-    Rule {
+    AppliesTo {
         options: &["captions"],
         takes: |asked, output| {
             let is_told = ["json", "csv", "parquet"].contains(&output.format.word);
@@ -119,7 +119,7 @@ const RULES: &[Rule] = &[
         },
         what: "animations, pages, single windows, figures and data take them: `x.gif`, `x{n}.svg`, `x.json`",
     },
-    Rule {
+    AppliesTo {
         options: &[
             "mode",
             "ns-filter",
@@ -133,12 +133,12 @@ const RULES: &[Rule] = &[
         takes: |asked, output| !is_data(output) || asked.args.view.filtered,
         what: "data holds the whole graph; `--filtered` writes what a picture would show",
     },
-    Rule {
+    AppliesTo {
         options: &["filtered"],
         takes: |_, output| is_data(output),
         what: "data takes it: json, csv, parquet, gexf, graphml; what is drawn is filtered already",
     },
-    Rule {
+    AppliesTo {
         options: &["frame-ms"],
         takes: |asked, output| {
             let is_animated = output.format.word == "svg" && !asked.is_window(output);
@@ -146,37 +146,37 @@ const RULES: &[Rule] = &[
         },
         what: "animations take it: `x.gif`, `x.apng`, `x.svg`, `x.mp4`",
     },
-    Rule {
+    AppliesTo {
         options: &["tween", "hold-changes"],
         takes: |_, output| plays(output),
         what: "animations take it: `x.gif`, `x.apng`, `x.mp4`, `x.webm`",
     },
-    Rule {
+    AppliesTo {
         options: &["strip"],
         takes: |_, output| output.format.whole != OneDrawing::Never && !output.target.is_numbered(),
         what: "pictures of the whole take it: `x.svg`, `x.png`, `x.webp`, `x.pdf`",
     },
-    Rule {
+    AppliesTo {
         options: &["max-bytes"],
         takes: |_, output| output.format.is_limited,
         what: "`x.gif` and `x.apng` take it",
     },
-    Rule {
+    AppliesTo {
         options: &["dot-profile"],
         takes: |_, output| output.format.word == "dot",
         what: "`x.dot` takes it",
     },
-    Rule {
+    AppliesTo {
         options: &["bytes"],
         takes: |_, output| ["json", "csv", "parquet"].contains(&output.format.word),
         what: "data holds sizes: `x.json`, `x.csv`",
     },
-    Rule {
+    AppliesTo {
         options: &["link"],
         takes: |_, output| output.format.word == "md",
         what: "reports take it: `x.md`",
     },
-    Rule {
+    AppliesTo {
         options: &["phases"],
         takes: |asked, output| {
             is_figure(asked.args, output)
@@ -184,12 +184,12 @@ const RULES: &[Rule] = &[
         },
         what: "figures and data take them: `--figure lives -o x.pdf`, `x.json`, `x.csv`",
     },
-    Rule {
+    AppliesTo {
         options: &["json"],
         takes: |_, output| output.format.word == "json",
         what: "`x.json` takes it",
     },
-    Rule {
+    AppliesTo {
         options: &["runs"],
         takes: |_, output| ["csv", "parquet"].contains(&output.format.word),
         what: "tables take it: `x.csv`",

@@ -7,7 +7,7 @@ use super::args::{FigureArgs, LookArgs, RenderArgs, SequenceArgs, ViewArgs};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::{budget, file};
-use crate::draw::figure::{Kind, Rows};
+use crate::draw::figure::{FigureKind, RowKind};
 use crate::draw::picture::PageOptions;
 use crate::draw::style::{BUILTIN, Style};
 use crate::draw::text::Fonts;
@@ -92,23 +92,23 @@ pub(super) fn options(args: &LookArgs, rate_change: f64) -> PageOptions {
     }
 }
 
-pub(super) fn sequence(args: &SequenceArgs) -> Result<options::Options> {
+pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> {
     let strip = args.strip.as_deref().map(options::Choice::parse);
-    Ok(options::Options {
+    Ok(options::SequenceOptions {
         frame_ms: args.frame_ms,
         tween: args.tween,
         hold_changes: args.hold_changes,
         max_bytes: args.max_bytes,
         dot_profile: Profile::parse(&args.dot_profile)?,
         json: match args.json.as_deref() {
-            Some("windows") => options::Form::Windows,
-            Some(_) => options::Form::Runs,
-            None => options::Form::Auto,
+            Some("windows") => options::JsonForm::Windows,
+            Some(_) => options::JsonForm::Runs,
+            None => options::JsonForm::Auto,
         },
         has_runs: args.runs,
         strip: strip.transpose()?,
         links: args.link.iter().map(|l| link(l)).collect::<Result<_>>()?,
-        ..options::Options::default()
+        ..options::SequenceOptions::default()
     })
 }
 
@@ -145,16 +145,16 @@ pub(super) fn figure(args: &FigureArgs, look: &LookArgs) -> Result<Option<Figure
     let Some(word) = &args.figure else {
         return Ok(None);
     };
-    let kind = Kind::parse(word)?;
+    let kind = FigureKind::parse(word)?;
     let steps = args.steps.iter().map(|s| usize::from(*s)).collect();
-    if kind != Kind::Steps && !args.steps.is_empty() {
+    if kind != FigureKind::Steps && !args.steps.is_empty() {
         return Err(Error::usage(
             format!("`--steps` says nothing to `--figure {word}`"),
             "it chooses the panels of `--figure steps`",
         ));
     }
-    let rows = args.rows.as_deref().map(Rows::parse).transpose()?;
-    if kind != Kind::Lives && rows == Some(Rows::Topics) {
+    let rows = args.rows.as_deref().map(RowKind::parse).transpose()?;
+    if kind != FigureKind::Lives && rows == Some(RowKind::Topics) {
         return Err(Error::usage(
             format!("`--figure {word}` has no rows of topics"),
             "`--rows nodes` or `--rows groups`; topics are arrows",

@@ -7,12 +7,12 @@ use crate::base::geometry::{Rect, Size};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::draw::figure::band::Axis;
-use crate::draw::figure::canvas::{Canvas, HAIRLINE, Sizes, Type, ink};
-use crate::draw::figure::lives::{Lives, Place};
-use crate::draw::figure::source::Source;
+use crate::draw::figure::canvas::{HAIRLINE, PaperCanvas, Sizes, Type, ink};
+use crate::draw::figure::lives::{LivesFigure, RowPlace};
+use crate::draw::figure::source::FigureSource;
 use crate::draw::figure::tracks::Track;
 use crate::draw::picture::PageOptions;
-use crate::draw::picture::page::{Page, unit};
+use crate::draw::picture::page::{PageFrame, unit};
 use crate::draw::picture::title::Title;
 use crate::draw::scene::{Form, Group, Piece, Scene, Shape, Stroke};
 use crate::draw::style::{Color, Style};
@@ -36,15 +36,15 @@ const PILL: f64 = 3.5;
 /// A board ready to be drawn, one scene per window.
 pub(crate) struct Board<'a> {
     view: &'a View,
-    source: &'a Source<'a>,
+    source: &'a FigureSource<'a>,
     style: &'a Style,
     fonts: &'a Fonts,
     options: PageOptions,
-    lives: Lives<'a>,
+    lives: LivesFigure<'a>,
     title: Title<'a>,
     sizes: Sizes,
     scale: f64,
-    place: Place,
+    place: RowPlace,
     /// The window of the mission that each frame shows.
     windows: Vec<usize>,
     ground: Vec<Group>,
@@ -69,7 +69,7 @@ impl<'a> Board<'a> {
     /// The board of what passes the filters of `source`. Where `is_sized` is false the page grows until all topics can
     /// be read; what then finds no room is counted.
     pub(crate) fn new(
-        source: &'a Source<'a>,
+        source: &'a FigureSource<'a>,
         view: &'a View,
         style: &'a Style,
         fonts: &'a Fonts,
@@ -77,21 +77,21 @@ impl<'a> Board<'a> {
         is_sized: bool,
     ) -> Self {
         let sizes = Sizes::of_names(7.0);
-        let mut lives = Lives::new(source, true).opened();
+        let mut lives = LivesFigure::new(source, true).opened();
         if !is_sized && most_rows(&lives, style, &options, fonts) < lives.rows.len() {
             options.size = LARGEST;
         }
         let mut most = most_rows(&lives, style, &options, fonts);
         if most < lives.rows.len() {
-            lives = Lives::new(source, true).plain();
+            lives = LivesFigure::new(source, true).plain();
             most = most_rows(&lives, style, &options, fonts);
         }
         let left_out = lives.shorten(most, &|track| messages(source, track));
-        let page = Page::new(style, &options, 0);
+        let page = PageFrame::new(style, &options, 0);
         let (place, scale) = placed(&lives, &page, &options, fonts);
         if !is_sized {
             // A short board leaves no empty page below; an even number of rows is what videos want.
-            let canvas = Canvas::new(fonts, sizes, scale);
+            let canvas = PaperCanvas::new(fonts, sizes, scale);
             let end = (place.top + lives.height(&canvas) + BELOW) * scale;
             options.size.h = (libm::ceil(end / 2.0) * 2.0).min(options.size.h);
         }
@@ -195,8 +195,8 @@ impl<'a> Board<'a> {
         }
     }
 
-    fn canvas(&self) -> Canvas<'a> {
-        Canvas::new(self.fonts, self.sizes, self.scale)
+    fn canvas(&self) -> PaperCanvas<'a> {
+        PaperCanvas::new(self.fonts, self.sizes, self.scale)
     }
 
     /// What stands still: band, pale bars, starts and ends, types, axis, and why this is no graph.
@@ -276,7 +276,7 @@ impl<'a> Board<'a> {
         groups
     }
 
-    fn rates(&self, canvas: &mut Canvas<'_>, told: &dyn Fn(&Track) -> Option<String>) {
+    fn rates(&self, canvas: &mut PaperCanvas<'_>, told: &dyn Fn(&Track) -> Option<String>) {
         let right = self.place.axis.right + RATES;
         for (y, track, ..) in self.lives.lines(canvas, &self.place) {
             let (color, text) = match told(track) {
@@ -288,7 +288,7 @@ impl<'a> Board<'a> {
     }
 
     /// The nodes that are known, as pills in a row as far as there is room: those that are there stand out.
-    fn nodes(&self, canvas: &mut Canvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
+    fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| {
             let node = elements.nodes.get(*id as usize);
@@ -333,7 +333,7 @@ impl<'a> Board<'a> {
     }
 
     /// What a canvas holds, in the colours of the style.
-    fn painted(&self, canvas: Canvas<'_>) -> Vec<Group> {
+    fn painted(&self, canvas: PaperCanvas<'_>) -> Vec<Group> {
         let mut groups = canvas.into_groups();
         for piece in groups.iter_mut().flat_map(|g| &mut g.pieces) {
             match piece {
@@ -385,14 +385,14 @@ fn scaled(r: Rect, by: f64) -> Rect {
 }
 
 /// How many messages a topic carried.
-fn messages(source: &Source<'_>, track: &Track) -> u64 {
+fn messages(source: &FigureSource<'_>, track: &Track) -> u64 {
     let Some(topic) = track.topic else { return 0 };
     let rows = source.mission.graphs.rows(Element::Topic(topic));
     rows.map(|(_, row)| row.count.unwrap_or(0)).sum()
 }
 
 /// The part of the page that a board has.
-fn room(page: &Page, options: &PageOptions) -> Rect {
+fn room(page: &PageFrame, options: &PageOptions) -> Rect {
     let margin = page.graph.x;
     let top = page.caption.bottom().max(margin / 2.0) + margin / 4.0;
     let size = options.size;
@@ -405,9 +405,14 @@ fn room(page: &Page, options: &PageOptions) -> Rect {
 }
 
 /// How many rows can be read on this page.
-fn most_rows(lives: &Lives<'_>, style: &Style, options: &PageOptions, fonts: &Fonts) -> usize {
-    let page = Page::new(style, options, 0);
-    let canvas = Canvas::new(fonts, Sizes::of_names(7.0), SCALE.0);
+fn most_rows(
+    lives: &LivesFigure<'_>,
+    style: &Style,
+    options: &PageOptions,
+    fonts: &Fonts,
+) -> usize {
+    let page = PageFrame::new(style, options, 0);
+    let canvas = PaperCanvas::new(fonts, Sizes::of_names(7.0), SCALE.0);
     let rows = lives.rows.len() as f64 * canvas.sizes.pitch();
     let others = lives.height(&canvas) - rows + BELOW;
     let free = room(&page, options).h / SCALE.0 - others;
@@ -421,9 +426,14 @@ fn most_rows(lives: &Lives<'_>, style: &Style, options: &PageOptions, fonts: &Fo
 }
 
 /// Where everything stands, in millimetres, and how many pixels these are.
-fn placed(lives: &Lives<'_>, page: &Page, options: &PageOptions, fonts: &Fonts) -> (Place, f64) {
+fn placed(
+    lives: &LivesFigure<'_>,
+    page: &PageFrame,
+    options: &PageOptions,
+    fonts: &Fonts,
+) -> (RowPlace, f64) {
     let room = room(page, options);
-    let canvas = Canvas::new(fonts, Sizes::of_names(7.0), 1.0);
+    let canvas = PaperCanvas::new(fonts, Sizes::of_names(7.0), 1.0);
     let high = lives.height(&canvas) + BELOW;
     let largest = SCALE.1 * unit(options).max(1.0);
     let scale = (room.h / high).clamp(SCALE.0, largest);
@@ -431,7 +441,7 @@ fn placed(lives: &Lives<'_>, page: &Page, options: &PageOptions, fonts: &Fonts) 
     let names = lives.names_width(&canvas, wide * 0.8);
     let types = if wide > 150.0 { TYPES } else { 0.0 };
     let right = left + wide - types - RATES - BETWEEN;
-    let place = Place {
+    let place = RowPlace {
         top: room.y / scale,
         left,
         axis: Axis {

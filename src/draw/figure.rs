@@ -34,11 +34,11 @@ use crate::view::NameFilter;
 
 use canvas::Sizes;
 pub(crate) use course::Course;
-use source::Source;
+use source::FigureSource;
 
 /// Which figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kind {
+pub enum FigureKind {
     /// What is alive when, how busy, what changed.
     #[default]
     Lives,
@@ -48,7 +48,7 @@ pub enum Kind {
     Steps,
 }
 
-impl Kind {
+impl FigureKind {
     /// The figures by the words of the command line.
     pub const ALL: [(&'static str, Self); 3] = [
         ("lives", Self::Lives),
@@ -81,7 +81,7 @@ impl Kind {
 
 /// What rows and boxes stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rows {
+pub enum RowKind {
     /// Nodes, by role.
     Nodes,
     /// Nodes of one namespace that live in the same phases.
@@ -90,7 +90,7 @@ pub enum Rows {
     Topics,
 }
 
-impl Rows {
+impl RowKind {
     /// The rows of this word: `nodes`, `groups`, `topics`.
     ///
     /// # Errors
@@ -110,15 +110,15 @@ impl Rows {
 
 /// A figure as it was asked for.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub struct FigureOptions {
     /// Which one.
-    pub kind: Kind,
+    pub kind: FigureKind,
     /// Its width in millimetres, exactly.
     pub width_mm: f64,
     /// The size of names in points, 7 to 12; all other text is 1 pt smaller.
     pub text_pt: f64,
     /// What rows and boxes stand for; as much as fits if `None`.
-    pub rows: Option<Rows>,
+    pub rows: Option<RowKind>,
     /// The boundaries that `Kind::Steps` shows, by the number of the phase that begins, 2..; the largest if empty.
     pub steps: Vec<usize>,
     /// Whether legend and notes are left to the caption.
@@ -127,10 +127,10 @@ pub struct Options {
     pub is_named: bool,
 }
 
-impl Default for Options {
+impl Default for FigureOptions {
     fn default() -> Self {
         Self {
-            kind: Kind::default(),
+            kind: FigureKind::default(),
             width_mm: 88.0,
             text_pt: 7.0,
             rows: None,
@@ -163,11 +163,11 @@ pub(crate) fn figure(
     mission: &Mission,
     filters: (&NameFilter, &NameFilter),
     fonts: &Fonts,
-    options: &Options,
+    options: &FigureOptions,
 ) -> Result<Figure> {
-    let source = Source::new(mission, filters.0, filters.1, options.is_named);
+    let source = FigureSource::new(mission, filters.0, filters.1, options.is_named);
     let sizes = Sizes::of_names(options.text_pt);
-    let sheet = page::Sheet {
+    let sheet = page::FigureSheet {
         source: &source,
         fonts,
         sizes,
@@ -182,6 +182,6 @@ pub(crate) fn figure(
 }
 
 /// A `LaTeX` file that shows the figure of this file name.
-pub(crate) fn latex(figure: &Figure, picture: &str, options: &Options) -> String {
+pub(crate) fn latex(figure: &Figure, picture: &str, options: &FigureOptions) -> String {
     tex::file(figure, picture, options)
 }

@@ -21,10 +21,10 @@ use std::fmt::Write as _;
 use self::arrows::{ArrowPath, Arrows};
 use self::boxes::{Boxes, ItemBox};
 use self::measured::MeasuredGraph;
-use self::page::{Fit, Page};
+use self::page::{GraphFit, PageFrame};
 use self::timeline::Timeline;
 use self::title::Title;
-pub use self::union::{Part, Union, rate_label, sign};
+pub use self::union::{Union, UnionElement, rate_label, sign};
 use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
@@ -94,8 +94,8 @@ pub struct Measured<'a> {
     fonts: &'a Fonts,
     options: PageOptions,
     graph: MeasuredGraph,
-    legend: Vec<Vec<(legend::Sign, String, f64)>>,
-    page: Page,
+    legend: Vec<Vec<(legend::LegendSign, String, f64)>>,
+    page: PageFrame,
 }
 
 impl<'a> Measured<'a> {
@@ -109,7 +109,7 @@ impl<'a> Measured<'a> {
         } else {
             Vec::new()
         };
-        let page = Page::new(style, &options, legend.len());
+        let page = PageFrame::new(style, &options, legend.len());
         Self {
             view,
             style,
@@ -127,8 +127,8 @@ impl<'a> Measured<'a> {
     }
 
     /// What to tell the layout engine of the page.
-    pub fn layout_options(&self) -> layout::Options {
-        layout::Options {
+    pub fn layout_options(&self) -> layout::LayoutOptions {
+        layout::LayoutOptions {
             page: Size::new(self.page.graph.w, self.page.graph.h),
             orientation: self.options.orientation,
         }
@@ -163,7 +163,7 @@ impl<'a> Measured<'a> {
 pub struct Picture<'a> {
     measured: Measured<'a>,
     layout: Layout,
-    fit: Fit,
+    fit: GraphFit,
     /// What never changes of each item and each arrow.
     cards: Vec<ItemBox>,
     tracks: Vec<ArrowPath>,
@@ -381,7 +381,7 @@ impl<'a> Picture<'a> {
     }
 }
 
-fn cards(measured: &Measured<'_>, layout: &Layout, fit: Fit) -> Vec<ItemBox> {
+fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox> {
     let tells = measured::tells(measured.view);
     let items = measured.view.items.iter().zip(&layout.boxes);
     let labels = measured.graph.labels.iter().zip(tells);
@@ -396,7 +396,7 @@ fn cards(measured: &Measured<'_>, layout: &Layout, fit: Fit) -> Vec<ItemBox> {
         .collect()
 }
 
-fn tracks(measured: &Measured<'_>, layout: &Layout, fit: Fit) -> Vec<ArrowPath> {
+fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowPath> {
     let view = measured.view;
     let name = |id: u32| view.items.get(id as usize).map_or("", |item| &*item.name);
     let empty = layout::Route::default();

@@ -43,7 +43,7 @@ pub struct Strip {
 
 /// What a strip is made from.
 #[derive(Clone, Copy)]
-pub struct Source<'a> {
+pub struct StripSource<'a> {
     /// For the mission's start.
     pub mission: &'a Mission,
     /// What is shown.
@@ -64,16 +64,16 @@ pub struct Source<'a> {
 /// # Errors
 /// [`Error::Usage`] for a window that does not exist.
 pub fn strip(
-    source: Source<'_>,
+    source: StripSource<'_>,
     choice: &Choice,
     width_mm: Option<f64>,
     width: f64,
 ) -> Result<Strip> {
     let windows = choice.places(source.view)?;
-    let mut best: Option<(f64, Page, Picture<'_>)> = None;
+    let mut best: Option<(f64, PanelGrid, Picture<'_>)> = None;
     for layout in source.layouts(width_mm.is_some()) {
         let bare = source.bare(&layout);
-        let page = Page::new(choice, windows.len(), &bare, width_mm, width);
+        let page = PanelGrid::new(choice, windows.len(), &bare, width_mm, width);
         // A page that is too high counts as if it were shrunk until it is not.
         let high = page.corner(windows.len().next_multiple_of(page.columns)).y;
         let text = page.text / (high / page.width / HIGHEST).max(1.0);
@@ -133,7 +133,7 @@ fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
 const LARGEST_STRIP: f64 = 24e6;
 
 /// The grid of panels.
-struct Page {
+struct PanelGrid {
     columns: usize,
     width: f64,
     /// The size of a graph on it.
@@ -144,7 +144,7 @@ struct Page {
     text: f64,
 }
 
-impl Page {
+impl PanelGrid {
     fn new(
         choice: &Choice,
         panels: usize,
@@ -186,7 +186,7 @@ impl Page {
     }
 }
 
-impl<'a> Source<'a> {
+impl<'a> StripSource<'a> {
     /// Ways to lay out the graph: as in the picture, and on paper, where room is scarce, for other shapes of panels.
     fn layouts(&self, on_paper: bool) -> Vec<Layout> {
         let mut layouts = vec![self.picture.layout().clone()];
@@ -195,7 +195,7 @@ impl<'a> Source<'a> {
             layouts.extend(SHAPES.map(|high| {
                 let page = Size::new(1000.0, 1000.0 * high);
                 let orientation = None;
-                let options = layout::Options { page, orientation };
+                let options = layout::LayoutOptions { page, orientation };
                 layout::lay_out(measured.plan(), &options, self.engine)
             }));
         }
@@ -213,7 +213,14 @@ impl<'a> Source<'a> {
     }
 
     /// One window with its frame, its time and what changed.
-    fn panel(&self, scene: &Scene, page: &Page, at: usize, window: usize, groups: &mut Vec<Group>) {
+    fn panel(
+        &self,
+        scene: &Scene,
+        page: &PanelGrid,
+        at: usize,
+        window: usize,
+        groups: &mut Vec<Group>,
+    ) {
         let corner = page.corner(at);
         let frame = &self.view.frames[window];
         let mut panel = Group::named(&format!("panel-{}", frame.index));
@@ -258,7 +265,7 @@ impl<'a> Source<'a> {
     }
 
     /// As many of the changes, the most important first, as fit under a panel; the first in any case.
-    fn caption(&self, frame: &Frame, page: &Page) -> String {
+    fn caption(&self, frame: &Frame, page: &PanelGrid) -> String {
         let texts = (1..=frame.caption.len())
             .rev()
             .map(|keep| frame.words(keep));
@@ -269,7 +276,7 @@ impl<'a> Source<'a> {
     }
 
     /// The shared legend from `y` on; returns its height.
-    fn legend(&self, page: &Page, y: f64, groups: &mut Vec<Group>) -> f64 {
+    fn legend(&self, page: &PanelGrid, y: f64, groups: &mut Vec<Group>) -> f64 {
         // A page so small that its legend has the smallest type, then enlarged to that of captions.
         let small = Size::new(page.width, 300.0);
         let size_on = |size: Size| {
@@ -449,7 +456,7 @@ mod tests {
         let (style, fonts) = (Style::builtin("paper").unwrap(), Fonts::bundled());
         let measured = Measured::new(&view, &style, &fonts, PageOptions::default());
         let picture = measured.laid_out(layout::engine("layered").unwrap());
-        let source = Source {
+        let source = StripSource {
             mission: &mission,
             view: &view,
             picture: &picture,

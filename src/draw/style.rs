@@ -174,7 +174,7 @@ impl Style {
     /// # Errors
     /// [`Error::BadFile`] with the line, for what is no TOML, an unknown section or key, or a value of the wrong kind.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
-        let file = File::read(text, path)?;
+        let file = StyleFile::read(text, path)?;
         let mut keys = match file.values.get("base") {
             None => complete(BUILTIN[0].1, path)?,
             Some(Value::String(base)) => builtin_text(base)
@@ -244,19 +244,19 @@ pub fn builtin_text(name: &str) -> Result<&'static str> {
 /// All keys of a built-in style: those it has over those of the first.
 fn complete(text: &str, path: &Path) -> Result<Table> {
     let mut keys: Table = BUILTIN[0].1.parse().unwrap_or_default();
-    File::read(text, path)?.overlay(&mut keys)?;
+    StyleFile::read(text, path)?.overlay(&mut keys)?;
     Ok(keys)
 }
 
 /// A style file with the places of its keys.
-struct File<'a> {
+struct StyleFile<'a> {
     text: &'a str,
     path: &'a Path,
     values: Table,
     places: Spanned<DeTable<'a>>,
 }
 
-impl<'a> File<'a> {
+impl<'a> StyleFile<'a> {
     fn read(text: &'a str, path: &'a Path) -> Result<Self> {
         let no_toml = |e: toml::de::Error| Error::BadFile {
             path: path.to_owned(),

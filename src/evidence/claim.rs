@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::base::budget;
 use crate::base::time::Stamp;
-use crate::evidence::texts::Texts;
+use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
 /// How well something is known. Ordered: the stronger is the smaller.
@@ -194,7 +194,7 @@ pub(crate) struct Claims {
     /// How many publishers each stream was offered by, by the streams' places.
     pub(crate) offers: BTreeMap<usize, u32>,
     /// What nodes log and what messages hold, as text.
-    pub(crate) spoken: Texts,
+    pub(crate) spoken: LoggedTexts,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
     /// The bytes of all texts.

@@ -15,7 +15,7 @@ const UNSET_DAYS: i64 = 3652;
 
 /// Days without a gap of more than [`FAR_DAYS`] between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Cluster {
+struct DayCluster {
     first: i64,
     last: i64,
     messages: u64,
@@ -59,15 +59,15 @@ pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
     }
 }
 
-fn clusters(days: &BTreeMap<i64, u64>) -> Vec<Cluster> {
-    let mut clusters: Vec<Cluster> = Vec::new();
+fn clusters(days: &BTreeMap<i64, u64>) -> Vec<DayCluster> {
+    let mut clusters: Vec<DayCluster> = Vec::new();
     for (day, count) in days {
         match clusters.last_mut() {
             Some(before) if day - before.last <= FAR_DAYS => {
                 before.last = *day;
                 before.messages += count;
             }
-            _ => clusters.push(Cluster {
+            _ => clusters.push(DayCluster {
                 first: *day,
                 last: *day,
                 messages: *count,
@@ -80,8 +80,8 @@ fn clusters(days: &BTreeMap<i64, u64>) -> Vec<Cluster> {
 /// How many clusters are named.
 const NAMED: usize = 3;
 
-fn told(clusters: &[Cluster]) -> String {
-    let one = |c: &Cluster| {
+fn told(clusters: &[DayCluster]) -> String {
+    let one = |c: &DayCluster| {
         let date = Stamp(c.first.saturating_mul(DAY)).to_string();
         let date = date.split('T').next().unwrap_or_default();
         format!("{} messages from {date}", c.messages)

@@ -25,7 +25,7 @@ use crate::base::words;
 use crate::evidence::topology::launch;
 use declaration::FileCode;
 use files::{FileKind, Files, SourceFile};
-use workspace::{Instance, Placed, Workspace};
+use workspace::{FileDeclaration, Instance, Workspace};
 
 /// Which code to read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,7 +55,7 @@ pub enum Version {
 pub struct Code {
     instances: Vec<Instance>,
     /// Every place in the code that declares something.
-    places: Vec<Placed>,
+    places: Vec<FileDeclaration>,
     files: usize,
     packages: usize,
     /// Which commit was read, in words.
@@ -70,8 +70,8 @@ pub struct Code {
 /// If the folder cannot be read, or a commit that was asked for is not there.
 pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
     let (files, version, mut notices) = match git::files(&wanted.folder, &wanted.version, end)? {
-        git::Found::Commit { files, words } => (files, Some(words), Vec::new()),
-        git::Found::Lying { note } => {
+        git::Checkout::Commit { files, words } => (files, Some(words), Vec::new()),
+        git::Checkout::Lying { note } => {
             let note = note.map(|text| Notice::new(NoticeKind::Note, text));
             (
                 files::of_folder(&wanted.folder)?,

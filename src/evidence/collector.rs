@@ -13,8 +13,8 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claims, SourceId};
-use crate::evidence::message::cursor::Cursor;
-use crate::evidence::message::dynamic::Schema;
+use crate::evidence::message::cursor::PayloadCursor;
+use crate::evidence::message::dynamic::MessageSchema;
 use crate::evidence::proof::{Reliability, Stream};
 use crate::evidence::publishers;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
@@ -22,7 +22,7 @@ use crate::evidence::times::Stamps;
 
 /// What to look at while reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Options {
+pub struct CollectOptions {
     /// Know every payload's size, even if that means reading more than the index.
     pub sizes: bool,
     /// Keep every piece of evidence on the elements with all of these names (one: a node or topic; two: an edge).
@@ -36,7 +36,7 @@ pub struct Options {
     pub texts_of: Option<String>,
 }
 
-impl Default for Options {
+impl Default for CollectOptions {
     fn default() -> Self {
         Self {
             sizes: false,
@@ -61,14 +61,14 @@ const PAYLOAD_ENTRY: u64 = 64;
 /// Takes in bags, one after another.
 #[derive(Debug, Default)]
 pub struct Collector {
-    options: Options,
+    options: CollectOptions,
     streams: Vec<Stream>,
     /// Who reads the messages of each stream.
     readers: Vec<Vec<(SourceId, Read)>>,
     /// Whether the header stamps of each stream are wanted.
     stamped: Vec<bool>,
     /// How to take the messages of each stream apart for words and numbers, where they hold any.
-    schemas: Vec<Option<Schema>>,
+    schemas: Vec<Option<MessageSchema>>,
     /// Bytes of payload compared so far.
     compared: u64,
     /// Whether the messages of each stream are texts that are kept.
@@ -82,7 +82,7 @@ pub struct Collector {
 
 impl Collector {
     /// A collector of nothing yet.
-    pub fn new(options: Options) -> Self {
+    pub fn new(options: CollectOptions) -> Self {
         let mut all = Self::default();
         all.facts.watched.clone_from(&options.why);
         all.options = options;
@@ -142,7 +142,7 @@ impl Collector {
                 source: *source,
                 time: Some(message.time),
             };
-            let done = Cursor::new(&stream.connection.encoding, message.data)
+            let done = PayloadCursor::new(&stream.connection.encoding, message.data)
                 .and_then(|mut payload| read(&mut heard, &mut payload));
             if done.is_err() {
                 self.notices
@@ -157,8 +157,8 @@ impl Collector {
             return;
         }
         let encoding = &self.streams[place].connection.encoding;
-        let mut cursor = Cursor::new(encoding, message.data);
-        if let Ok(Ok(text)) = cursor.as_mut().map(Cursor::string) {
+        let mut cursor = PayloadCursor::new(encoding, message.data);
+        if let Ok(Ok(text)) = cursor.as_mut().map(PayloadCursor::string) {
             let text = text.chars().take(LONGEST_TEXT).collect();
             self.texts.push((message.time, text));
         }

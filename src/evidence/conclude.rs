@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::collector::{Recorded, spool_error};
 use super::restarts::{Restarts, restarts};
-use super::values::Values;
+use super::values::StatedValues;
 use crate::base::error::Result;
 use crate::base::nearest::nearest;
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -15,14 +15,14 @@ use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claims, Name};
 use crate::evidence::code::{Code, matching};
-use crate::evidence::proof::{Conclusions, Key, Proof, Stream, Validity, offers};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Stream, Validity, offers};
 use crate::evidence::times::Stamps;
-use crate::evidence::topology::{Element, Entry, Topology};
+use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
 
 /// What is added to what the bags tell.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Options {
+pub struct ConcludeOptions {
     /// Whether nodes whose names differ only in an anonymous suffix are one, under the name of their role.
     pub roles: bool,
     /// Nodes and edges that the user knows of.
@@ -43,12 +43,12 @@ pub struct Findings {
     /// When nodes began anew under the same name.
     pub(crate) restarts: Restarts,
     /// What somebody states of elements besides their being there.
-    pub(crate) values: Values,
+    pub(crate) values: StatedValues,
     /// How many publishers the bags count on each topic.
     pub(crate) offers: BTreeMap<Name, u32>,
     /// The texts of all names.
     names: Vec<Arc<str>>,
-    /// Every piece of evidence on what [`super::collector::Options::why`] asks for, in order of time, source and text.
+    /// Every piece of evidence on what [`super::collector::CollectOptions::why`] asks for, in order of time, source and text.
     pub lines: Vec<EvidenceLine>,
     /// What is worth saying about what the user gave.
     pub notices: Notices,
@@ -68,11 +68,11 @@ impl Findings {
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub fn conclude(recorded: &Recorded, options: &Options) -> Result<Findings> {
+pub fn conclude(recorded: &Recorded, options: &ConcludeOptions) -> Result<Findings> {
     findings(recorded, options).map_err(spool_error)
 }
 
-fn findings(recorded: &Recorded, options: &Options) -> io::Result<Findings> {
+fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findings> {
     let start = recorded.span.map_or(Stamp(0), |s| s.start);
     let end = recorded.span.map_or(Stamp(0), |s| s.end.plus(-1));
     let mut known = Conclusions::new(&recorded.streams, recorded.facts.clone(), (start, end));
@@ -130,7 +130,7 @@ fn findings(recorded: &Recorded, options: &Options) -> io::Result<Findings> {
     Ok(Findings {
         mission: (start, end),
         restarts: restarts(recorded, &streams, &proofs)?,
-        values: Values::new(&facts, role)?,
+        values: StatedValues::new(&facts, role)?,
         offers: offers(&facts.offers, &streams),
         names: facts.into_texts(),
         streams,
@@ -142,7 +142,7 @@ fn findings(recorded: &Recorded, options: &Options) -> io::Result<Findings> {
 }
 
 /// Names of the user's that nothing in the bags bears: topics, and nodes that come close to one that is known.
-fn strangers(known: &Conclusions<'_>, entries: &[Entry]) -> Vec<Notice> {
+fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> {
     let texts = |names: &mut dyn Iterator<Item = Name>| -> BTreeSet<Arc<str>> {
         names.map(|name| known.text(name)).collect()
     };
@@ -151,9 +151,9 @@ fn strangers(known: &Conclusions<'_>, entries: &[Entry]) -> Vec<Notice> {
     let mut told = BTreeMap::new();
     for entry in entries.iter().filter(|e| !e.declared) {
         let (node, topic) = match &entry.element {
-            Element::Node(node) => (Some(node), None),
-            Element::Topic(topic) => (None, Some(topic)),
-            Element::Publish(node, topic) | Element::Subscribe(node, topic) => {
+            NamedElement::Node(node) => (Some(node), None),
+            NamedElement::Topic(topic) => (None, Some(topic)),
+            NamedElement::Publish(node, topic) | NamedElement::Subscribe(node, topic) => {
                 (Some(node), Some(topic))
             }
         };
@@ -182,10 +182,10 @@ fn strangers(known: &Conclusions<'_>, entries: &[Entry]) -> Vec<Notice> {
 fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     let name = |name: Name| known.facts.text(name);
     let told = |what| match what {
-        Key::Node(node) => format!("{} lives", name(node)),
-        Key::Topic(topic) => format!("{} exists", name(topic)),
-        Key::Publish(node, topic) => format!("{} publishes {}", name(node), name(topic)),
-        Key::Subscribe(topic, node) => format!("{} subscribes {}", name(node), name(topic)),
+        ElementKey::Node(node) => format!("{} lives", name(node)),
+        ElementKey::Topic(topic) => format!("{} exists", name(topic)),
+        ElementKey::Publish(node, topic) => format!("{} publishes {}", name(node), name(topic)),
+        ElementKey::Subscribe(topic, node) => format!("{} subscribes {}", name(node), name(topic)),
     };
     let mut pieces = Vec::new();
     for proof in &known.proofs {
@@ -236,13 +236,13 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
 }
 
 /// Adds what the user's file says to what is known.
-fn told(known: &mut Conclusions<'_>, entry: &Entry, mission: (Stamp, Stamp)) {
+fn told(known: &mut Conclusions<'_>, entry: &TopologyEntry, mission: (Stamp, Stamp)) {
     let mut name = |text: &String| known.facts.name(text);
     let what = match &entry.element {
-        Element::Node(node) => Key::Node(name(node)),
-        Element::Topic(topic) => Key::Topic(name(topic)),
-        Element::Publish(node, topic) => Key::Publish(name(node), name(topic)),
-        Element::Subscribe(node, topic) => Key::Subscribe(name(topic), name(node)),
+        NamedElement::Node(node) => ElementKey::Node(name(node)),
+        NamedElement::Topic(topic) => ElementKey::Topic(name(topic)),
+        NamedElement::Publish(node, topic) => ElementKey::Publish(name(node), name(topic)),
+        NamedElement::Subscribe(node, topic) => ElementKey::Subscribe(name(topic), name(node)),
     };
     let at = |offset: Option<i64>, without| offset.map_or(without, |ns| mission.0.plus(ns));
     // The end itself is not in it any more.

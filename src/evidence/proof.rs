@@ -46,7 +46,7 @@ pub(crate) enum Reliability {
 
 /// A node, a topic or an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Key {
+pub(crate) enum ElementKey {
     Node(Name),
     Topic(Name),
     /// Node, topic.
@@ -55,7 +55,7 @@ pub(crate) enum Key {
     Subscribe(Name, Name),
 }
 
-impl Key {
+impl ElementKey {
     /// The names in it.
     pub(crate) fn names(self) -> [Option<Name>; 2] {
         match self {
@@ -99,7 +99,7 @@ pub(crate) enum Validity {
     /// At these moments; what holds only then is not known to last.
     Moments(Vec<Stamp>),
     /// As long as this other element lives.
-    Like(Key),
+    Like(ElementKey),
     /// For the whole mission, unless signs tell when.
     Whole,
     /// From the first sign to the mission's end: it writes the bag.
@@ -111,7 +111,7 @@ pub(crate) enum Validity {
 /// One reason to believe in an element.
 #[derive(Clone, Debug)]
 pub(crate) struct Proof {
-    pub(crate) what: Key,
+    pub(crate) what: ElementKey,
     pub(crate) source: SourceId,
     pub(crate) degree: Degree,
     pub(crate) when: Validity,
@@ -134,7 +134,7 @@ pub(crate) struct Conclusions<'a> {
     pub(crate) facts: Claims,
     pub(crate) proofs: Vec<Proof>,
     /// Reasons that were put into words by who gave them, while somebody asks why.
-    pub(crate) worded: BTreeSet<(Key, SourceId)>,
+    pub(crate) worded: BTreeSet<(ElementKey, SourceId)>,
     /// Publications whose messages are those of another topic, byte by byte.
     pub(crate) copies: BTreeSet<(Name, Name)>,
     /// The mission's first and last moment.
@@ -177,18 +177,18 @@ impl<'a> Conclusions<'a> {
     /// Adds a reason.
     pub(crate) fn prove(&mut self, proof: Proof) {
         match proof.what {
-            Key::Node(node) => {
+            ElementKey::Node(node) => {
                 self.nodes.insert(node);
             }
-            Key::Subscribe(topic, node) => {
+            ElementKey::Subscribe(topic, node) => {
                 self.nodes.insert(node);
                 self.subscribers.entry(topic).or_default().insert(node);
             }
-            Key::Publish(node, topic) => {
+            ElementKey::Publish(node, topic) => {
                 self.nodes.insert(node);
                 self.publishers.entry(topic).or_default().insert(node);
             }
-            Key::Topic(_) => {}
+            ElementKey::Topic(_) => {}
         }
         self.proofs.push(proof);
     }
@@ -218,8 +218,8 @@ impl<'a> Conclusions<'a> {
     pub(crate) fn infer(
         &mut self,
         source: SourceId,
-        what: Key,
-        basis: Key,
+        what: ElementKey,
+        basis: ElementKey,
         words: impl FnOnce(&Self) -> String,
     ) {
         if !self.knows(what) && !self.denies(what) {
@@ -241,7 +241,7 @@ impl<'a> Conclusions<'a> {
         topic: Name,
         words: impl Fn(&Self) -> String,
     ) {
-        let what = Key::Publish(node, topic);
+        let what = ElementKey::Publish(node, topic);
         if self.knows(what) || self.denies(what) {
             return;
         }
@@ -259,17 +259,17 @@ impl<'a> Conclusions<'a> {
     }
 
     /// Whether somebody gave a reason for this element already.
-    pub(crate) fn knows(&self, what: Key) -> bool {
+    pub(crate) fn knows(&self, what: ElementKey) -> bool {
         match what {
-            Key::Node(node) => self.nodes.contains(&node),
-            Key::Topic(topic) => self.is_recorded(topic),
-            Key::Publish(node, topic) => self.publishers(topic).any(|n| n == node),
-            Key::Subscribe(topic, node) => self.subscribers(topic).any(|n| n == node),
+            ElementKey::Node(node) => self.nodes.contains(&node),
+            ElementKey::Topic(topic) => self.is_recorded(topic),
+            ElementKey::Publish(node, topic) => self.publishers(topic).any(|n| n == node),
+            ElementKey::Subscribe(topic, node) => self.subscribers(topic).any(|n| n == node),
         }
     }
 
     /// Whether a complete list, or every message's own header, speaks against an edge.
-    pub(crate) fn denies(&mut self, what: Key) -> bool {
+    pub(crate) fn denies(&mut self, what: ElementKey) -> bool {
         self.closed(|closed| closed.lists_deny(what) || closed.headers_deny(what))
     }
 
@@ -365,7 +365,7 @@ impl<'a> Conclusions<'a> {
 
     /// By a convention, `what` lives as long as `basis`, unless a complete list leaves it out. Headers say nothing
     /// against it: what a node publishes by convention is often silent.
-    pub(crate) fn like(&mut self, source: SourceId, what: Key, basis: Key) {
+    pub(crate) fn like(&mut self, source: SourceId, what: ElementKey, basis: ElementKey) {
         if self.closed(|closed| closed.settled_lists_deny(what)) {
             return;
         }
@@ -387,8 +387,8 @@ impl<'a> Conclusions<'a> {
     ) {
         self.like(
             source,
-            Key::Subscribe(topic, node),
-            Key::Publish(node, basis),
+            ElementKey::Subscribe(topic, node),
+            ElementKey::Publish(node, basis),
         );
     }
 

@@ -10,7 +10,7 @@ use crate::evidence::proof::{Reliability, Stream};
 
 /// Lowers the trust in streams whose header cannot be believed; says so once per bag.
 pub(crate) fn judge(streams: &mut [Stream], facts: &Claims) -> Vec<Notice> {
-    let named = Named::new(facts);
+    let named = NamedTopics::new(facts);
     let mut notices = Vec::new();
     let mut bags: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (at, stream) in streams.iter().enumerate() {
@@ -53,13 +53,13 @@ const PLAYBACK: &str =
     "the bag was recorded during a playback, so the player publishes what other nodes did once";
 
 /// Who names which topic as its own in log records and the like.
-struct Named {
+struct NamedTopics {
     topics: BTreeMap<Name, BTreeSet<Name>>,
     /// Names that log over the connection of another.
     guests: BTreeMap<Name, BTreeSet<Name>>,
 }
 
-impl Named {
+impl NamedTopics {
     fn new(facts: &Claims) -> Self {
         let mut all = Self {
             topics: BTreeMap::new(),
@@ -86,7 +86,7 @@ impl Named {
 }
 
 /// Whether a bag has no topic with two publishers, and one log connection that several nodes log over.
-fn rewritten(streams: &[Stream], of_bag: &[usize], named: &Named, facts: &Claims) -> bool {
+fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics, facts: &Claims) -> bool {
     let mut topics = BTreeSet::new();
     if !of_bag.iter().all(|at| topics.insert(streams[*at].topic)) {
         return false;

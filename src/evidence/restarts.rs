@@ -7,7 +7,7 @@ use std::io;
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::Recorded;
-use crate::evidence::proof::{Key, Proof, Reliability, Stream, Validity};
+use crate::evidence::proof::{ElementKey, Proof, Reliability, Stream, Validity};
 use crate::evidence::times::SeriesId;
 
 /// A break in a node's life: its last sign before, its first one after.
@@ -76,8 +76,10 @@ fn own_streams(streams: &[Stream]) -> BTreeMap<Name, Vec<usize>> {
 /// When somebody said something of a node.
 fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
     let of_node = proofs.iter().filter(move |proof| match proof.what {
-        Key::Node(name) | Key::Publish(name, _) | Key::Subscribe(_, name) => name == node,
-        Key::Topic(_) => false,
+        ElementKey::Node(name) | ElementKey::Publish(name, _) | ElementKey::Subscribe(_, name) => {
+            name == node
+        }
+        ElementKey::Topic(_) => false,
     });
     of_node
         .flat_map(|proof| match &proof.when {

@@ -35,8 +35,8 @@ pub(crate) mod topic_statistics;
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Claims, Degree, Name, SourceId, Statement};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::{Fit, Shape};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::{LayoutFit, MessageLayout};
 use crate::evidence::proof::{Conclusions, Stream};
 
 /// A kind of evidence.
@@ -46,7 +46,7 @@ pub struct Source {
     /// What it reads, in one line.
     pub about: &'static str,
     /// The layouts of the messages that it reads.
-    pub(crate) reads: &'static [(Shape, Read)],
+    pub(crate) reads: &'static [(MessageLayout, Read)],
     /// Whether a node says it of itself, so that it was there when it did.
     pub(crate) own: bool,
     /// What the announcement of a connection says.
@@ -111,7 +111,8 @@ impl SourceContext<'_> {
 }
 
 /// A reader of one layout.
-pub(crate) type Read = fn(&mut SourceContext<'_>, &mut Cursor<'_>) -> cursor::Result<()>;
+pub(crate) type Read =
+    fn(&mut SourceContext<'_>, &mut PayloadCursor<'_>) -> cursor::PayloadResult<()>;
 
 /// The sources that read a connection's messages, with how; and whether some source knows its type by another layout.
 pub(crate) fn readers(stream: &Stream) -> (Vec<(SourceId, Read)>, bool) {
@@ -122,8 +123,10 @@ pub(crate) fn readers(stream: &Stream) -> (Vec<(SourceId, Read)>, bool) {
             .reads
             .iter()
             .map(|(shape, read)| (read, shape.fit(&stream.connection)));
-        let known: Vec<_> = fits.filter(|(_, fit)| *fit != Fit::OtherType).collect();
-        match known.iter().find(|(_, fit)| *fit == Fit::Same) {
+        let known: Vec<_> = fits
+            .filter(|(_, fit)| *fit != LayoutFit::OtherType)
+            .collect();
+        match known.iter().find(|(_, fit)| *fit == LayoutFit::Same) {
             Some((read, _)) => readers.push((id, **read)),
             None => foreign |= !known.is_empty(),
         }

@@ -8,7 +8,7 @@ use crate::base::time::Stamp;
 
 /// A text of a logger.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Said {
+pub(crate) struct LoggedText {
     pub(crate) time: Stamp,
     pub(crate) logger: Arc<str>,
     pub(crate) text: Box<str>,
@@ -16,7 +16,7 @@ pub(crate) struct Said {
 
 /// A value in a message of the stream at a place.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Shown {
+pub(crate) struct ShownValue {
     pub(crate) time: Stamp,
     pub(crate) stream: usize,
     /// The place of its field in the message.
@@ -26,9 +26,9 @@ pub(crate) struct Shown {
 
 /// Texts of both sides.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Texts {
-    said: Vec<Said>,
-    shown: Vec<Shown>,
+pub(crate) struct LoggedTexts {
+    said: Vec<LoggedText>,
+    shown: Vec<ShownValue>,
     /// Bytes of texts on either side.
     bytes: [usize; 2],
 }
@@ -38,12 +38,12 @@ const MOST: usize = 2 << 20;
 /// What a short text takes besides its bytes.
 const ENTRY: usize = 48;
 
-impl Texts {
+impl LoggedTexts {
     /// Takes in a text of a logger.
     pub(crate) fn say(&mut self, time: Stamp, logger: &str, text: &str) {
         self.bytes[0] += text.len() + ENTRY;
         if self.bytes[0] <= MOST {
-            self.said.push(Said {
+            self.said.push(LoggedText {
                 time,
                 logger: logger.into(),
                 text: text.into(),
@@ -55,7 +55,7 @@ impl Texts {
     pub(crate) fn show(&mut self, time: Stamp, (stream, field): (usize, usize), value: &str) {
         self.bytes[1] += value.len() + ENTRY;
         if self.bytes[1] <= MOST {
-            self.shown.push(Shown {
+            self.shown.push(ShownValue {
                 time,
                 stream,
                 field,
@@ -65,7 +65,7 @@ impl Texts {
     }
 
     /// Both sides, sorted; of values that a field repeats only the first.
-    pub(crate) fn sorted(&self) -> (Vec<Said>, Vec<Shown>) {
+    pub(crate) fn sorted(&self) -> (Vec<LoggedText>, Vec<ShownValue>) {
         let (mut said, mut shown) = (self.said.clone(), self.shown.clone());
         said.sort_unstable();
         shown.sort_unstable();
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn what_a_field_repeats_is_kept_once() {
-        let mut texts = Texts::default();
+        let mut texts = LoggedTexts::default();
         for (time, value) in [(3, "b"), (1, "a"), (2, "a"), (4, "a")] {
             texts.show(Stamp(time), (0, 0), value);
         }
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn either_side_is_bounded() {
-        let mut texts = Texts::default();
+        let mut texts = LoggedTexts::default();
         let long = "x".repeat(1 << 20);
         (0..9).for_each(|n| texts.say(Stamp(n), "/a", &long));
         texts.show(Stamp(0), (0, 0), "kept");

@@ -29,7 +29,7 @@ pub(crate) struct SeriesId(pub u32);
 
 /// An encoded run of stamps and where it lies.
 #[derive(Clone, Debug)]
-struct Block {
+struct StampBlock {
     first: Stamp,
     last: Stamp,
     at: u64,
@@ -38,9 +38,9 @@ struct Block {
 }
 
 #[derive(Clone, Debug, Default)]
-struct Series {
+struct OpenSeries {
     open: Vec<(Stamp, u32)>,
-    blocks: Vec<Block>,
+    blocks: Vec<StampBlock>,
     count: u64,
     /// Whether some message came without its size.
     size_unknown: bool,
@@ -50,7 +50,7 @@ struct Series {
 /// Any number of sequences of times, each message with its size where that is known.
 #[derive(Debug)]
 pub(crate) struct Stamps {
-    series: Vec<Series>,
+    series: Vec<OpenSeries>,
     /// Locked because reading moves its position.
     spool: Mutex<SpooledTempFile>,
     written: u64,
@@ -76,7 +76,7 @@ impl Default for Stamps {
 impl Stamps {
     /// A new, empty sequence.
     pub(crate) fn series(&mut self) -> SeriesId {
-        self.series.push(Series::default());
+        self.series.push(OpenSeries::default());
         SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
     }
 
@@ -159,7 +159,7 @@ impl Stamps {
         Ok(times)
     }
 
-    fn get(&self, id: SeriesId) -> Option<&Series> {
+    fn get(&self, id: SeriesId) -> Option<&OpenSeries> {
         self.series.get(id.0 as usize)
     }
 
@@ -167,7 +167,7 @@ impl Stamps {
         self.spool.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn load(&self, block: &Block) -> io::Result<Vec<(Stamp, u32)>> {
+    fn load(&self, block: &StampBlock) -> io::Result<Vec<(Stamp, u32)>> {
         let mut bytes = vec![0; block.bytes as usize];
         let mut spool = self.spool();
         spool.seek(SeekFrom::Start(block.at))?;
@@ -179,7 +179,7 @@ impl Stamps {
 
 /// Sorts and writes the open stamps of a series.
 fn close(
-    series: &mut Series,
+    series: &mut OpenSeries,
     spool: &mut SpooledTempFile,
     written: &mut u64,
     days: &mut BTreeMap<i64, u64>,
@@ -196,7 +196,7 @@ fn close(
         *days.entry(run[0].0.0.div_euclid(DAY)).or_default() += run.len() as u64;
     }
     let bytes = block::encode(&open);
-    series.blocks.push(Block {
+    series.blocks.push(StampBlock {
         first,
         last,
         at: *written,

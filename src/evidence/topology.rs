@@ -20,7 +20,7 @@ use crate::base::notice::{Notice, NoticeKind};
 
 /// An element by its names.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Element {
+pub enum NamedElement {
     /// A node.
     Node(String),
     /// A topic.
@@ -33,9 +33,9 @@ pub enum Element {
 
 /// One thing that a file says.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Entry {
+pub struct TopologyEntry {
     /// What there is.
-    pub element: Element,
+    pub element: NamedElement,
     /// From when, in nanoseconds after the mission's start; `None`: from the start.
     pub from_ns: Option<i64>,
     /// Until when, exclusive; `None`: to the end.
@@ -50,7 +50,7 @@ pub struct Entry {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
     /// Nodes and edges.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<TopologyEntry>,
     /// What could not be used: includes that were not found, nodes without a name.
     pub notices: Vec<Notice>,
 }

@@ -8,7 +8,7 @@ use crate::base::name::is_quiet;
 use crate::base::words::count;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Degree, Name};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 use crate::evidence::source::contract::Owners;
 
 /// Adds a box for every recorded topic that lacks publishers.
@@ -65,14 +65,14 @@ fn add(
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
     let node = known.facts.name(name);
     // It comes and goes with its topic, of whose life it says nothing.
-    let topics = || Validity::Like(Key::Topic(topic));
+    let topics = || Validity::Like(ElementKey::Topic(topic));
     let life = if word == "unknown" {
         topics()
     } else {
         Validity::Whole
     };
-    let edge = (Key::Publish(node, topic), topics());
-    for (what, when) in [(Key::Node(node), life), edge] {
+    let edge = (ElementKey::Publish(node, topic), topics());
+    for (what, when) in [(ElementKey::Node(node), life), edge] {
         let proof = Proof {
             what,
             source,

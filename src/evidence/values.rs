@@ -9,14 +9,14 @@ use crate::evidence::claim::{Claim, Claims, Name};
 
 /// Stated values by node or topic.
 #[derive(Debug, Default)]
-pub(crate) struct Values {
+pub(crate) struct StatedValues {
     /// When a node entered which state, sorted.
     states: BTreeMap<Name, Vec<(Stamp, Arc<str>)>>,
     types: BTreeMap<Name, BTreeSet<Arc<str>>>,
     qualities: BTreeMap<Name, BTreeSet<Arc<str>>>,
 }
 
-impl Values {
+impl StatedValues {
     pub(crate) fn new(facts: &Claims, role: impl Fn(Name) -> Name) -> io::Result<Self> {
         let mut all = Self::default();
         for fact in &facts.list {

@@ -3,11 +3,11 @@
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{Encoder, Frame, Needs, Pack, Packet, Written};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::export::palette::{self, Area, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
 struct Apng {
@@ -19,7 +19,7 @@ struct Apng {
 
 /// The file, shared with the writer, which does not give it back.
 #[derive(Clone)]
-struct Shared(Arc<Mutex<Sink>>);
+struct Shared(Arc<Mutex<OutputSink>>);
 
 impl Write for Shared {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -44,7 +44,7 @@ pub(crate) fn start<'a>(
     Ok(Box::new(Apng {
         target: target.clone(),
         frames: sequence.frame_times().len(),
-        out: Shared(Arc::new(Mutex::new(Sink::create(
+        out: Shared(Arc::new(Mutex::new(OutputSink::create(
             target,
             sequence.options.max_bytes,
         )?))),
@@ -102,7 +102,7 @@ impl Encoder for Apng {
 
 /// What differs from the frame before; one pixel where nothing does, as every frame needs some.
 #[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
-fn pack(frame: &Frame<'_>) -> Result<Packet> {
+fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
     if frame.before.is_empty() {
         return Ok(Packet::Bytes(frame.indices.to_vec()));
     }

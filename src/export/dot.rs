@@ -4,20 +4,20 @@ use std::io::Write as _;
 
 use crate::base::error::Result;
 use crate::base::words;
-use crate::draw::paint::dot::Drawing;
+use crate::draw::paint::dot::DotView;
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::export::options::Profile;
 use crate::export::sequence::Sequence;
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::export::{Encoder, Written};
 use crate::view::union::union;
 
-struct Graphs<'a> {
+struct DotEncoder<'a> {
     sequence: &'a Sequence<'a>,
     target: Target,
-    drawing: Drawing<'a>,
+    drawing: DotView<'a>,
 }
 
 /// Begins a file per window; without `{n}` one file with the single window or the union of all.
@@ -25,24 +25,24 @@ pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
-    let drawing = Drawing::new(sequence.mission, sequence.view, Style::builtin("light")?);
+    let drawing = DotView::new(sequence.mission, sequence.view, Style::builtin("light")?);
     let drawing = match sequence.options.dot_profile {
         Profile::Rqt => drawing.laid_out(&Fonts::bundled()),
         Profile::Plain => drawing,
     };
-    Ok(Box::new(Graphs {
+    Ok(Box::new(DotEncoder {
         sequence,
         target: target.clone(),
         drawing,
     }))
 }
 
-impl Encoder for Graphs<'_> {
+impl Encoder for DotEncoder<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut written = Written::to(&self.target);
         let frames = &self.sequence.view.frames;
         let mut write = |target: &Target, text: &str| -> Result<()> {
-            let mut sink = Sink::create(target, None)?;
+            let mut sink = OutputSink::create(target, None)?;
             sink.write_all(text.as_bytes()).map_err(sink.error())?;
             written.add(sink.commit()?);
             Ok(())
@@ -64,7 +64,7 @@ impl Encoder for Graphs<'_> {
     }
 }
 
-impl Graphs<'_> {
+impl DotEncoder<'_> {
     /// The bags' names, and the window with its time.
     fn title(&self, window: Option<usize>) -> String {
         let mission = self.sequence.mission;

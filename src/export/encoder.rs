@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::palette::{Area, Palette};
 use super::sequence::{FrameTime, Sequence};
-use super::sink::Sink;
+use super::sink::OutputSink;
 use super::target::Target;
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
@@ -26,7 +26,7 @@ pub enum Needs {
 
 /// One frame as all encoders of its size share it, on the core that drew it.
 #[derive(Clone, Copy)]
-pub struct Frame<'a> {
+pub struct DrawnFrame<'a> {
     /// What it shows and for how long.
     pub time: FrameTime,
     /// The drawing.
@@ -55,7 +55,7 @@ pub enum Packet {
 }
 
 /// Makes a packet of a frame. It runs on any core, for several frames at a time and in any order.
-pub(crate) type Pack = fn(&Frame<'_>) -> Result<Packet>;
+pub(crate) type Pack = fn(&DrawnFrame<'_>) -> Result<Packet>;
 
 /// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -191,7 +191,7 @@ impl<'a, W: FnOnce() -> (String, Vec<String>) + Send + 'a> AtOnce<W> {
 impl<W: FnOnce() -> (String, Vec<String>) + Send> Encoder for AtOnce<W> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut written = Written::to(&self.target);
-        let mut sink = Sink::create(&self.target, None)?;
+        let mut sink = OutputSink::create(&self.target, None)?;
         let (text, remarks) = (self.write)();
         sink.write_all(text.as_bytes()).map_err(sink.error())?;
         written.remarks = remarks;
@@ -216,7 +216,7 @@ pub enum OneDrawing {
 
 /// An output format.
 #[derive(Debug)]
-pub struct Format {
+pub struct OutputFormat {
     /// Its extension and its word for `--format`.
     pub word: &'static str,
     /// What it is, for `--help` and the README.
@@ -236,7 +236,7 @@ pub struct Format {
 }
 
 /// What formats of drawings have in common.
-pub(crate) const PICTURE: Format = Format {
+pub(crate) const PICTURE: OutputFormat = OutputFormat {
     word: "",
     what: "",
     is_drawn: true,
@@ -248,19 +248,19 @@ pub(crate) const PICTURE: Format = Format {
 };
 
 /// What formats that play have in common.
-pub(crate) const ANIMATION: Format = Format {
+pub(crate) const ANIMATION: OutputFormat = OutputFormat {
     is_limited: true,
     ..PICTURE
 };
 
 /// What formats of single images have in common.
-pub(crate) const IMAGE: Format = Format {
+pub(crate) const IMAGE: OutputFormat = OutputFormat {
     whole: OneDrawing::Always,
     ..PICTURE
 };
 
 /// What formats that hold the graph itself have in common.
-pub(crate) const DATA: Format = Format {
+pub(crate) const DATA: OutputFormat = OutputFormat {
     is_drawn: false,
     is_viewed: false,
     ..PICTURE
@@ -302,7 +302,7 @@ pub(crate) mod testing {
             phase: 1.0,
             ms: 100,
         };
-        pack(&Frame {
+        pack(&DrawnFrame {
             time: frame_time,
             scene: &scene,
             pixels: &pixels,

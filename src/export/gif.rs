@@ -2,11 +2,11 @@
 
 use std::io::{self, Write};
 
-use super::{Encoder, Frame, Needs, Pack, Packet, Written};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::export::palette::{self, Area, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
 /// The shortest time a frame is shown, in units of 10 ms as GIF counts: browsers slow down anything faster.
@@ -17,8 +17,8 @@ const LONGEST: u64 = 65_535;
 struct Gif {
     target: Target,
     /// The file until the first frame comes.
-    sink: Option<Sink>,
-    animation: Option<Animation<Sink>>,
+    sink: Option<OutputSink>,
+    animation: Option<Animation<OutputSink>>,
 }
 
 /// Begins the animation.
@@ -32,7 +32,7 @@ pub(crate) fn start<'a>(
     target.must_be_one("an animation holds all windows")?;
     Ok(Box::new(Gif {
         target: target.clone(),
-        sink: Some(Sink::create(target, sequence.options.max_bytes)?),
+        sink: Some(OutputSink::create(target, sequence.options.max_bytes)?),
         animation: None,
     }))
 }
@@ -92,7 +92,7 @@ impl Encoder for Gif {
 
 /// The frame as GIF compresses it: all of it, or the area that differs from the frame before.
 #[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
-fn pack(frame: &Frame<'_>) -> Result<Packet> {
+fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
     let width = frame.pixels.width as usize;
     let clear = clear(frame.palette);
     let (area, pixels) = if frame.before.is_empty() {

@@ -11,7 +11,7 @@ use crate::base::geometry::Rect;
 use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::board::Overview;
-use crate::draw::paint::classes::{self, Classes, Detail, ElementLook};
+use crate::draw::paint::classes::{self, ClassDetail, Classes, ElementLook};
 use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
 use crate::draw::picture::{Union, rate_label};
@@ -27,7 +27,7 @@ const LOOK: &str = include_str!("../../styles/player.css");
 
 /// What a page is made of.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Page<'a> {
+pub(crate) struct HtmlPage<'a> {
     /// The whole sequence.
     pub mission: &'a Mission,
     /// What is shown of it.
@@ -44,7 +44,7 @@ pub(crate) struct Page<'a> {
     pub overview: Option<&'a Overview>,
 }
 
-impl Page<'_> {
+impl HtmlPage<'_> {
     /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
     pub(crate) fn write(&self) -> String {
         let runs = Runs::of(self.view, rate_label);
@@ -111,7 +111,7 @@ impl Page<'_> {
 
     /// The graph as it is in the window at place `still`, which is what a reader without scripts sees.
     fn graph(&self, runs: &Runs, still: usize) -> String {
-        let detail = Detail {
+        let detail = ClassDetail {
             is_fine: true,
             has_names: true,
         };

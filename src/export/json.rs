@@ -3,11 +3,11 @@
 use super::{Encoder, Written};
 use crate::base::error::Result;
 use crate::export::sequence::Sequence;
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::mission::Json;
 
-struct Data<'a> {
+struct JsonEncoder<'a> {
     json: Json<'a>,
     target: Target,
 }
@@ -21,7 +21,7 @@ pub(crate) fn start<'a>(
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
     target.must_be_one("the data of all windows is one file")?;
-    Ok(Box::new(Data {
+    Ok(Box::new(JsonEncoder {
         json: Json {
             mission: sequence.data,
             places: sequence.places,
@@ -31,9 +31,9 @@ pub(crate) fn start<'a>(
     }))
 }
 
-impl Encoder for Data<'_> {
+impl Encoder for JsonEncoder<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
-        let mut sink = Sink::create(&self.target, None)?;
+        let mut sink = OutputSink::create(&self.target, None)?;
         self.json.write(&mut sink).map_err(sink.error())?;
         let mut written = Written::to(&self.target);
         written.add(sink.commit()?);

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use crate::base::error::{Error, Result};
-pub use crate::draw::figure::Options as FigureOptions;
+pub use crate::draw::figure::FigureOptions;
 pub use crate::draw::strip::Choice;
-pub use crate::mission::Form;
+pub use crate::mission::JsonForm;
 
 /// How the sequence runs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub struct SequenceOptions {
     /// How long a window is shown, in milliseconds, 20...
     pub frame_ms: u32,
     /// How many staged frames lead into a window in which something changed, 0...
@@ -27,7 +27,7 @@ pub struct Options {
     /// How DOT is written.
     pub dot_profile: Profile,
     /// How JSON is written.
-    pub json: Form,
+    pub json: JsonForm,
     /// Whether tables of elements have a row per run of equal windows.
     pub has_runs: bool,
     /// The windows of a film strip, if one was asked for: it takes the place of a sequence of drawings too.
@@ -40,7 +40,7 @@ pub struct Options {
     pub append_to: Option<PathBuf>,
 }
 
-impl Default for Options {
+impl Default for SequenceOptions {
     fn default() -> Self {
         Self {
             frame_ms: 1000,
@@ -51,7 +51,7 @@ impl Default for Options {
             scale: 1.0,
             max_bytes: None,
             dot_profile: Profile::default(),
-            json: Form::Auto,
+            json: JsonForm::Auto,
             has_runs: false,
             strip: None,
             figure: None,
@@ -61,7 +61,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl SequenceOptions {
     /// Whether one drawing of the whole was asked for, which takes the place of a sequence.
     pub fn is_one_drawing(&self) -> bool {
         self.strip.is_some() || self.figure.is_some()

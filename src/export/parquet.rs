@@ -21,7 +21,7 @@ use arrow_array::{
 use arrow_buffer::{Buffer, NullBuffer, OffsetBuffer, ScalarBuffer};
 use arrow_schema::{DataType, Field, Schema, TimeUnit};
 
-use crate::base::table::{Batch, Column, Kind, Texts, Values};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn};
 
 /// How many rows a group has at most: its columns are held in memory, packed, until it is written.
 const MOST_ROWS: usize = 1 << 20;
@@ -88,7 +88,7 @@ impl<W: Write + Send> Rows<W> {
     }
 }
 
-fn field(column: &Column) -> Field {
+fn field(column: &TableColumn) -> Field {
     let mut kind = data_type(column.kind);
     for _ in &column.lists {
         kind = DataType::List(element(kind));
@@ -100,28 +100,28 @@ fn element(kind: DataType) -> Arc<Field> {
     Arc::new(Field::new("element", kind, false))
 }
 
-fn data_type(kind: Kind) -> DataType {
+fn data_type(kind: ColumnKind) -> DataType {
     match kind {
-        Kind::Flag => DataType::Boolean,
-        Kind::I8 => DataType::Int8,
-        Kind::U8 => DataType::UInt8,
-        Kind::I16 => DataType::Int16,
-        Kind::U16 => DataType::UInt16,
-        Kind::I32 => DataType::Int32,
-        Kind::U32 => DataType::UInt32,
-        Kind::I64 => DataType::Int64,
-        Kind::U64 => DataType::UInt64,
-        Kind::F32 => DataType::Float32,
-        Kind::F64 => DataType::Float64,
-        Kind::Text => DataType::Utf8,
-        Kind::Bytes => DataType::Binary,
-        Kind::Time => DataType::Timestamp(TimeUnit::Nanosecond, Some("UTC".into())),
+        ColumnKind::Flag => DataType::Boolean,
+        ColumnKind::I8 => DataType::Int8,
+        ColumnKind::U8 => DataType::UInt8,
+        ColumnKind::I16 => DataType::Int16,
+        ColumnKind::U16 => DataType::UInt16,
+        ColumnKind::I32 => DataType::Int32,
+        ColumnKind::U32 => DataType::UInt32,
+        ColumnKind::I64 => DataType::Int64,
+        ColumnKind::U64 => DataType::UInt64,
+        ColumnKind::F32 => DataType::Float32,
+        ColumnKind::F64 => DataType::Float64,
+        ColumnKind::Text => DataType::Utf8,
+        ColumnKind::Bytes => DataType::Binary,
+        ColumnKind::Time => DataType::Timestamp(TimeUnit::Nanosecond, Some("UTC".into())),
     }
 }
 
 type Made<T> = Result<T, arrow_schema::ArrowError>;
 
-fn array(column: &Column) -> Made<ArrayRef> {
+fn array(column: &TableColumn) -> Made<ArrayRef> {
     let mut array = values(column)?;
     for ends in column.lists.iter().rev() {
         let kind = element(array.data_type().clone());
@@ -130,27 +130,29 @@ fn array(column: &Column) -> Made<ArrayRef> {
     Ok(array)
 }
 
-fn values(column: &Column) -> Made<ArrayRef> {
+fn values(column: &TableColumn) -> Made<ArrayRef> {
     let known = column.valid.clone().map(NullBuffer::from);
     Ok(match (&column.values, column.kind) {
-        (Values::Flag(v), _) => Arc::new(BooleanArray::new(v.clone().into(), known)),
-        (Values::I64(v), Kind::Time) => {
+        (ColumnValues::Flag(v), _) => Arc::new(BooleanArray::new(v.clone().into(), known)),
+        (ColumnValues::I64(v), ColumnKind::Time) => {
             Arc::new(TimestampNanosecondArray::new(v.clone().into(), known).with_timezone("UTC"))
         }
-        (Values::I8(v), _) => numbers::<Int8Type>(v, known),
-        (Values::U8(v), _) => numbers::<UInt8Type>(v, known),
-        (Values::I16(v), _) => numbers::<Int16Type>(v, known),
-        (Values::U16(v), _) => numbers::<UInt16Type>(v, known),
-        (Values::I32(v), _) => numbers::<Int32Type>(v, known),
-        (Values::U32(v), _) => numbers::<UInt32Type>(v, known),
-        (Values::I64(v), _) => numbers::<Int64Type>(v, known),
-        (Values::U64(v), _) => numbers::<UInt64Type>(v, known),
-        (Values::F32(v), _) => numbers::<Float32Type>(v, known),
-        (Values::F64(v), _) => numbers::<Float64Type>(v, known),
-        (Values::Texts(v), Kind::Bytes) => {
+        (ColumnValues::I8(v), _) => numbers::<Int8Type>(v, known),
+        (ColumnValues::U8(v), _) => numbers::<UInt8Type>(v, known),
+        (ColumnValues::I16(v), _) => numbers::<Int16Type>(v, known),
+        (ColumnValues::U16(v), _) => numbers::<UInt16Type>(v, known),
+        (ColumnValues::I32(v), _) => numbers::<Int32Type>(v, known),
+        (ColumnValues::U32(v), _) => numbers::<UInt32Type>(v, known),
+        (ColumnValues::I64(v), _) => numbers::<Int64Type>(v, known),
+        (ColumnValues::U64(v), _) => numbers::<UInt64Type>(v, known),
+        (ColumnValues::F32(v), _) => numbers::<Float32Type>(v, known),
+        (ColumnValues::F64(v), _) => numbers::<Float64Type>(v, known),
+        (ColumnValues::Texts(v), ColumnKind::Bytes) => {
             Arc::new(BinaryArray::try_new(offsets(&v.ends), held(v), known)?)
         }
-        (Values::Texts(v), _) => Arc::new(StringArray::try_new(offsets(&v.ends), held(v), known)?),
+        (ColumnValues::Texts(v), _) => {
+            Arc::new(StringArray::try_new(offsets(&v.ends), held(v), known)?)
+        }
     })
 }
 
@@ -158,7 +160,7 @@ fn numbers<T: ArrowPrimitiveType>(values: &[T::Native], known: Option<NullBuffer
     Arc::new(PrimitiveArray::<T>::new(values.to_vec().into(), known))
 }
 
-fn held(texts: &Texts) -> Buffer {
+fn held(texts: &TextColumn) -> Buffer {
     Buffer::from_slice_ref(&texts.bytes)
 }
 

@@ -7,10 +7,10 @@ use std::thread::{self, JoinHandle};
 use super::{Encoder, Needs, Pack, Packet, Written};
 use crate::base::error::{Error, Result};
 use crate::base::words;
-use crate::draw::paint::pdf::{self, Sheet};
+use crate::draw::paint::pdf::{self, PdfPage};
 use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
 /// How many pages wait to be pressed at most.
@@ -22,7 +22,7 @@ struct Book<'a> {
     strip: Option<&'a Scene>,
     target: Target,
     /// Where pages go; a document cannot move between threads, so it has its own.
-    sheets: SyncSender<Sheet>,
+    sheets: SyncSender<PdfPage>,
     press: JoinHandle<std::result::Result<Vec<u8>, String>>,
 }
 
@@ -56,7 +56,7 @@ impl Book<'_> {
     }
 
     fn add(&self, scene: Scene, entry: String) -> Result<()> {
-        let sent = self.sheets.send(Sheet { scene, entry });
+        let sent = self.sheets.send(PdfPage { scene, entry });
         sent.map_err(|_| self.failed("the document broke off".to_owned()))
     }
 
@@ -114,7 +114,7 @@ impl Encoder for Book<'_> {
             }
             Err(_) => return Err(refused),
         };
-        let mut sink = Sink::create(&target, None)?;
+        let mut sink = OutputSink::create(&target, None)?;
         sink.write_all(&bytes).map_err(sink.error())?;
         let mut written = Written::to(&target);
         written.add(sink.commit()?);

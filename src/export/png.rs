@@ -6,12 +6,12 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
 
-use super::{Encoder, Frame, Needs, Pack, Packet, Single, Written, single};
+use super::{DrawnFrame, Encoder, Needs, Pack, Packet, Single, Written, single};
 use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
 /// Pixels of an image per pixel of a page on paper: 300 instead of 96 to the inch.
@@ -19,13 +19,13 @@ const PAPER: f64 = 300.0 / 96.0;
 
 /// The two formats of still images.
 #[derive(Clone, Copy)]
-enum Kind {
+enum StillKind {
     Png,
     WebP,
 }
 
 struct Images<'a> {
-    kind: Kind,
+    kind: StillKind,
     sequence: &'a Sequence<'a>,
     /// The one drawing to write, if it is no sequence.
     strip: Option<&'a Scene>,
@@ -44,7 +44,7 @@ pub(crate) fn start_png<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, Kind::Png)
+    start(sequence, target, StillKind::Png)
 }
 
 /// Begins WebP images.
@@ -55,7 +55,7 @@ pub(crate) fn start_webp<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
 ) -> Result<Box<dyn Encoder + 'a>> {
-    start(sequence, target, Kind::WebP)
+    start(sequence, target, StillKind::WebP)
 }
 
 /// Begins the PNG image of the first window.
@@ -68,7 +68,7 @@ pub(crate) fn start_poster<'a>(
 ) -> Result<Box<dyn Encoder + 'a>> {
     target.must_be_one("a poster is one image")?;
     Ok(Box::new(Images {
-        kind: Kind::Png,
+        kind: StillKind::Png,
         sequence,
         strip: None,
         is_poster: true,
@@ -81,7 +81,7 @@ pub(crate) fn start_poster<'a>(
 fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
-    kind: Kind,
+    kind: StillKind,
 ) -> Result<Box<dyn Encoder + 'a>> {
     let strip = match single(sequence, target, true)? {
         Single::Windows => None,
@@ -100,7 +100,7 @@ fn start<'a>(
 
 impl Images<'_> {
     fn write(&mut self, bytes: &[u8], target: &Target) -> Result<()> {
-        let mut sink = Sink::create(target, None)?;
+        let mut sink = OutputSink::create(target, None)?;
         sink.write_all(bytes).map_err(sink.error())?;
         self.written.add(sink.commit()?);
         Ok(())
@@ -118,11 +118,11 @@ impl Encoder for Images<'_> {
     fn pack(&self) -> Pack {
         match (self.kind, self.is_poster) {
             (_, true) => |frame| match frame.time.window {
-                0 => packed(Kind::Png, frame),
+                0 => packed(StillKind::Png, frame),
                 _ => Ok(Packet::Nothing),
             },
-            (Kind::Png, _) => |frame| packed(Kind::Png, frame),
-            (Kind::WebP, _) => |frame| packed(Kind::WebP, frame),
+            (StillKind::Png, _) => |frame| packed(StillKind::Png, frame),
+            (StillKind::WebP, _) => |frame| packed(StillKind::WebP, frame),
         }
     }
 
@@ -146,12 +146,12 @@ impl Encoder for Images<'_> {
     }
 }
 
-fn packed(kind: Kind, frame: &Frame<'_>) -> Result<Packet> {
+fn packed(kind: StillKind, frame: &DrawnFrame<'_>) -> Result<Packet> {
     encoded(kind, frame.pixels).map(Packet::Bytes)
 }
 
 /// An image; without its transparency, as pictures have a background.
-fn encoded(kind: Kind, pixels: &Pixels) -> Result<Vec<u8>> {
+fn encoded(kind: StillKind, pixels: &Pixels) -> Result<Vec<u8>> {
     let mut rgb = Vec::with_capacity(pixels.rgba.len() / 4 * 3);
     for pixel in pixels.rgba.chunks_exact(4) {
         rgb.extend_from_slice(&pixel[..3]);
@@ -160,11 +160,13 @@ fn encoded(kind: Kind, pixels: &Pixels) -> Result<Vec<u8>> {
     let mut out = Vec::new();
     match kind {
         // Ten times as fast as the default for a quarter more bytes.
-        Kind::Png => {
+        StillKind::Png => {
             PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
                 .write_image(&rgb, width, height, color)
         }
-        Kind::WebP => WebPEncoder::new_lossless(&mut out).write_image(&rgb, width, height, color),
+        StillKind::WebP => {
+            WebPEncoder::new_lossless(&mut out).write_image(&rgb, width, height, color)
+        }
     }
     .map_err(|error| {
         let what = format!("an image of {width} x {height} pixels cannot be written: {error}");
@@ -190,7 +192,7 @@ mod tests {
             height: 50,
             rgba,
         };
-        for kind in [Kind::Png, Kind::WebP] {
+        for kind in [StillKind::Png, StillKind::WebP] {
             let bytes = encoded(kind, &pixels).unwrap();
             let read = image::load_from_memory(&bytes).unwrap().to_rgba8();
             assert_eq!(read.dimensions(), (70, 50));

@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use self::raster_pool::{Packed, RasterPool, Want};
-use self::steps::Step;
+use self::raster_pool::{FrameWant, Packed, RasterPool};
+use self::steps::RunStep;
 pub use self::steps::Steps;
 use crate::base::error::{Error, Result};
 use crate::export::check;
@@ -92,9 +92,9 @@ impl<'a> OutputJob<'a> {
     }
 
     /// What it wants of every frame; nothing once it has ended.
-    fn want(&self) -> Want {
+    fn want(&self) -> FrameWant {
         let encoder = self.encoder.as_ref();
-        Want {
+        FrameWant {
             needs: self.needs(),
             plays: self.plays(),
             pack: encoder.map_or(|_| Ok(Packet::Nothing), |e| e.pack()),
@@ -190,14 +190,14 @@ fn play(
     if !jobs.iter().any(OutputJob::plays) {
         frame_times.retain(FrameTime::is_settled);
     }
-    let wants: Vec<Want> = jobs.iter().map(OutputJob::want).collect();
+    let wants: Vec<FrameWant> = jobs.iter().map(OutputJob::want).collect();
     let pool = RasterPool::new(sequence, &frame_times, &wants, steps)?;
     let mut done = 0;
     pool.run(|row| {
         done += row.len();
         let size = row.first().map_or((0, 0), |packed| packed.size);
         let queues = by_output(sequence, row, jobs.len());
-        steps.time(Step::Write, || {
+        steps.time(RunStep::Write, || {
             let each = jobs.par_iter_mut().zip(queues);
             each.for_each(|(job, packets)| job.take(size, pool.palette(), packets));
         });

@@ -1,6 +1,6 @@
 //! The sequence as it is shown: which window when and for how long, and what draws it.
 
-pub use super::options::Options;
+pub use super::options::SequenceOptions;
 
 pub use crate::draw::board::Overview;
 
@@ -21,7 +21,7 @@ pub trait Drawings: Sync {
     fn scene(&self, window: usize, phase: f64) -> Scene;
 
     /// What all windows have in common, for outputs that draw the graph once; `None` where there is no such thing.
-    fn graph(&self) -> Option<Whole<'_>> {
+    fn graph(&self) -> Option<UnionDrawings<'_>> {
         None
     }
 
@@ -33,7 +33,7 @@ pub trait Drawings: Sync {
 
 /// The graph of all windows, drawn once.
 #[derive(Clone, Debug)]
-pub struct Whole<'a> {
+pub struct UnionDrawings<'a> {
     /// Every element.
     pub union: Union,
     /// How it looks.
@@ -47,8 +47,8 @@ impl Drawings for Picture<'_> {
         self.between(window, phase)
     }
 
-    fn graph(&self) -> Option<Whole<'_>> {
-        Some(Whole {
+    fn graph(&self) -> Option<UnionDrawings<'_>> {
+        Some(UnionDrawings {
             union: self.union(),
             style: self.style(),
             title: self.title_text(),
@@ -90,7 +90,7 @@ pub struct Sequence<'a> {
     /// The lines that put the figure into LaTeX, if there is one.
     pub latex: Option<&'a str>,
     /// How it runs.
-    pub options: Options,
+    pub options: SequenceOptions,
 }
 
 /// One frame of the sequence.
@@ -125,7 +125,7 @@ impl Sequence<'_> {
     }
 }
 
-fn frame_times(changed: &[bool], options: &Options) -> Vec<FrameTime> {
+fn frame_times(changed: &[bool], options: &SequenceOptions) -> Vec<FrameTime> {
     let (shortest, longest) = STAGED_MS;
     let mut frame_times: Vec<FrameTime> = Vec::with_capacity(changed.len());
     for (window, &changed) in changed.iter().enumerate() {
@@ -168,7 +168,7 @@ mod tests {
     const QUIET_LOUD_QUIET: [bool; 3] = [false, true, false];
 
     /// Window, phase and milliseconds of every frame.
-    fn plan(changed: &[bool], options: &Options) -> Vec<(usize, f64, u32)> {
+    fn plan(changed: &[bool], options: &SequenceOptions) -> Vec<(usize, f64, u32)> {
         let told = |s: FrameTime| (s.window, s.phase, s.ms);
         frame_times(changed, options)
             .into_iter()
@@ -179,14 +179,17 @@ mod tests {
     #[test]
     fn every_window_is_shown_once() {
         let expected = [(0, 1.0, 1000), (1, 1.0, 1000), (2, 1.0, 1000)];
-        assert_eq!(plan(&QUIET_LOUD_QUIET, &Options::default()), expected);
+        assert_eq!(
+            plan(&QUIET_LOUD_QUIET, &SequenceOptions::default()),
+            expected
+        );
     }
 
     #[test]
     fn staged_frames_stand_only_before_changes_and_take_no_extra_time() {
-        let options = Options {
+        let options = SequenceOptions {
             tween: 3,
-            ..Options::default()
+            ..SequenceOptions::default()
         };
         let expected = [
             (0, 1.0, 1000),
@@ -201,9 +204,9 @@ mod tests {
 
     #[test]
     fn a_change_may_be_held_longer() {
-        let options = Options {
+        let options = SequenceOptions {
             hold_changes: 2,
-            ..Options::default()
+            ..SequenceOptions::default()
         };
         let expected = [(0, 1.0, 1000), (1, 1.0, 2000), (2, 1.0, 1000)];
         assert_eq!(plan(&QUIET_LOUD_QUIET, &options), expected);
@@ -211,9 +214,9 @@ mod tests {
 
     #[test]
     fn windows_that_are_left_out_give_their_time_away_but_changes_stay() {
-        let options = Options {
+        let options = SequenceOptions {
             every: 3,
-            ..Options::default()
+            ..SequenceOptions::default()
         };
         let changed = [false, false, true, false, false, false, false];
         let expected = [
@@ -223,19 +226,19 @@ mod tests {
             (6, 1.0, 1000),
         ];
         assert_eq!(plan(&changed, &options), expected);
-        let options = Options {
+        let options = SequenceOptions {
             changes_only: true,
-            ..Options::default()
+            ..SequenceOptions::default()
         };
         assert_eq!(plan(&changed, &options), [(0, 1.0, 2000), (2, 1.0, 5000)]);
     }
 
     #[test]
     fn a_hurried_film_still_shows_every_frame() {
-        let options = Options {
+        let options = SequenceOptions {
             frame_ms: 20,
             tween: 8,
-            ..Options::default()
+            ..SequenceOptions::default()
         };
         let plan = plan(&[false, true], &options);
         assert!(plan.iter().all(|frame_time| frame_time.2 >= 20));

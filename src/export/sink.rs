@@ -10,20 +10,20 @@ use super::target::{Target, folder_of, is_special};
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
-/// A file (or standard output) being written. Dropped without [`Sink::commit`], a file leaves no trace.
+/// A file (or standard output) being written. Dropped without [`OutputSink::commit`], a file leaves no trace.
 #[derive(Debug)]
-pub(crate) struct Sink {
+pub(crate) struct OutputSink {
     /// As it was asked for.
     path: PathBuf,
     /// What is replaced: for a symbolic link, what it points to.
     place: PathBuf,
-    to: BufWriter<Way>,
+    to: BufWriter<SinkTarget>,
     written: u64,
     limit: u64,
 }
 
 #[derive(Debug)]
-enum Way {
+enum SinkTarget {
     Stdout(io::Stdout),
     /// A device or pipe that is there already: nothing to rename.
     Special(File),
@@ -36,7 +36,7 @@ enum Way {
     Memory(Vec<u8>),
 }
 
-impl Sink {
+impl OutputSink {
     /// Opens what will become `target`, whose folder is there. With `limit`, writing more bytes than that fails as
     /// [`io::ErrorKind::FileTooLarge`].
     ///
@@ -44,12 +44,13 @@ impl Sink {
     /// Where the system refuses; the error names the final file.
     pub(crate) fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
         let way = match target {
-            Target::Stdout if limit.is_some() => Ok(Way::Memory(Vec::new())),
+            Target::Stdout if limit.is_some() => Ok(SinkTarget::Memory(Vec::new())),
             // An output that the user asked for on standard output is no message of the library's.
-            Target::Stdout => Ok(Way::Stdout(io::stdout())),
-            Target::Path(path) if is_special(path) => {
-                File::options().write(true).open(path).map(Way::Special)
-            }
+            Target::Stdout => Ok(SinkTarget::Stdout(io::stdout())),
+            Target::Path(path) if is_special(path) => File::options()
+                .write(true)
+                .open(path)
+                .map(SinkTarget::Special),
             Target::Path(path) => hidden(folder_of(path)),
         };
         let place = match target {
@@ -83,10 +84,10 @@ impl Sink {
     pub(crate) fn handle(&mut self) -> Result<Option<File>> {
         let handle = match self.to.get_ref() {
             #[cfg(target_os = "linux")]
-            Way::Nameless(file) => Some(file.try_clone()),
-            Way::Special(file) => Some(file.try_clone()),
-            Way::Named(file, _) => Some(file.as_file().try_clone()),
-            Way::Stdout(_) | Way::Memory(_) => None,
+            SinkTarget::Nameless(file) => Some(file.try_clone()),
+            SinkTarget::Special(file) => Some(file.try_clone()),
+            SinkTarget::Named(file, _) => Some(file.as_file().try_clone()),
+            SinkTarget::Stdout(_) | SinkTarget::Memory(_) => None,
         };
         handle.transpose().map_err(self.error())
     }
@@ -112,7 +113,7 @@ impl Sink {
     }
 }
 
-impl Write for Sink {
+impl Write for OutputSink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.written + bytes.len() as u64 > self.limit {
             return Err(io::ErrorKind::FileTooLarge.into());
@@ -127,7 +128,7 @@ impl Write for Sink {
     }
 }
 
-impl Way {
+impl SinkTarget {
     /// The size of what will be renamed; `None` for everything else.
     fn size(&self) -> Option<u64> {
         let file = match self {
@@ -140,7 +141,7 @@ impl Way {
     }
 }
 
-impl Write for Way {
+impl Write for SinkTarget {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
             Self::Stdout(out) => out.write(bytes),
@@ -161,16 +162,16 @@ impl Write for Way {
 }
 
 /// Gives what was written its final name.
-fn publish(way: Way, path: &Path) -> io::Result<()> {
+fn publish(way: SinkTarget, path: &Path) -> io::Result<()> {
     match way {
-        Way::Stdout(_) | Way::Special(_) => Ok(()),
-        Way::Memory(held) => {
+        SinkTarget::Stdout(_) | SinkTarget::Special(_) => Ok(()),
+        SinkTarget::Memory(held) => {
             let mut out = io::stdout().lock();
             out.write_all(&held)?;
             out.flush()
         }
         #[cfg(target_os = "linux")]
-        Way::Nameless(file) => {
+        SinkTarget::Nameless(file) => {
             let mut left = None;
             let named = temporary().make_in(folder_of(path), |name| {
                 left = Some(Leftover::at(name));
@@ -178,19 +179,19 @@ fn publish(way: Way, path: &Path) -> io::Result<()> {
             })?;
             named.persist(path).map(drop).map_err(|e| e.error)
         }
-        Way::Named(file, _left) => file.persist(path).map(drop).map_err(|e| e.error),
+        SinkTarget::Named(file, _left) => file.persist(path).map(drop).map_err(|e| e.error),
     }
 }
 
 /// A file in `folder` that nobody sees: without a name where the system can do that.
-fn hidden(folder: &Path) -> io::Result<Way> {
+fn hidden(folder: &Path) -> io::Result<SinkTarget> {
     #[cfg(target_os = "linux")]
     if let Ok(file) = nameless(folder) {
-        return Ok(Way::Nameless(file));
+        return Ok(SinkTarget::Nameless(file));
     }
     let file = temporary().tempfile_in(folder)?;
     let left = Leftover::at(file.path());
-    Ok(Way::Named(file, left))
+    Ok(SinkTarget::Named(file, left))
 }
 
 /// How temporary files are called, so that a left one tells whose it is.
@@ -257,7 +258,7 @@ mod tests {
     #[test]
     fn a_file_appears_when_it_is_whole() {
         let (folder, target) = place("a.gif");
-        let mut sink = Sink::create(&target, None).unwrap();
+        let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"whole").unwrap();
         #[cfg(target_os = "linux")]
         assert!(names(folder.path()).is_empty());
@@ -270,7 +271,7 @@ mod tests {
     fn a_file_that_is_given_up_leaves_the_old_one() {
         let (folder, target) = place("a.gif");
         fs::write(target.path(), "old").unwrap();
-        let mut sink = Sink::create(&target, None).unwrap();
+        let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"half").unwrap();
         drop(sink);
         assert_eq!(names(folder.path()), ["a.gif"]);
@@ -280,7 +281,7 @@ mod tests {
     #[test]
     fn a_limit_is_kept() {
         let (folder, target) = place("a.gif");
-        let mut sink = Sink::create(&target, Some(4)).unwrap();
+        let mut sink = OutputSink::create(&target, Some(4)).unwrap();
         let error = sink.write_all(b"five!").unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
         drop(sink);
@@ -290,7 +291,7 @@ mod tests {
     #[test]
     fn a_folder_that_vanishes_is_named() {
         let (folder, target) = place("a.gif");
-        let mut sink = Sink::create(&target, None).unwrap();
+        let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"whole").unwrap();
         fs::remove_dir_all(folder.path()).unwrap();
         let error = sink.commit().unwrap_err().to_string();
@@ -301,7 +302,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     fn a_full_disk_is_told_with_the_files_name() {
         let target = Target::parse("/dev/full");
-        let mut sink = Sink::create(&target, None).unwrap();
+        let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"no room").unwrap();
         let error = sink.commit().unwrap_err();
         assert!(error.to_string().contains("/dev/full"), "{error}");
@@ -315,7 +316,7 @@ mod tests {
         let real = folder.path().join("real.gif");
         fs::write(&real, "old").unwrap();
         std::os::unix::fs::symlink(&real, target.path()).unwrap();
-        let mut sink = Sink::create(&target, None).unwrap();
+        let mut sink = OutputSink::create(&target, None).unwrap();
         sink.write_all(b"new").unwrap();
         sink.commit().unwrap();
         assert!(fs::symlink_metadata(target.path()).unwrap().is_symlink());

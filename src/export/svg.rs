@@ -7,10 +7,10 @@ use crate::base::error::Result;
 use crate::draw::paint::svg;
 use crate::draw::scene::Scene;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
-struct Drawings<'a> {
+struct SvgEncoder<'a> {
     /// The one drawing to write, if it is no sequence.
     strip: Option<&'a Scene>,
     target: Target,
@@ -30,7 +30,7 @@ pub(crate) fn start<'a>(
         Single::Windows => None,
         Single::Strip(scene) => Some(scene),
     };
-    Ok(Box::new(Drawings {
+    Ok(Box::new(SvgEncoder {
         strip,
         target: target.clone(),
         windows: sequence.view.frames.len(),
@@ -38,7 +38,7 @@ pub(crate) fn start<'a>(
     }))
 }
 
-impl Encoder for Drawings<'_> {
+impl Encoder for SvgEncoder<'_> {
     fn needs(&self) -> Needs {
         match self.strip {
             Some(_) => Needs::Nothing,
@@ -69,7 +69,7 @@ impl Encoder for Drawings<'_> {
 }
 
 fn write(text: &[u8], target: &Target) -> Result<u64> {
-    let mut sink = Sink::create(target, None)?;
+    let mut sink = OutputSink::create(target, None)?;
     sink.write_all(text).map_err(sink.error())?;
     sink.commit()
 }

@@ -9,9 +9,9 @@ pub(crate) mod writer;
 
 use super::{Encoder, Written};
 use crate::base::error::{Error, Result};
-use crate::base::table::{Batch, Cell};
+use crate::base::table::{Batch, TableCell};
 use crate::export::sequence::Sequence;
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::{Target, is_special};
 use crate::mission::Mission;
 use mission::{Row, TABLES, Table};
@@ -93,7 +93,7 @@ impl Encoder for Tables<'_> {
             write(rows, table, &file, self.format)
         };
         // All of them are whole before the first one gets its name.
-        let sinks: Vec<Sink> = each.map(write).collect::<Result<_>>()?;
+        let sinks: Vec<OutputSink> = each.map(write).collect::<Result<_>>()?;
         let mut written = Written::to(&self.target);
         for sink in sinks {
             written.add(sink.commit()?);
@@ -110,14 +110,14 @@ fn write(
     table: &Table,
     target: &Target,
     format: TableFormat,
-) -> Result<Sink> {
-    let sink = Sink::create(target, None)?;
+) -> Result<OutputSink> {
+    let sink = OutputSink::create(target, None)?;
     let failed = Error::io("write", sink.path());
     let write = || {
         let mut batch = Batch::new(table.columns);
         let mut writer = Writer::new(format, sink, &batch, &[])?;
         let mut result = Ok(());
-        rows(&mut |row: &[Cell<'_>]| {
+        rows(&mut |row: &[TableCell<'_>]| {
             batch.push(row);
             if batch.rows >= MOST_ROWS && result.is_ok() {
                 result = writer.write(&batch);

@@ -10,7 +10,7 @@ use crate::base::budget;
 use crate::base::error::{Error, Result};
 use crate::export::palette::Palette;
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
 /// The finest step of time in milliseconds; frames are repeated to fill theirs.
@@ -19,19 +19,19 @@ const FINEST_MS: u32 = 20;
 const FEWEST_PER_SECOND: f64 = 10.0;
 
 /// A kind of video: the container and how to get it from ffmpeg.
-struct Kind {
+struct VideoKind {
     arguments: &'static [&'static str],
     /// Container arguments for a pipe, which cannot be gone back in.
     piped: &'static [&'static str],
 }
 
-const MP4: Kind = Kind {
+const MP4: VideoKind = VideoKind {
     arguments: &[
         "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4",
     ],
     piped: &["-movflags", "frag_keyframe+empty_moov"],
 };
-const WEBM: Kind = Kind {
+const WEBM: VideoKind = VideoKind {
     arguments: &[
         "-c:v",
         "libvpx-vp9",
@@ -71,10 +71,10 @@ fn missing(path: PathBuf, error: &io::Error) -> Error {
 
 struct Video<'a> {
     sequence: &'a Sequence<'a>,
-    kind: &'static Kind,
+    kind: &'static VideoKind,
     target: Target,
     size: (u32, u32),
-    work: Option<Work>,
+    work: Option<FfmpegJob>,
 }
 
 /// A process that ends when nobody wants it any more.
@@ -89,13 +89,13 @@ impl Drop for Process {
 }
 
 /// ffmpeg at work.
-struct Work {
+struct FfmpegJob {
     child: Process,
     /// Where frames go.
     pipe: Option<ChildStdin>,
     /// Hears what it says meanwhile: a pipe that nobody empties would stop it.
     ear: Option<JoinHandle<Vec<u8>>>,
-    sink: Sink,
+    sink: OutputSink,
     /// The length of one repetition in milliseconds.
     step: u32,
     /// Milliseconds asked for and repetitions written so far.
@@ -127,7 +127,7 @@ pub(crate) fn start_webm<'a>(
 fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
-    kind: &'static Kind,
+    kind: &'static VideoKind,
 ) -> Result<Box<dyn Encoder + 'a>> {
     target.must_be_one("an animation holds all windows")?;
     Ok(Box::new(Video {
@@ -148,8 +148,8 @@ impl Video<'_> {
         }
     }
 
-    fn start(&self, first: &[u8]) -> Result<Work> {
-        let mut sink = Sink::create(&self.target, None)?;
+    fn start(&self, first: &[u8]) -> Result<FfmpegJob> {
+        let mut sink = OutputSink::create(&self.target, None)?;
         let step = step(&self.sequence.frame_times());
         let rate = 1000.0 / f64::from(step);
         let mut command = Command::new("ffmpeg");
@@ -186,7 +186,7 @@ impl Video<'_> {
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let child = command.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
         let mut child = child.map_err(|e| missing(self.target.path().to_owned(), &e))?;
-        Ok(Work {
+        Ok(FfmpegJob {
             pipe: child.stdin.take(),
             ear: child
                 .stderr
@@ -200,7 +200,7 @@ impl Video<'_> {
     }
 
     /// What ffmpeg says about its failure.
-    fn complaint(&self, work: &mut Work) -> Error {
+    fn complaint(&self, work: &mut FfmpegJob) -> Error {
         drop(work.pipe.take());
         let _ = work.child.0.wait();
         let said = work.ear.take().and_then(|ear| ear.join().ok());
@@ -265,7 +265,7 @@ impl Encoder for Video<'_> {
     }
 }
 
-impl Work {
+impl FfmpegJob {
     /// Shows a frame for `ms` milliseconds, rounded so that errors do not add up.
     fn show(&mut self, rgba: &[u8], ms: u32) -> io::Result<()> {
         let Some(pipe) = &mut self.pipe else {

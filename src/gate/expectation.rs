@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use super::pattern::Pattern;
 use super::range::{During, Range};
 use crate::base::time::{Period, Stamp};
-pub(crate) use crate::base::yaml::Place;
+pub(crate) use crate::base::yaml::YamlPlace;
 
 pub(crate) use parse::read;
 
@@ -18,7 +18,7 @@ pub(crate) const SCHEMA: &str = "bagreel.expect/1";
 /// A value and where it stands.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct At<T> {
-    pub(crate) at: Place,
+    pub(crate) at: YamlPlace,
     pub(crate) value: T,
 }
 
@@ -41,16 +41,16 @@ pub(crate) struct Expectation {
 pub(crate) struct Named<T> {
     pub(crate) name: Pattern,
     /// Where the name stands.
-    pub(crate) at: Place,
+    pub(crate) at: YamlPlace,
     /// Where what is said of it begins.
-    pub(crate) body: Place,
+    pub(crate) body: YamlPlace,
     pub(crate) facts: T,
 }
 
 /// What of the bag that the file does not name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Policy {
-    pub(crate) at: Place,
+    pub(crate) at: YamlPlace,
     pub(crate) nodes: Closed,
     pub(crate) topics: Closed,
     /// Of topics whose publishers are listed.
@@ -121,7 +121,7 @@ pub(crate) enum While {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Rule {
     pub(crate) id: String,
-    pub(crate) at: Place,
+    pub(crate) at: YamlPlace,
     pub(crate) demand: Demand,
 }
 
@@ -195,7 +195,7 @@ impl EventKind {
 /// A finding that is known and forgiven.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Allowance {
-    pub(crate) at: Place,
+    pub(crate) at: YamlPlace,
     pub(crate) finding: super::Kind,
     pub(crate) name: Pattern,
     /// It does not hold for bags that begin at this time or later.

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::base::digest;
 use crate::base::time::{Span, Stamp};
 use crate::base::words::visible;
-use crate::base::yaml::Place;
+use crate::base::yaml::YamlPlace;
 
 /// A kind of finding: its place in [`KINDS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -236,7 +236,7 @@ pub(crate) struct Finding {
     pub(crate) kind: Kind,
     pub(crate) severity: Severity,
     /// Where the file says what was expected.
-    pub(crate) place: Place,
+    pub(crate) place: YamlPlace,
     /// The node or topic that it is about.
     pub(crate) name: String,
     /// One sentence.
@@ -261,7 +261,7 @@ pub(crate) struct Finding {
 
 impl Finding {
     /// A finding about a name, an error until something else is said.
-    pub(crate) fn new(kind: Kind, name: &str, place: Place, says: impl fmt::Display) -> Self {
+    pub(crate) fn new(kind: Kind, name: &str, place: YamlPlace, says: impl fmt::Display) -> Self {
         Self {
             kind,
             severity: Severity::Error,
@@ -280,7 +280,12 @@ impl Finding {
     }
 
     /// That the bag does not tell, and why.
-    pub(crate) fn unknown(kind: Kind, name: &str, place: Place, says: impl fmt::Display) -> Self {
+    pub(crate) fn unknown(
+        kind: Kind,
+        name: &str,
+        place: YamlPlace,
+        says: impl fmt::Display,
+    ) -> Self {
         Self {
             severity: Severity::Unknown,
             ..Self::new(kind, name, place, says)
@@ -341,7 +346,7 @@ mod tests {
 
     #[test]
     fn a_fingerprint_does_not_know_lines_or_numbers_seen() {
-        let at = |line| Place { line, column: 1 };
+        let at = |line| YamlPlace { line, column: 1 };
         let one = Finding::new(Kind::TopicRateLow, "/scan", at(3), "a").saw("7", "9..");
         let two = Finding::new(Kind::TopicRateLow, "/scan", at(9), "b").saw("6", "9..");
         let other = Finding::new(Kind::TopicRateLow, "/scan2", at(3), "a").saw("7", "9..");

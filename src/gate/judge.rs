@@ -8,7 +8,7 @@ mod rate;
 mod rule;
 mod topic;
 
-use super::expectation::{Closed, Expectation, Place};
+use super::expectation::{Closed, Expectation, YamlPlace};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, Severity};
 use super::pattern::Pattern;
@@ -22,7 +22,7 @@ pub(crate) struct Checked {
     /// What it is about: `/scan hz`, or a rule's `id`.
     pub(crate) title: String,
     /// Where it stands.
-    pub(crate) place: Place,
+    pub(crate) place: YamlPlace,
     /// What was found; nothing where it is kept.
     pub(crate) findings: Vec<Finding>,
     /// Whether there was nothing to judge, because what it is about is not there.
@@ -119,7 +119,7 @@ struct Judge<'a> {
 
 impl Judge<'_> {
     /// Notes what was found of one fact.
-    fn note(&mut self, title: impl Into<String>, place: Place, findings: Vec<Finding>) {
+    fn note(&mut self, title: impl Into<String>, place: YamlPlace, findings: Vec<Finding>) {
         self.checks.push(Checked {
             title: title.into(),
             place,
@@ -129,7 +129,7 @@ impl Judge<'_> {
     }
 
     /// Notes a fact about something that is not there.
-    fn moot(&mut self, title: impl Into<String>, place: Place) {
+    fn moot(&mut self, title: impl Into<String>, place: YamlPlace) {
         self.checks.push(Checked {
             title: title.into(),
             place,

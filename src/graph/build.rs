@@ -50,7 +50,7 @@ pub struct Built {
 pub fn build(
     recorded: &Recorded,
     windows: &[Span],
-    options: &conclude::Options,
+    options: &conclude::ConcludeOptions,
     grace: usize,
 ) -> Result<Built> {
     let findings = conclude(recorded, options)?;

@@ -175,17 +175,17 @@ pub fn apply(before: &Graph, diff: &Diff) -> Graph {
 }
 
 /// Something with a place in the mission's list of elements.
-trait Placed {
+trait HasId {
     fn place(&self) -> u32;
 }
 
 macro_rules! placed {
-    ($($type:ty),*) => { $(impl Placed for $type { fn place(&self) -> u32 { self.id } })* };
+    ($($type:ty),*) => { $(impl HasId for $type { fn place(&self) -> u32 { self.id } })* };
 }
 placed!(NodeState, TopicState, EdgeState);
 
 /// Walks two lists that are sorted by id, in step.
-fn delta<T: Placed + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
+fn delta<T: HasId + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
     let mut delta = Delta::default();
     let (mut old, mut new) = (before.iter().peekable(), after.iter().peekable());
     loop {
@@ -210,7 +210,7 @@ fn delta<T: Placed + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
     }
 }
 
-fn patched<T: Placed + Clone>(before: &[T], delta: &Delta<T>) -> Vec<T> {
+fn patched<T: HasId + Clone>(before: &[T], delta: &Delta<T>) -> Vec<T> {
     let gone: BTreeSet<u32> = delta.removed.iter().copied().collect();
     let kept = before.iter().filter(|s| !gone.contains(&s.place()));
     let mut all: BTreeMap<u32, T> = kept.map(|s| (s.place(), s.clone())).collect();

@@ -4,7 +4,7 @@
 mod column;
 mod row;
 
-pub(crate) use column::{Column, ColumnWriter, Cursor};
+pub(crate) use column::{Column, ColumnCursor, ColumnWriter};
 pub(crate) use row::{Number, Row};
 
 use std::sync::Arc;
@@ -39,7 +39,7 @@ impl Graphs {
 
     /// The graphs in order, each made as it is asked for.
     pub fn iter(&self) -> Iter<'_> {
-        fn cursors(columns: &[Column]) -> Vec<Cursor<'_>> {
+        fn cursors(columns: &[Column]) -> Vec<ColumnCursor<'_>> {
             columns.iter().map(Column::cursor).collect()
         }
         Iter {
@@ -67,7 +67,7 @@ impl Graphs {
         };
         let mut cursor = columns.get(id as usize).map(Column::cursor);
         let row = move |at| {
-            let row = cursor.as_mut().and_then(Cursor::next);
+            let row = cursor.as_mut().and_then(ColumnCursor::next);
             row.map(|row| (at, row))
         };
         (0..self.spans.len()).filter_map(row)
@@ -99,10 +99,10 @@ impl PartialEq for Graphs {
 pub struct Iter<'a> {
     all: &'a Graphs,
     next: usize,
-    nodes: Vec<Cursor<'a>>,
-    topics: Vec<Cursor<'a>>,
-    publishes: Vec<Cursor<'a>>,
-    subscribes: Vec<Cursor<'a>>,
+    nodes: Vec<ColumnCursor<'a>>,
+    topics: Vec<ColumnCursor<'a>>,
+    publishes: Vec<ColumnCursor<'a>>,
+    subscribes: Vec<ColumnCursor<'a>>,
 }
 
 impl Iterator for Iter<'_> {
@@ -153,7 +153,7 @@ impl<'a> IntoIterator for &'a Graphs {
 }
 
 /// What is there in the next window, by id.
-fn states<T>(cursors: &mut [Cursor<'_>], state: impl Fn(u32, &Row) -> T) -> Vec<T> {
+fn states<T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(u32, &Row) -> T) -> Vec<T> {
     let rows = (0..).zip(cursors);
     rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?)))
         .collect()

@@ -27,7 +27,7 @@ pub(crate) fn shortest_silence(mission: i64) -> i64 {
 
 /// What was heard of one sequence of messages.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Runs {
+pub(crate) struct SendingRuns {
     first: Option<Stamp>,
     last: Stamp,
     gaps: i64,
@@ -35,7 +35,7 @@ pub(crate) struct Runs {
     long: Vec<(Stamp, Stamp)>,
 }
 
-impl Runs {
+impl SendingRuns {
     /// Takes the next message; `least` is the shortest silence.
     pub(crate) fn hear(&mut self, time: Stamp, least: i64) {
         if self.first.is_none() {
@@ -91,7 +91,7 @@ mod tests {
 
     /// Stretches in seconds of messages at these seconds, where a silence lasts at least 4 s.
     fn stretches(times: &[i64]) -> Vec<(i64, i64)> {
-        let mut runs = Runs::default();
+        let mut runs = SendingRuns::default();
         for time in times {
             runs.hear(Stamp(time * 1_000_000_000), SILENCE_NS);
         }

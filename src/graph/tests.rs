@@ -4,8 +4,8 @@ use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
 use crate::base::time::Span;
 use crate::evidence::collector::Collector;
-use crate::evidence::conclude::Options;
-use crate::evidence::topology::Element::{Node, Subscribe};
+use crate::evidence::conclude::ConcludeOptions;
+use crate::evidence::topology::NamedElement::{Node, Subscribe};
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -27,11 +27,11 @@ fn connection(id: u32, topic: &str, publisher: Option<&str>, latching: bool) -> 
 }
 
 fn graphs(talks: &[Talk<'_>], period: i64) -> Built {
-    built(talks, period, &Options::default(), 0)
+    built(talks, period, &ConcludeOptions::default(), 0)
 }
 
-fn built(talks: &[Talk<'_>], period: i64, options: &Options, grace: usize) -> Built {
-    let mut collector = Collector::new(crate::evidence::collector::Options::default());
+fn built(talks: &[Talk<'_>], period: i64, options: &ConcludeOptions, grace: usize) -> Built {
+    let mut collector = Collector::new(crate::evidence::collector::CollectOptions::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
     for (id, (topic, publisher, latching, times)) in (0..).zip(talks) {
@@ -144,7 +144,7 @@ fn grace_keeps_a_silent_node_for_some_windows() {
         ("/a", Some("/x"), false, &[5, 6, 7, 8, 9]),
         ("/b", Some("/y"), false, &[0, 49]),
     ];
-    let all = built(&talks, 10, &Options::default(), 2);
+    let all = built(&talks, 10, &ConcludeOptions::default(), 2);
     assert_eq!(states(&all, "/x"), ["active", "active", "active", "-", "-"]);
 }
 
@@ -187,9 +187,9 @@ fn roles_fold_anonymous_nodes_into_one() {
         ("/a", Some("/probe_12_1795171273454"), false, &[0, 5]),
         ("/a", Some("/probe_34_1795171318449"), false, &[20, 29]),
     ];
-    let options = Options {
+    let options = ConcludeOptions {
         roles: true,
-        ..Options::default()
+        ..ConcludeOptions::default()
     };
     let all = built(&talks, 10, &options, 0);
     let names: Vec<_> = all.elements.nodes.iter().map(|n| n.name.as_str()).collect();
@@ -202,14 +202,14 @@ fn roles_fold_anonymous_nodes_into_one() {
 
 #[test]
 fn what_the_user_tells_is_added_and_overwrites_nothing() {
-    let entry = |element, from_ns, to_ns| crate::evidence::topology::Entry {
+    let entry = |element, from_ns, to_ns| crate::evidence::topology::TopologyEntry {
         element,
         from_ns,
         to_ns,
         declared: false,
         place: String::new(),
     };
-    let options = Options {
+    let options = ConcludeOptions {
         topology: crate::evidence::topology::Topology {
             entries: vec![
                 entry(Node("/x".to_owned()), None, None),
@@ -221,7 +221,7 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
             ],
             notices: Vec::new(),
         },
-        ..Options::default()
+        ..ConcludeOptions::default()
     };
     let talks: [Talk<'_>; 2] = [
         ("/a", Some("/x"), false, &[0, 1, 2, 3, 4, 5]),
@@ -236,7 +236,7 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
 
 #[test]
 fn windows_may_overlap() {
-    let mut collector = Collector::new(crate::evidence::collector::Options::default());
+    let mut collector = Collector::new(crate::evidence::collector::CollectOptions::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
     bag.connection(&connection(0, "/a", Some("/x"), false));
@@ -249,7 +249,7 @@ fn windows_may_overlap() {
             end: Stamp((n * 10 + 20).min(40) * SECOND),
         })
         .collect();
-    let all = build(&recorded, &windows, &Options::default(), 0).unwrap();
+    let all = build(&recorded, &windows, &ConcludeOptions::default(), 0).unwrap();
     assert_eq!(all.messages, [20, 20, 20, 10]);
 }
 
@@ -278,7 +278,7 @@ fn log_record((_, node, text, topics): &Log<'_>, file: &str) -> Vec<u8> {
 
 /// Graphs of windows of 10 s, of a bag with one log connection, which names `/host` as its publisher.
 fn logged(talks: &[Talk<'_>], logs: &[Log<'_>], file: &str) -> Built {
-    let mut collector = Collector::new(crate::evidence::collector::Options::default());
+    let mut collector = Collector::new(crate::evidence::collector::CollectOptions::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
     bag.connection(&Connection {
@@ -306,7 +306,7 @@ fn logged(talks: &[Talk<'_>], logs: &[Log<'_>], file: &str) -> Built {
             end: Stamp((n + 1) * 10 * SECOND),
         })
         .collect();
-    build(&recorded, &windows, &Options::default(), 0).unwrap()
+    build(&recorded, &windows, &ConcludeOptions::default(), 0).unwrap()
 }
 
 /// The windows in which a node is there.

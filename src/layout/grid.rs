@@ -2,14 +2,14 @@
 
 use super::pack::pack;
 use super::routes::around;
-use super::{Layout, Options, Orientation, Plan};
+use super::{Layout, LayoutOptions, Orientation, Plan};
 use crate::base::geometry::{Point, Rect, Size};
 
 const GAP: f64 = 14.0;
 const PADDING: f64 = 8.0;
 
 /// Everything packed, clusters around their members; it knows its siblings that pack and route.
-pub(crate) fn lay_out(plan: &Plan, options: &Options) -> Layout {
+pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     let (n, k) = (plan.vertices.len(), plan.clusters.len());
     // Places `n..` stand for clusters; the last group holds what is in none.
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); k + 1];
@@ -86,7 +86,7 @@ mod tests {
         let page = Size::new(800.0, 450.0);
         let layout = lay_out(
             &plan,
-            &Options {
+            &LayoutOptions {
                 page,
                 orientation: None,
             },

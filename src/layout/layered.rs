@@ -15,7 +15,9 @@ use std::collections::BTreeSet;
 
 use super::layers::{Lane, cut, items};
 use super::spacing::{Spacing, turned};
-use super::{Engine, Layers, Layout, Options, Orientation, Part, Plan, Route, Rows};
+use super::{
+    Component, Engine, LayerRows, Layers, Layout, LayoutOptions, Orientation, Plan, Route,
+};
 use super::{grid, pack, routes};
 use crate::base::error::Result;
 use crate::base::geometry::{Point, Rect, Size};
@@ -33,13 +35,13 @@ const EFFORT: usize = 120_000;
 pub(crate) struct Layered;
 
 impl Engine for Layered {
-    fn lay_out(&self, plan: &Plan, options: &Options) -> Result<Layout> {
+    fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout> {
         Ok(lay_out(plan, options))
     }
 }
 
 /// The layered layout of a sane plan.
-pub(crate) fn lay_out(plan: &Plan, options: &Options) -> Layout {
+pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     let parts = parts::parts(plan);
     let aspect = options.page.w / options.page.h.max(1.0);
     let orderings: Vec<Vec<Ordering>> = parts
@@ -56,7 +58,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &Options) -> Layout {
         .into_iter()
         .filter(|o| options.orientation.is_none_or(|options| options == *o));
     let tries = wished.map(|orientation| {
-        let blocks: Vec<Block> = parts
+        let blocks: Vec<PlacedPart> = parts
             .iter()
             .zip(&orderings)
             .map(|(part, orderings)| best_block(plan, options, part, orderings, orientation))
@@ -93,12 +95,12 @@ fn labelled(plan: &Plan, layout: &Layout) -> f64 {
 /// One way of cutting and ordering a part.
 struct Ordering {
     layers: Layers,
-    rows: Rows,
+    rows: LayerRows,
     crossings: u64,
 }
 
 /// The drafts of a part, none if it is too large: every way of ranking, with long edges led outside and inside of clusters.
-fn orderings(plan: &Plan, part: &Part, aspect: f64) -> Vec<Ordering> {
+fn orderings(plan: &Plan, part: &Component, aspect: f64) -> Vec<Ordering> {
     let mut ways = rankings(part, aspect);
     ways.retain(|rank| items(part, rank) <= MOST);
     let mut lanes = vec![Lane::Inside];
@@ -123,7 +125,7 @@ fn orderings(plan: &Plan, part: &Part, aspect: f64) -> Vec<Ordering> {
 }
 
 /// Ranks for a part: cycles broken in different ways, shallow graphs folded.
-fn rankings(part: &Part, aspect: f64) -> Vec<Vec<usize>> {
+fn rankings(part: &Component, aspect: f64) -> Vec<Vec<usize>> {
     let n = part.vertices.len();
     let ranked = |reversed: &[bool]| {
         let edges = rank::turned(&part.ends, reversed);
@@ -149,7 +151,7 @@ fn rankings(part: &Part, aspect: f64) -> Vec<Vec<usize>> {
 }
 
 /// One part placed and routed, its top left corner at (0, 0).
-pub(crate) struct Block {
+pub(crate) struct PlacedPart {
     pub(crate) size: Size,
     pub(crate) crossings: u64,
     pub(crate) boxes: Vec<Rect>,
@@ -158,7 +160,7 @@ pub(crate) struct Block {
 }
 
 /// How good a drawing is: the scale at which it fills the page, above all; how small it is; how free of crossings.
-fn quality(size: Size, crossings: u64, links: usize, options: &Options) -> f64 {
+fn quality(size: Size, crossings: u64, links: usize, options: &LayoutOptions) -> f64 {
     let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
     let readable = libm::pow(pack::fit(size, options.page), 0.8) * libm::pow(small, 0.2);
     readable / (1.0 + 0.5 * crossings as f64 / links.max(1) as f64)
@@ -166,11 +168,11 @@ fn quality(size: Size, crossings: u64, links: usize, options: &Options) -> f64 {
 
 fn best_block(
     plan: &Plan,
-    options: &Options,
-    part: &Part,
+    options: &LayoutOptions,
+    part: &Component,
     orderings: &[Ordering],
     orientation: Orientation,
-) -> Block {
+) -> PlacedPart {
     let blocks = orderings
         .iter()
         .map(|ordering| block(plan, part, ordering, orientation));
@@ -181,10 +183,15 @@ fn best_block(
         )
     });
     let best = judged.reduce(|best, next| if next.0 > best.0 { next } else { best });
-    best.map_or_else(Block::empty, |best| best.1)
+    best.map_or_else(PlacedPart::empty, |best| best.1)
 }
 
-fn block(plan: &Plan, part: &Part, ordering: &Ordering, orientation: Orientation) -> Block {
+fn block(
+    plan: &Plan,
+    part: &Component,
+    ordering: &Ordering,
+    orientation: Orientation,
+) -> PlacedPart {
     let layers = &ordering.layers;
     let room = Spacing::new(plan, part, layers, orientation);
     let across = place::place(layers, &ordering.rows, &room.apart(&ordering.rows));
@@ -194,7 +201,7 @@ fn block(plan: &Plan, part: &Part, ordering: &Ordering, orientation: Orientation
         .iter()
         .map(|&v| plan.vertices[v].outline)
         .collect();
-    let sheet = routes::Sheet {
+    let sheet = routes::RoutingPlane {
         layers,
         size: &room.size,
         outline: &outline,
@@ -206,7 +213,7 @@ fn block(plan: &Plan, part: &Part, ordering: &Ordering, orientation: Orientation
         .collect();
     let clusters = room.frames(&boxes, &across, &columns);
     let routes = sheet.routes(&part.ends);
-    Block {
+    PlacedPart {
         size: Size::default(),
         crossings: ordering.crossings,
         boxes,
@@ -216,7 +223,7 @@ fn block(plan: &Plan, part: &Part, ordering: &Ordering, orientation: Orientation
     .on_page(orientation)
 }
 
-impl Block {
+impl PlacedPart {
     fn empty() -> Self {
         Self {
             size: Size::default(),
@@ -267,9 +274,9 @@ impl Block {
 /// All blocks packed, with the quality of the whole.
 pub(crate) fn assembled(
     plan: &Plan,
-    options: &Options,
-    parts: &[Part],
-    blocks: Vec<Block>,
+    options: &LayoutOptions,
+    parts: &[Component],
+    blocks: Vec<PlacedPart>,
     orientation: Orientation,
 ) -> (f64, Layout) {
     let sizes: Vec<Size> = blocks.iter().map(|block| block.size).collect();

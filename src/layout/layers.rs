@@ -1,6 +1,6 @@
 //! A part cut into layers: long edges led through the layers between their ends, clusters bordered in each layer.
 
-use crate::layout::{Kind, Layers, Part};
+use crate::layout::{Component, LayerItem, Layers};
 
 /// Which cluster a long edge passes a layer in, besides the one around both of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,11 +12,11 @@ pub(crate) enum Lane {
 }
 
 /// The layers of a part with these ranks; an edge that runs against them is led the other way.
-pub(crate) fn cut(part: &Part, rank: &[usize], lane: Lane) -> Layers {
+pub(crate) fn cut(part: &Component, rank: &[usize], lane: Lane) -> Layers {
     let n = part.vertices.len();
     let mut layers = Layers {
         vertices: n,
-        kind: vec![Kind::Vertex; n],
+        kind: vec![LayerItem::Vertex; n],
         rank: rank.to_vec(),
         home: part.home.clone(),
         up: vec![Vec::new(); n],
@@ -40,7 +40,7 @@ pub(crate) fn cut(part: &Part, rank: &[usize], lane: Lane) -> Layers {
 }
 
 /// How many items the layers would have.
-pub(crate) fn items(part: &Part, rank: &[usize]) -> usize {
+pub(crate) fn items(part: &Component, rank: &[usize]) -> usize {
     let bends = part
         .ends
         .iter()
@@ -55,7 +55,7 @@ pub(crate) fn items(part: &Part, rank: &[usize]) -> usize {
 }
 
 /// The first and last rank in each cluster.
-fn spans(part: &Part, rank: &[usize]) -> Vec<(usize, usize)> {
+fn spans(part: &Component, rank: &[usize]) -> Vec<(usize, usize)> {
     let mut span = vec![(usize::MAX, 0); part.parent.len()];
     for (&home, &rank) in part.home.iter().zip(rank) {
         let mut cluster = home;
@@ -69,7 +69,7 @@ fn spans(part: &Part, rank: &[usize]) -> Vec<(usize, usize)> {
 }
 
 impl Layers {
-    fn push(&mut self, kind: Kind, rank: usize, home: usize) -> usize {
+    fn push(&mut self, kind: LayerItem, rank: usize, home: usize) -> usize {
         self.kind.push(kind);
         self.rank.push(rank);
         self.home.push(home);
@@ -95,7 +95,7 @@ impl Layers {
                     spanning(to).or_else(|| spanning(from)).unwrap_or(shared)
                 }
             };
-            let bend = self.push(Kind::Bend, rank, home);
+            let bend = self.push(LayerItem::Bend, rank, home);
             self.link(chain[chain.len() - 1], bend);
             chain.push(bend);
         }
@@ -138,8 +138,8 @@ impl Layers {
             let (low, high) = self.span[cluster];
             self.borders.push((self.kind.len(), self.kind.len() + 1));
             for rank in low..=high {
-                let top = self.push(Kind::Top, rank, cluster);
-                let bottom = self.push(Kind::Bottom, rank, cluster);
+                let top = self.push(LayerItem::Top, rank, cluster);
+                let bottom = self.push(LayerItem::Bottom, rank, cluster);
                 if rank > low {
                     self.link(top - 2, top);
                     self.link(bottom - 2, bottom);
@@ -155,15 +155,15 @@ mod tests {
 
     #[test]
     fn a_long_edge_bends_in_every_layer_between() {
-        let part = Part {
+        let part = Component {
             vertices: vec![0, 1, 2],
             ends: vec![(0, 1), (1, 2), (2, 0)],
             home: vec![0; 3],
             parent: vec![0],
-            ..Part::default()
+            ..Component::default()
         };
         let layers = cut(&part, &[0, 1, 2], Lane::Outside);
         assert_eq!(layers.chains, [vec![0, 1], vec![1, 2], vec![0, 3, 2]]);
-        assert_eq!(layers.kind[3], Kind::Bend);
+        assert_eq!(layers.kind[3], LayerItem::Bend);
     }
 }

@@ -14,12 +14,14 @@ use ::layout::std_shapes::shapes::{Element, ShapeKind};
 use ::layout::topo::layout::VisualGraph;
 use ::layout::topo::placer::Placer;
 
-use super::layered::{Block, assembled};
+use super::layered::{PlacedPart, assembled};
 use super::layered::{acyclic, labels, order, parts, rank};
 use super::layers::{Lane, cut};
 use super::routes;
 use super::spacing::{Spacing, turned};
-use super::{Engine, Kind, Layers, Layout, Options, Orientation, Part, Plan, Rows};
+use super::{
+    Component, Engine, LayerItem, LayerRows, Layers, Layout, LayoutOptions, Orientation, Plan,
+};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
 
@@ -35,7 +37,7 @@ const EDGE_HALO: Size = Size::new(10.0, 7.0);
 pub(crate) struct LayoutRs;
 
 impl Engine for LayoutRs {
-    fn lay_out(&self, plan: &Plan, options: &Options) -> Result<Layout> {
+    fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout> {
         let hint = "use `--layout layered`, or show fewer elements";
         if plan.vertices.len() > MOST {
             return Err(Error::usage(
@@ -72,10 +74,10 @@ fn unheard<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
     outcome
 }
 
-fn lay_out(plan: &Plan, options: &Options, orientation: Orientation) -> Result<Layout> {
+fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Result<Layout> {
     let flat = plan.without_clusters();
     let parts = parts::parts(&flat);
-    let blocks: Option<Vec<Block>> = parts
+    let blocks: Option<Vec<PlacedPart>> = parts
         .iter()
         .map(|part| block(&flat, part, orientation))
         .collect();
@@ -97,7 +99,7 @@ fn lay_out(plan: &Plan, options: &Options, orientation: Orientation) -> Result<L
 }
 
 /// One part, or nothing if its boxes overlap.
-fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
+fn block(plan: &Plan, part: &Component, orientation: Orientation) -> Option<PlacedPart> {
     let n = part.vertices.len();
     let reversed = acyclic::in_order(n, &part.ends);
     let layers = cut(
@@ -118,7 +120,7 @@ fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
         .iter()
         .map(|&v| plan.vertices[v].outline)
         .collect();
-    let sheet = routes::Sheet {
+    let sheet = routes::RoutingPlane {
         layers: &layers,
         size: &room.size,
         outline: &outline,
@@ -131,7 +133,7 @@ fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
     let clear = (0..n).all(|v| boxes[..v].iter().all(|other| !other.overlaps(&boxes[v])));
     let routes = sheet.routes(&part.ends);
     clear.then(|| {
-        Block {
+        PlacedPart {
             size: Size::default(),
             crossings,
             boxes,
@@ -145,7 +147,7 @@ fn block(plan: &Plan, part: &Part, orientation: Orientation) -> Option<Block> {
 /// The middle of each item: along, across.
 fn places(
     layers: &Layers,
-    rows: &Rows,
+    rows: &LayerRows,
     room: &Spacing,
     orientation: Orientation,
 ) -> Vec<(f64, f64)> {
@@ -160,7 +162,7 @@ fn places(
         TheirPoint::new(size.w, size.h)
     };
     for item in 0..layers.kind.len() {
-        let vertex = layers.kind[item] == Kind::Vertex;
+        let vertex = layers.kind[item] == LayerItem::Vertex;
         let (size, halo) = if vertex {
             let size = room.size[item];
             (
@@ -211,7 +213,7 @@ fn column(row: &[usize], layers: &Layers, room: &Spacing, places: &[(f64, f64)])
     let middle = row.iter().map(|&item| places[item].0).sum::<f64>() / row.len().max(1) as f64;
     let vertices = row
         .iter()
-        .filter(|&&item| layers.kind[item] == Kind::Vertex);
+        .filter(|&&item| layers.kind[item] == LayerItem::Vertex);
     let half = vertices.map(|&v| room.size[v].w / 2.0).fold(0.0, f64::max);
     (middle - half, middle + half)
 }

@@ -13,7 +13,7 @@ const STEP: Size = Size::new(30.0, 20.0);
 /// Boxes and clusters with known places kept; routes are still to be found. Boxes that grew stay where their middle
 /// was; of two that would overlap now, the later one counts as new.
 pub(crate) fn kept(plan: &Plan, known: &[Option<Rect>], orientation: Orientation) -> Layout {
-    let mut table = Table {
+    let mut table = PinnedBoxes {
         plan,
         boxes: vec![None; plan.vertices.len()],
     };
@@ -60,12 +60,12 @@ fn is_sane(rect: &Rect) -> bool {
 }
 
 /// The boxes placed so far.
-struct Table<'a> {
+struct PinnedBoxes<'a> {
     plan: &'a Plan,
     boxes: Vec<Option<Rect>>,
 }
 
-impl Table<'_> {
+impl PinnedBoxes<'_> {
     fn is_free(&self, place: &Rect, gap: f64) -> bool {
         let place = place.grown(gap);
         !self

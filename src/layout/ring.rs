@@ -3,7 +3,7 @@
 //! Layers would lead most of such edges past most of the boxes. On a rim no box lies between two others.
 
 use super::layered::labels;
-use super::{Engine, Layout, Options, Orientation, Outline, Plan, Route, Vertex};
+use super::{Engine, Layout, LayoutOptions, Orientation, Outline, Plan, Route, Vertex};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 
@@ -23,7 +23,7 @@ const PIECES: u32 = 48;
 pub(crate) struct Ring;
 
 impl Engine for Ring {
-    fn lay_out(&self, plan: &Plan, options: &Options) -> Result<Layout> {
+    fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout> {
         if plan.vertices.len() > MOST {
             return Err(Error::usage(
                 format!("a ring holds at most {MOST} boxes"),
@@ -243,8 +243,8 @@ mod tests {
         plan
     }
 
-    fn page() -> Options {
-        Options {
+    fn page() -> LayoutOptions {
+        LayoutOptions {
             page: Size::new(1280.0, 560.0),
             orientation: None,
         }

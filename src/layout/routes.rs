@@ -10,7 +10,7 @@ use crate::base::geometry::{Point, Size};
 const PORT_STEP: f64 = 6.0;
 
 /// What a router sees, with x along and y across: vertices as they were placed and the layers' extents.
-pub(crate) struct Sheet<'a> {
+pub(crate) struct RoutingPlane<'a> {
     /// The layered graph.
     pub(crate) layers: &'a Layers,
     /// The size of each vertex: along, across.
@@ -23,7 +23,7 @@ pub(crate) struct Sheet<'a> {
     pub(crate) columns: &'a [(f64, f64)],
 }
 
-impl Sheet<'_> {
+impl RoutingPlane<'_> {
     /// The middle of a vertex.
     pub(crate) fn centre(&self, v: usize) -> Point {
         let (start, end) = self.columns[self.layers.rank[v]];
@@ -133,7 +133,7 @@ impl Sheet<'_> {
         let [first, .., last] = chain[..] else {
             return Route::default();
         };
-        let mut pen = Pen::at(self.centre(first).x + self.reach(first, leave), leave);
+        let mut pen = RoutePen::at(self.centre(first).x + self.reach(first, leave), leave);
         pen.level(self.columns[self.layers.rank[first]].1);
         for &bend in &chain[1..chain.len() - 1] {
             let (start, end) = self.columns[self.layers.rank[bend]];
@@ -147,14 +147,14 @@ impl Sheet<'_> {
 }
 
 /// Draws a route piece by piece.
-struct Pen {
+struct RoutePen {
     at: Point,
     route: Route,
     /// Whether the last piece is level and can be lengthened.
     is_level: bool,
 }
 
-impl Pen {
+impl RoutePen {
     fn at(x: f64, y: f64) -> Self {
         let at = Point::new(x, y);
         let route = Route {

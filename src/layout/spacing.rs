@@ -3,7 +3,7 @@
 //! Here x runs along the edges and y across; [`Spacing::turned`] brings sizes there and back.
 
 use crate::base::geometry::{Rect, Size};
-use crate::layout::{Kind, Layers, Orientation, Part, Plan, Rows};
+use crate::layout::{Component, LayerItem, LayerRows, Layers, Orientation, Plan};
 
 /// The room between boxes side by side, between edges side by side, and between an edge and anything else.
 const BOX_GAP: f64 = 12.0;
@@ -33,7 +33,7 @@ pub(crate) struct Spacing<'a> {
 impl<'a> Spacing<'a> {
     pub(crate) fn new(
         plan: &Plan,
-        part: &Part,
+        part: &Component,
         layers: &'a Layers,
         orientation: Orientation,
     ) -> Self {
@@ -71,7 +71,7 @@ impl<'a> Spacing<'a> {
     }
 
     /// The distances between neighbours in every row.
-    pub(crate) fn apart(&self, rows: &Rows) -> Vec<Vec<f64>> {
+    pub(crate) fn apart(&self, rows: &LayerRows) -> Vec<Vec<f64>> {
         let distance = |pair: &[usize]| {
             self.reach(pair[0], true) + self.reach(pair[1], false) + self.gap(pair[0], pair[1])
         };
@@ -89,23 +89,22 @@ impl<'a> Spacing<'a> {
     /// How far an item reaches across from its middle; borders reach inwards only.
     fn reach(&self, item: usize, onwards: bool) -> f64 {
         match (self.layers.kind[item], self.orientation) {
-            (Kind::Vertex, _) => self.size[item].h / 2.0 + self.loop_room(item),
-            (Kind::Top, Orientation::LeftRight) if onwards => {
+            (LayerItem::Vertex, _) => self.size[item].h / 2.0 + self.loop_room(item),
+            (LayerItem::Top, Orientation::LeftRight) if onwards => {
                 PADDING + self.title[self.layers.home[item]].h
             }
-            (Kind::Top, Orientation::TopBottom) if onwards => PADDING,
-            (Kind::Bottom, _) if !onwards => PADDING,
+            (LayerItem::Top, Orientation::TopBottom) if onwards => PADDING,
+            (LayerItem::Bottom, _) if !onwards => PADDING,
             _ => 0.0,
         }
     }
 
     fn gap(&self, a: usize, b: usize) -> f64 {
         match (self.layers.kind[a], self.layers.kind[b]) {
-            (Kind::Vertex, Kind::Vertex) => BOX_GAP,
-            (Kind::Vertex | Kind::Bend, Kind::Vertex | Kind::Bend) => EDGE_GAP,
-            (Kind::Top, Kind::Vertex | Kind::Top) | (Kind::Vertex | Kind::Bottom, Kind::Bottom) => {
-                0.0
-            }
+            (LayerItem::Vertex, LayerItem::Vertex) => BOX_GAP,
+            (LayerItem::Vertex | LayerItem::Bend, LayerItem::Vertex | LayerItem::Bend) => EDGE_GAP,
+            (LayerItem::Top, LayerItem::Vertex | LayerItem::Top)
+            | (LayerItem::Vertex | LayerItem::Bottom, LayerItem::Bottom) => 0.0,
             _ => MARGIN,
         }
     }
@@ -124,7 +123,7 @@ impl<'a> Spacing<'a> {
     }
 
     /// The extent of every layer along.
-    pub(crate) fn columns(&self, rows: &Rows, across: &[f64]) -> Vec<(f64, f64)> {
+    pub(crate) fn columns(&self, rows: &LayerRows, across: &[f64]) -> Vec<(f64, f64)> {
         let depth = self.depths();
         let mut width = self.widths();
         let bending = rows.iter().map(|row| self.bending_room(row, across));
@@ -211,7 +210,7 @@ impl<'a> Spacing<'a> {
         let (mut edges, mut steepest) = (0.0, 0.0_f64);
         for &v in row
             .iter()
-            .filter(|&&v| matches!(self.layers.kind[v], Kind::Vertex | Kind::Bend))
+            .filter(|&&v| matches!(self.layers.kind[v], LayerItem::Vertex | LayerItem::Bend))
         {
             for &u in &self.layers.down[v] {
                 edges += 1.0;

@@ -40,7 +40,7 @@ pub struct LogOptions {
 }
 
 /// A row of the log, in order.
-enum Row<'a> {
+enum LogRow<'a> {
     Phase(usize, &'a Phase),
     Entry(EntryId, &'a Entry),
     Part(EntryId, &'a Entry),
@@ -58,7 +58,7 @@ pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String 
     }
 }
 
-fn chosen(mission: &Mission, options: LogOptions) -> Vec<Row<'_>> {
+fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
     let ledger = &mission.ledger;
     let parts = if options.parts {
         ledger.all_parts()
@@ -70,18 +70,18 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<Row<'_>> {
     let mut rows = Vec::new();
     for (id, entry) in (0..).zip(&ledger.entries) {
         while let Some((at, phase)) = phases.next_if(|(_, p)| p.span.start <= entry.time) {
-            rows.push(Row::Phase(at, phase));
+            rows.push(LogRow::Phase(at, phase));
         }
         if entry.part_of.is_some() || entry.quiet && !options.all {
             continue;
         }
-        rows.push(Row::Entry(id, entry));
+        rows.push(LogRow::Entry(id, entry));
         let own = parts.get(&id).into_iter().flatten();
         let own =
-            own.filter_map(|part| Some(Row::Part(*part, ledger.entries.get(*part as usize)?)));
+            own.filter_map(|part| Some(LogRow::Part(*part, ledger.entries.get(*part as usize)?)));
         rows.extend(own);
     }
-    rows.extend(phases.map(|(at, phase)| Row::Phase(at, phase)));
+    rows.extend(phases.map(|(at, phase)| LogRow::Phase(at, phase)));
     rows
 }
 
@@ -105,16 +105,16 @@ fn title(at: usize, phase: &Phase) -> String {
     format!("phase {}: {}", at + 1, visible(&phase.name))
 }
 
-fn text(mission: &Mission, rows: &[Row<'_>]) -> String {
+fn text(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let mut all = String::new();
     for row in rows {
         let (when, words) = match row {
-            Row::Phase(at, phase) => {
+            LogRow::Phase(at, phase) => {
                 let when = words::offset_tenths(mission.offset(phase.span.start));
                 (when, format!("── {} ──", title(*at, phase)))
             }
-            Row::Entry(id, entry) => (at(mission, entry), sentence(mission, *id, entry)),
-            Row::Part(id, entry) => {
+            LogRow::Entry(id, entry) => (at(mission, entry), sentence(mission, *id, entry)),
+            LogRow::Part(id, entry) => {
                 let words = format!("  {}", sentence(mission, *id, entry));
                 (at(mission, entry), words)
             }
@@ -125,19 +125,19 @@ fn text(mission: &Mission, rows: &[Row<'_>]) -> String {
     all
 }
 
-fn markdown(mission: &Mission, rows: &[Row<'_>]) -> String {
+fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let mut all = "| when | what |\n|---:|---|\n".to_owned();
     for row in rows {
         let (when, words) = match row {
-            Row::Phase(at, phase) => {
+            LogRow::Phase(at, phase) => {
                 let when = words::offset_tenths(mission.offset(phase.span.start));
                 (when, format!("**{}**", escaped(&title(*at, phase))))
             }
-            Row::Entry(id, entry) => {
+            LogRow::Entry(id, entry) => {
                 let words = sentence(mission, *id, entry);
                 (at(mission, entry), escaped(&words))
             }
-            Row::Part(id, entry) => {
+            LogRow::Part(id, entry) => {
                 let words = sentence(mission, *id, entry);
                 (at(mission, entry), format!("· {}", escaped(&words)))
             }
@@ -181,12 +181,12 @@ const COLUMNS: [&str; 16] = [
     "weight",
 ];
 
-fn csv(mission: &Mission, rows: &[Row<'_>]) -> String {
+fn csv(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     table(
         &COLUMNS,
         rows.iter().map(|row| match row {
-            Row::Phase(at, phase) => phase_cells(*at, phase),
-            Row::Entry(id, entry) | Row::Part(id, entry) => cells(mission, *id, entry),
+            LogRow::Phase(at, phase) => phase_cells(*at, phase),
+            LogRow::Entry(id, entry) | LogRow::Part(id, entry) => cells(mission, *id, entry),
         }),
     )
 }
@@ -246,13 +246,13 @@ fn phase_cells(at: usize, phase: &Phase) -> Vec<String> {
     cells
 }
 
-fn ndjson(mission: &Mission, rows: &[Row<'_>]) -> String {
+fn ndjson(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     let entries = rows_of(mission);
     let mut all = String::new();
     for row in rows {
         match row {
-            Row::Phase(at, phase) => all.push_str(&phase_line(*at, phase)),
-            Row::Entry(id, _) | Row::Part(id, _) => {
+            LogRow::Phase(at, phase) => all.push_str(&phase_line(*at, phase)),
+            LogRow::Entry(id, _) | LogRow::Part(id, _) => {
                 all.push_str(entries.get(*id as usize).map_or("{}", String::as_str));
             }
         }

@@ -40,11 +40,11 @@ pub struct Info {
     /// All messages.
     pub messages: u64,
     /// How many nodes are known how well.
-    pub nodes_by_degree: Degrees,
+    pub nodes_by_degree: DegreeCounts,
     /// How many publications are known how well.
-    pub publishes_by_degree: Degrees,
+    pub publishes_by_degree: DegreeCounts,
     /// How many subscriptions are known how well.
-    pub subscribes_by_degree: Degrees,
+    pub subscribes_by_degree: DegreeCounts,
     /// Topics that carry messages and of which no publisher is known.
     pub topics_without_publisher: usize,
     /// Topics that carry messages and of which no subscriber is known; the recorder is none.
@@ -82,14 +82,14 @@ pub struct BagInfo {
 /// How many elements are known how well at their best.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "the names are those of `Degree`")]
-pub struct Degrees {
+pub struct DegreeCounts {
     pub measured: usize,
     pub stated: usize,
     pub inferred: usize,
     pub declared: usize,
 }
 
-impl Degrees {
+impl DegreeCounts {
     fn add(&mut self, degree: Degree) {
         match degree {
             Degree::Measured => self.measured += 1,
@@ -105,7 +105,7 @@ impl Degrees {
     }
 }
 
-impl FromIterator<Degree> for Degrees {
+impl FromIterator<Degree> for DegreeCounts {
     fn from_iter<T: IntoIterator<Item = Degree>>(degrees: T) -> Self {
         let mut all = Self::default();
         degrees.into_iter().for_each(|degree| all.add(degree));
@@ -331,7 +331,7 @@ fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usiz
 
 /// The edges of one node and its messages.
 #[derive(Clone, Default)]
-struct Traffic {
+struct NodeTraffic {
     publishes: usize,
     subscribes: usize,
     /// `None` where no count is known.
@@ -341,9 +341,9 @@ struct Traffic {
 }
 
 /// The traffic of every node, in one pass over the edges.
-fn traffic(mission: &Mission, topics: &[TopicInfo]) -> Vec<Traffic> {
+fn traffic(mission: &Mission, topics: &[TopicInfo]) -> Vec<NodeTraffic> {
     let elements = &mission.elements;
-    let mut traffic = vec![Traffic::default(); elements.nodes.len()];
+    let mut traffic = vec![NodeTraffic::default(); elements.nodes.len()];
     for edge in &elements.publishes {
         traffic[edge.node as usize].publishes += 1;
     }

@@ -19,7 +19,7 @@ use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Window;
 
 pub(crate) use changes::{explain, places};
-pub(crate) use make::{Told, make, sorted};
+pub(crate) use make::{LedgerInput, make, sorted};
 
 /// A launch file brings its nodes up one after the other, each within this time.
 const CLOSE_NS: i64 = 2_000_000_000;

@@ -53,7 +53,7 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
 
 /// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
 /// use if every payload were read.
-fn affordable(reading: &Reading) -> collector::Options {
+fn affordable(reading: &Reading) -> collector::CollectOptions {
     let mut options = reading.collect.clone();
     let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
     if sizes.fold(0, u64::saturating_add) > options.payload_bytes {

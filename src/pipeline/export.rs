@@ -13,7 +13,7 @@ use crate::draw::board::Board;
 use crate::draw::figure::{self, Figure};
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
-use crate::draw::strip::{Source, Strip, strip};
+use crate::draw::strip::{Strip, StripSource, strip};
 use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
 use crate::export::sequence::Sequence;
@@ -31,7 +31,7 @@ pub struct Render {
     /// What to draw.
     pub drawing: Drawing,
     /// How the sequence runs.
-    pub sequence: options::Options,
+    pub sequence: options::SequenceOptions,
     /// Files and folders of the user's that are read beside the inputs, and never overwritten.
     pub kept: Vec<PathBuf>,
     /// What to write.
@@ -49,7 +49,7 @@ impl Render {
         Ok(Self {
             reading,
             drawing: Drawing::new()?,
-            sequence: options::Options::default(),
+            sequence: options::SequenceOptions::default(),
             outputs,
             kept: Vec::new(),
             is_filtered: false,
@@ -256,7 +256,7 @@ const MOST_LIVES: usize = 14;
 /// Who lived when, for the strip below frames.
 fn course(mission: &Mission, drawing: &Drawing) -> figure::Course {
     let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
-    let source = figure::source::Source::new(mission, nodes, topics, false);
+    let source = figure::source::FigureSource::new(mission, nodes, topics, false);
     figure::Course::new(&source, MOST_LIVES)
 }
 
@@ -274,7 +274,7 @@ fn show_board(
         all.add(Notice::new(NoticeKind::Chosen, text));
     }
     let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
-    let source = figure::source::Source::new(&mission, nodes, topics, false);
+    let source = figure::source::FigureSource::new(&mission, nodes, topics, false);
     let page = drawing.page.clone();
     let is_sized = drawing.is_sized || !drawing.is_fitted;
     let board = Board::new(
@@ -334,7 +334,7 @@ fn side_by_side(
         return Ok(None);
     }
     let page = &job.drawing.page;
-    let source = Source {
+    let source = StripSource {
         mission,
         view,
         picture,

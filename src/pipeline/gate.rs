@@ -9,7 +9,7 @@ use crate::base::error::Result;
 use crate::base::{budget, file, words};
 use crate::export::Output;
 use crate::export::check as places;
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::gate::{
     DiffFormat, DiffSubject, Difference, Format, Side, Subject, Update, Verdict, differences,
@@ -49,7 +49,7 @@ impl Check {
 }
 
 /// What came of it.
-pub(crate) struct Checked {
+pub(crate) struct CheckResult {
     pub(crate) mission: Mission,
     pub(crate) verdict: Verdict,
 }
@@ -58,7 +58,7 @@ pub(crate) struct Checked {
 ///
 /// # Errors
 /// Where the expectation, the mission or an output cannot be read or written.
-pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
+pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
     let text = file::read_text(&job.expect, budget::USER_TEXT)?;
     let expectation = crate::gate::read(&text, &job.expect)?;
     let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
@@ -87,7 +87,7 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<Checked> {
         };
         put(&report.target, &text)?;
     }
-    Ok(Checked { mission, verdict })
+    Ok(CheckResult { mission, verdict })
 }
 
 /// The whole job of `bagreel diff`.
@@ -255,7 +255,7 @@ fn paths(readings: &[Reading]) -> Vec<PathBuf> {
 /// Writes a text whole or not at all.
 fn put(target: &Target, text: &str) -> Result<()> {
     places::make_folder(target)?;
-    let mut sink = Sink::create(target, None)?;
+    let mut sink = OutputSink::create(target, None)?;
     let failed = sink.error();
     match sink.write_all(text.as_bytes()) {
         Ok(()) => sink.commit().map(drop),

@@ -106,7 +106,7 @@ impl Basis<'_> {
 }
 
 /// One line: when it begins, if it says so, and its name.
-type Line = (Option<i64>, String);
+type CaptionLine = (Option<i64>, String);
 
 fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     let bad = |line: usize, reason: String| Error::BadFile {
@@ -118,7 +118,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     };
     let all = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim()));
     let all = all.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
-    let lines: Vec<(usize, Line)> = all.map(|(n, l)| (n, line(l))).collect();
+    let lines: Vec<(usize, CaptionLine)> = all.map(|(n, l)| (n, line(l))).collect();
     let timed = lines.iter().filter(|(_, (at, _))| at.is_some()).count();
     if let Some((n, _)) = lines.iter().find(|(_, (at, _))| timed > 0 && at.is_none()) {
         return Err(bad(
@@ -153,7 +153,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
     Ok(found)
 }
 
-fn line(text: &str) -> Line {
+fn line(text: &str) -> CaptionLine {
     let timed = text.split_once([' ', '|', '\t']);
     let timed = timed.and_then(|(at, name)| Some((parse_nanos(at)?, name)));
     match timed {

@@ -7,7 +7,7 @@ use super::collect::{Collected, collect};
 use super::phases::{Basis, wanted};
 use super::verify::{Verified, verify};
 use super::{Phases, Stage, Watch};
-use crate::bag::{self, Input, Kind};
+use crate::bag::{self, Input, InputKind};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
@@ -36,9 +36,9 @@ pub struct Reading {
     /// Whether to merge runs of windows without a change.
     pub skip_unchanged: bool,
     /// What to look at while reading.
-    pub collect: collector::Options,
+    pub collect: collector::CollectOptions,
     /// What is added to what the bags tell.
-    pub conclude: conclude::Options,
+    pub conclude: conclude::ConcludeOptions,
     /// Windows of silence before something that never speaks again counts as gone.
     pub grace: usize,
     /// The source code to read once the recording's day is known; takes the place of `conclude.code`.
@@ -57,8 +57,8 @@ impl Default for Reading {
             verify: false,
             division: Division::default(),
             skip_unchanged: false,
-            collect: collector::Options::default(),
-            conclude: conclude::Options::default(),
+            collect: collector::CollectOptions::default(),
+            conclude: conclude::ConcludeOptions::default(),
             grace: 0,
             code: None,
             rate_change: RATE_CHANGE,
@@ -127,7 +127,8 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
 /// # Errors
 /// Where it cannot be read.
 pub(crate) fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
-    let is_json = |input: &Input| -> Result<bool> { Ok(matches!(bag::sniff(input)?, Kind::Json)) };
+    let is_json =
+        |input: &Input| -> Result<bool> { Ok(matches!(bag::sniff(input)?, InputKind::Json)) };
     match inputs {
         [Input::Path(path)] if is_json(&inputs[0])? => Ok(Some(path)),
         _ => Ok(None),
@@ -288,7 +289,7 @@ fn told(
     reading: &Reading,
 ) -> Result<Ledger> {
     let elements = &history.elements;
-    let entries = ledger::make(&ledger::Told {
+    let entries = ledger::make(&ledger::LedgerInput {
         elements,
         lives: &history.lives,
         rate_change: reading.rate_change,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::collect::NOTHING_RECORDED;
 use super::{Reading, Watch, read};
-use crate::bag::{self, Input, Kind};
+use crate::bag::{self, Input, InputKind};
 use crate::base::error::{Error, Result};
 use crate::export::tables::{TableFormat, writer};
 use crate::mission::info::{SurveyRow, info, survey_table};
@@ -164,7 +164,11 @@ fn is_bag(path: &Path) -> bool {
             .iter()
             .flat_map(|f| f.extensions)
             .any(|e| ends_in(path, e));
-    named || matches!(bag::sniff(&Input::Path(path.to_owned())), Ok(Kind::Bag(_)))
+    named
+        || matches!(
+            bag::sniff(&Input::Path(path.to_owned())),
+            Ok(InputKind::Bag(_))
+        )
 }
 
 fn ends_in(path: &Path, extension: &str) -> bool {

@@ -62,7 +62,7 @@ pub(crate) fn swallows<'a>(
 
 /// A namespace that could be collapsed to one box.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Candidate {
+pub struct Collapsible {
     /// The namespace: `/robot1/nav`.
     pub name: Arc<str>,
     /// How many boxes it holds now.
@@ -97,7 +97,7 @@ impl View {
     /// The namespaces that could be collapsed, the one to collapse first at the front: those in which least changes for
     /// each box that they hold, then innermost ones before those around them, the largest first, then by name. Those
     /// that hold fewer than two boxes, or that `options` keeps open, are left out.
-    pub fn collapsible(&self, mission: &Mission, options: &ViewOptions) -> Vec<Candidate> {
+    pub fn collapsible(&self, mission: &Mission, options: &ViewOptions) -> Vec<Collapsible> {
         let news = news(mission);
         let open = Collapse::new(options).expand;
         let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
@@ -118,14 +118,14 @@ impl View {
             let mut after = sizes.range(below.as_str()..);
             !after.next().is_some_and(|(s, _)| s.starts_with(&below))
         };
-        let mut all: Vec<(bool, Candidate)> = sizes
+        let mut all: Vec<(bool, Collapsible)> = sizes
             .iter()
             .map(|(space, size)| {
                 let below = format!("{space}/");
                 let inside = news.range(below.as_str()..);
                 let inside = inside.take_while(|(name, _)| name.starts_with(&below));
                 let own = news.get(space).copied().unwrap_or_default();
-                let candidate = Candidate {
+                let candidate = Collapsible {
                     name: Arc::from(*space),
                     items: *size,
                     headlines: own + inside.map(|(_, n)| n).sum::<usize>(),
@@ -134,7 +134,7 @@ impl View {
             })
             .collect();
         all.sort_by(|a, b| {
-            let key = |c: &(bool, Candidate)| (c.0, usize::MAX - c.1.items);
+            let key = |c: &(bool, Collapsible)| (c.0, usize::MAX - c.1.items);
             // Headlines per box, without dividing.
             let (here, there) = (a.1.headlines * b.1.items, b.1.headlines * a.1.items);
             let by_key = here.cmp(&there).then(key(a).cmp(&key(b)));

@@ -11,12 +11,12 @@ use crate::base::error::{Error, Result};
 /// a name that it equals, and, if it holds a character outside `[A-Za-z0-9_/]`, as a pattern at the name's beginning.
 #[derive(Clone, Debug, Default)]
 pub struct NameFilter {
-    includes: Vec<Token>,
-    excludes: Vec<Token>,
+    includes: Vec<FilterToken>,
+    excludes: Vec<FilterToken>,
 }
 
 #[derive(Clone, Debug)]
-struct Token {
+struct FilterToken {
     text: String,
     pattern: Option<Regex>,
 }
@@ -29,13 +29,13 @@ impl NameFilter {
     pub fn parse(text: &str) -> Result<Self> {
         let tokens: Vec<&str> = text.split(',').map(str::trim).collect();
         let excludes = tokens.iter().filter_map(|t| t.strip_prefix('-'));
-        let excludes = excludes.map(Token::new).collect::<Result<_>>()?;
+        let excludes = excludes.map(FilterToken::new).collect::<Result<_>>()?;
         let mut includes: Vec<&str> = tokens;
         includes.retain(|t| !t.starts_with('-'));
         if matches!(includes[..], ["/" | ""]) {
             includes.clear();
         }
-        let includes = includes.into_iter().map(Token::new);
+        let includes = includes.into_iter().map(FilterToken::new);
         let includes = includes.collect::<Result<_>>()?;
         Ok(Self { includes, excludes })
     }
@@ -58,7 +58,7 @@ impl NameFilter {
     }
 }
 
-impl Token {
+impl FilterToken {
     fn new(text: &str) -> Result<Self> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
         let is_pattern = text.is_empty() || !text.chars().all(plain);

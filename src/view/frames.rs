@@ -2,10 +2,10 @@
 
 use super::caption::Speaker;
 use super::items::Viewed;
-use super::lives::{Alive, Lives};
+use super::lives::{Alive, ItemTurns};
 use super::marks::{News, Told};
 use super::settle::settle;
-use super::state::{Presence, States, present};
+use super::state::{LivingItems, States, present};
 use super::{ArrowKind, Attendance, Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
 use crate::graph::Element;
 use crate::mission::Mission;
@@ -13,7 +13,7 @@ use crate::mission::Mission;
 /// The windows one after the other.
 pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Vec<Frame> {
     let speaker = Speaker::new(mission, viewed);
-    let lives = Lives::new(mission);
+    let lives = ItemTurns::new(mission);
     let parts = mission.ledger.all_parts();
     let mut frames = Vec::with_capacity(mission.windows.len());
     for (window, graph) in mission.each() {
@@ -22,9 +22,9 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
         let paused = lives.paused(span, &alive);
         let now = present(&graph, options, viewed, (&alive, &paused));
         let (before, after) = (lives.before(span.start), lives.before(span.end));
-        let turn = Turn {
-            before: Presence::of(viewed, &before),
-            after: Presence::of(viewed, &after),
+        let turn = WindowTurn {
+            before: LivingItems::of(viewed, &before),
+            after: LivingItems::of(viewed, &after),
             news: News::new(&mission.ledger, &parts, span, viewed),
         };
         let items = turn.items(viewed, now.0);
@@ -74,13 +74,13 @@ fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<
 }
 
 /// What is there before and after a window, and what is told in between.
-struct Turn {
-    before: Presence,
-    after: Presence,
+struct WindowTurn {
+    before: LivingItems,
+    after: LivingItems,
     news: News,
 }
 
-impl Turn {
+impl WindowTurn {
     fn items(&self, viewed: &Viewed, now: States) -> Vec<Shown> {
         let mut items = Vec::new();
         for shown in now.into_iter().flatten() {

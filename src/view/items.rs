@@ -14,7 +14,7 @@ use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, Topic, TopicId};
 
 /// Where an edge of the graph went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum EdgePlace {
     /// Nowhere.
     Hidden,
     /// It is this item, or part of it.
@@ -38,9 +38,9 @@ pub(crate) struct Viewed {
     /// Per topic of the mission, its item.
     pub(crate) topic: Vec<Option<u32>>,
     /// Per publication. In mode *nodes* it may be part of several arrows and is told by `pairs` alone.
-    pub(crate) publish: Vec<Place>,
+    pub(crate) publish: Vec<EdgePlace>,
     /// Per subscription.
-    pub(crate) subscribe: Vec<Place>,
+    pub(crate) subscribe: Vec<EdgePlace>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
     pub(crate) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
     /// Node and topic of each publication.
@@ -65,8 +65,8 @@ fn fleets(elements: &Elements, options: &ViewOptions) -> Fleets {
     Fleets::new(elements, options)
 }
 
-type Key = (ItemKind, Arc<str>);
-type Ends = (u32, u32, ArrowKind);
+type ItemKey = (ItemKind, Arc<str>);
+type ArrowEnds = (u32, u32, ArrowKind);
 
 impl Viewed {
     pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
@@ -115,7 +115,7 @@ impl Viewed {
                 *name = stand_in;
             }
         }
-        let nodes: Vec<Option<Key>> = (elements.nodes.iter().zip(&names).enumerate())
+        let nodes: Vec<Option<ItemKey>> = (elements.nodes.iter().zip(&names).enumerate())
             .map(|(at, (_, name))| {
                 let plain = || (ItemKind::Node, Arc::clone(name));
                 seen(&self.selection.nodes, at).then(|| {
@@ -124,7 +124,7 @@ impl Viewed {
                 })
             })
             .collect();
-        let mut topics: Vec<Option<Key>> = vec![None; elements.topics.len()];
+        let mut topics: Vec<Option<ItemKey>> = vec![None; elements.topics.len()];
         if options.mode == Mode::Bundles {
             topics = inside(elements, &collapse, &nodes, &self.selection);
         } else if options.mode != Mode::Nodes {
@@ -143,7 +143,7 @@ impl Viewed {
                 swallow(elements, (&collapse, &names), &nodes, &mut topics);
             }
         }
-        let mut members: BTreeMap<&Key, Vec<Element>> = BTreeMap::new();
+        let mut members: BTreeMap<&ItemKey, Vec<Element>> = BTreeMap::new();
         for (key, id) in nodes.iter().zip(0..) {
             if let Some(key) = key {
                 members.entry(key).or_default().push(Element::Node(id));
@@ -154,8 +154,8 @@ impl Viewed {
                 members.entry(key).or_default().push(Element::Topic(id));
             }
         }
-        let places: BTreeMap<&Key, u32> = members.keys().copied().zip(0..).collect();
-        let place = |key: &Option<Key>| key.as_ref().and_then(|key| places.get(key).copied());
+        let places: BTreeMap<&ItemKey, u32> = members.keys().copied().zip(0..).collect();
+        let place = |key: &Option<ItemKey>| key.as_ref().and_then(|key| places.get(key).copied());
         self.node = nodes.iter().map(place).collect();
         self.topic = topics.iter().map(place).collect();
         self.items = members
@@ -176,8 +176,8 @@ impl Viewed {
     }
 
     fn set_arrows(&mut self, elements: &Elements) {
-        let mut arrows: BTreeMap<Ends, Vec<Element>> = BTreeMap::new();
-        let publish: Vec<Option<Ends>> = elements
+        let mut arrows: BTreeMap<ArrowEnds, Vec<Element>> = BTreeMap::new();
+        let publish: Vec<Option<ArrowEnds>> = elements
             .publishes
             .iter()
             .map(|edge| {
@@ -185,7 +185,7 @@ impl Viewed {
                 Some((node, topic, ArrowKind::Publish))
             })
             .collect();
-        let subscribe: Vec<Option<Ends>> = elements
+        let subscribe: Vec<Option<ArrowEnds>> = elements
             .subscribes
             .iter()
             .map(|edge| {
@@ -200,13 +200,13 @@ impl Viewed {
                 arrows.entry(ends.clone()).or_default().push(element);
             }
         }
-        let places: BTreeMap<&Ends, u32> = arrows.keys().zip(0..).collect();
-        let place = |ends: &Option<Ends>| match ends {
-            None => Place::Hidden,
-            Some((from, to, _)) if from == to => Place::Inside(*from),
+        let places: BTreeMap<&ArrowEnds, u32> = arrows.keys().zip(0..).collect();
+        let place = |ends: &Option<ArrowEnds>| match ends {
+            None => EdgePlace::Hidden,
+            Some((from, to, _)) if from == to => EdgePlace::Inside(*from),
             Some(ends) => places
                 .get(ends)
-                .map_or(Place::Hidden, |at| Place::Arrow(*at)),
+                .map_or(EdgePlace::Hidden, |at| EdgePlace::Arrow(*at)),
         };
         self.publish = publish.iter().map(place).collect();
         self.subscribe = subscribe.iter().map(place).collect();
@@ -234,11 +234,11 @@ impl Viewed {
                 list.push((id, item));
             }
         }
-        let mut arrows: BTreeMap<Ends, Vec<(EdgeId, EdgeId)>> = BTreeMap::new();
+        let mut arrows: BTreeMap<ArrowEnds, Vec<(EdgeId, EdgeId)>> = BTreeMap::new();
         let mut pairs = 0;
         let is_bundled = options.mode == Mode::Bundles;
-        self.publish = vec![Place::Hidden; elements.publishes.len()];
-        self.subscribe = vec![Place::Hidden; elements.subscribes.len()];
+        self.publish = vec![EdgePlace::Hidden; elements.publishes.len()];
+        self.subscribe = vec![EdgePlace::Hidden; elements.subscribes.len()];
         for (edge, publish) in elements.publishes.iter().zip(0..) {
             let at = edge.topic as usize;
             let (Some(from), Some(topic)) = (self.item_of_node(edge.node), elements.topics.get(at))
@@ -253,8 +253,8 @@ impl Viewed {
             }
             for (subscribe, to) in subscribers.get(at).into_iter().flatten() {
                 if from == *to && self.is_namespace(from) {
-                    self.publish[publish as usize] = Place::Inside(from);
-                    self.subscribe[*subscribe as usize] = Place::Inside(from);
+                    self.publish[publish as usize] = EdgePlace::Inside(from);
+                    self.subscribe[*subscribe as usize] = EdgePlace::Inside(from);
                     continue;
                 }
                 pairs += 1;
@@ -323,7 +323,7 @@ impl Viewed {
     }
 }
 
-fn arrow((from, to, kind): Ends, members: Vec<Element>) -> Arrow {
+fn arrow((from, to, kind): ArrowEnds, members: Vec<Element>) -> Arrow {
     Arrow {
         from,
         to,
@@ -337,10 +337,10 @@ fn arrow((from, to, kind): Ends, members: Vec<Element>) -> Arrow {
 fn inside(
     elements: &Elements,
     collapse: &Collapse<'_>,
-    nodes: &[Option<Key>],
+    nodes: &[Option<ItemKey>],
     selection: &Selection,
-) -> Vec<Option<Key>> {
-    let mut homes: Vec<BTreeSet<Option<&Key>>> = vec![BTreeSet::new(); elements.topics.len()];
+) -> Vec<Option<ItemKey>> {
+    let mut homes: Vec<BTreeSet<Option<&ItemKey>>> = vec![BTreeSet::new(); elements.topics.len()];
     for edge in &elements.publishes {
         let node = nodes.get(edge.node as usize).and_then(Option::as_ref);
         if let (Some(homes), Some(node)) = (homes.get_mut(edge.topic as usize), node) {
@@ -348,7 +348,7 @@ fn inside(
         }
     }
     let topics = elements.topics.iter().zip(&homes).zip(&selection.topics);
-    let home = |((topic, homes), hidden): ((&Topic, &BTreeSet<Option<&Key>>), &Option<_>)| {
+    let home = |((topic, homes), hidden): ((&Topic, &BTreeSet<Option<&ItemKey>>), &Option<_>)| {
         let mut homes = homes.iter();
         match (hidden, homes.next(), homes.next()) {
             (None, Some(home), None) => home.cloned(),
@@ -363,7 +363,7 @@ fn inside(
 }
 
 /// Puts the topics of each group into its box, whose name is made unlike that of every topic.
-fn set_groups(topics: &mut [Option<Key>], groups: &Groups) {
+fn set_groups(topics: &mut [Option<ItemKey>], groups: &Groups) {
     for ids in groups.values() {
         for id in ids {
             topics[*id as usize] = None;
@@ -391,11 +391,11 @@ fn set_groups(topics: &mut [Option<Key>], groups: &Groups) {
 fn swallow(
     elements: &Elements,
     (collapse, names): (&Collapse<'_>, &[Arc<str>]),
-    nodes: &[Option<Key>],
-    topics: &mut [Option<Key>],
+    nodes: &[Option<ItemKey>],
+    topics: &mut [Option<ItemKey>],
 ) {
     type Spaces<'a> = Vec<Option<&'a str>>;
-    let mut ends: BTreeMap<Key, (Spaces<'_>, Spaces<'_>)> = BTreeMap::new();
+    let mut ends: BTreeMap<ItemKey, (Spaces<'_>, Spaces<'_>)> = BTreeMap::new();
     for key in topics.iter().flatten() {
         ends.entry(key.clone()).or_default();
     }
@@ -417,7 +417,7 @@ fn swallow(
             }
         }
     }
-    let inside: BTreeMap<Key, Arc<str>> = ends
+    let inside: BTreeMap<ItemKey, Arc<str>> = ends
         .into_iter()
         .filter_map(|(key, (p, s))| {
             let space = swallows(collapse.of(&key.1), &p, &s)?;

@@ -11,7 +11,7 @@ use crate::mission::Mission;
 use crate::mission::ledger::Kind;
 
 /// Beginnings and ends in continuous time.
-pub(crate) struct Lives<'a> {
+pub(crate) struct ItemTurns<'a> {
     elements: &'a Elements,
     /// Per element, sorted by time, when it began (true) and ended.
     turns: BTreeMap<Element, Vec<(Stamp, bool)>>,
@@ -28,7 +28,7 @@ pub(crate) struct Alive {
     pub(crate) subscribes: Vec<bool>,
 }
 
-impl<'a> Lives<'a> {
+impl<'a> ItemTurns<'a> {
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let mut lives = Self {
             elements: &mission.elements,

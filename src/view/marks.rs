@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::items::{Place, Viewed};
+use super::items::{EdgePlace, Viewed};
 use super::{Headline, ItemKind, Mark};
 use crate::base::time::Span;
 use crate::graph::Element;
@@ -64,7 +64,7 @@ impl News {
     }
 
     fn tell(&mut self, viewed: &Viewed, entry: &Entry, headline: EntryId) {
-        let sign = Sign::of(entry, headline);
+        let sign = EntrySign::of(entry, headline);
         self.add(viewed, entry.what, &sign);
         match (&entry.detail, entry.what) {
             (Detail::Senders { from, to }, Element::Topic(topic)) => {
@@ -92,11 +92,11 @@ impl News {
         }
     }
 
-    fn add(&mut self, viewed: &Viewed, what: Element, sign: &Sign) {
+    fn add(&mut self, viewed: &Viewed, what: Element, sign: &EntrySign) {
         let item = |items: &[Option<u32>], id: u32| items.get(id as usize).copied().flatten();
         let place = match what {
-            Element::Node(id) => item(&viewed.node, id).map(Place::Item),
-            Element::Topic(id) => item(&viewed.topic, id).map(Place::Item),
+            Element::Node(id) => item(&viewed.node, id).map(EdgePlace::Item),
+            Element::Topic(id) => item(&viewed.topic, id).map(EdgePlace::Item),
             Element::Publish(id) => viewed.publish.get(id as usize).copied(),
             Element::Subscribe(id) => viewed.subscribe.get(id as usize).copied(),
         };
@@ -104,15 +104,17 @@ impl News {
             self.add_carriers(viewed, what, sign);
         }
         match place {
-            Some(Place::Item(id)) => sign.keep(&mut self.items, id, Reach::of_item(viewed, id)),
-            Some(Place::Inside(id)) => sign.keep(&mut self.items, id, Reach::Inside),
-            Some(Place::Arrow(id)) => sign.keep(&mut self.arrows, id, Reach::of_arrow(viewed, id)),
-            Some(Place::Hidden) | None => {}
+            Some(EdgePlace::Item(id)) => sign.keep(&mut self.items, id, Reach::of_item(viewed, id)),
+            Some(EdgePlace::Inside(id)) => sign.keep(&mut self.items, id, Reach::Inside),
+            Some(EdgePlace::Arrow(id)) => {
+                sign.keep(&mut self.arrows, id, Reach::of_arrow(viewed, id));
+            }
+            Some(EdgePlace::Hidden) | None => {}
         }
     }
 
     /// Marks the arrows that carry a topic or publication.
-    fn add_carriers(&mut self, viewed: &Viewed, what: Element, sign: &Sign) {
+    fn add_carriers(&mut self, viewed: &Viewed, what: Element, sign: &EntrySign) {
         for id in viewed.carriers.get(&what).into_iter().flatten() {
             sign.keep(&mut self.arrows, *id, Reach::of_arrow(viewed, *id));
         }
@@ -160,13 +162,13 @@ impl Reach {
 }
 
 /// What one entry says of whatever it is told on.
-struct Sign {
+struct EntrySign {
     kind: Kind,
     rates: Option<(f64, f64)>,
     headline: EntryId,
 }
 
-impl Sign {
+impl EntrySign {
     fn of(entry: &Entry, headline: EntryId) -> Self {
         Self {
             kind: entry.kind,

@@ -51,8 +51,8 @@ pub(crate) fn at(list: &[Run], window: u32) -> u32 {
 impl Runs {
     /// The runs of a view. `label` writes the rate of an element in a window, empty for none.
     pub(crate) fn of(view: &View, label: impl Fn(&Shown) -> String) -> Self {
-        let mut classes = Table::starting_with(None);
-        let mut labels = Table::starting_with(String::new());
+        let mut classes = ValueTable::starting_with(None);
+        let mut labels = ValueTable::starting_with(String::new());
         let mut runs = |count, shown: fn(&Frame) -> &[Shown], are_arrows| {
             let mut recorder = RunRecorder {
                 classes: &mut classes,
@@ -82,7 +82,7 @@ impl Runs {
         }
         Self {
             classes: classes.sorted(&new_classes, |class| {
-                class.map_or("off".to_owned(), Class::words)
+                class.map_or("off".to_owned(), LookClass::words)
             }),
             labels: labels.sorted(&new_labels, Clone::clone),
             items,
@@ -121,7 +121,7 @@ impl Runs {
 
 /// What decides the look of an element in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Class {
+struct LookClass {
     state: State,
     degree: Degree,
     mark: Option<Mark>,
@@ -129,7 +129,7 @@ struct Class {
     step: u8,
 }
 
-impl Class {
+impl LookClass {
     fn of(shown: &Shown, is_arrow: bool) -> Self {
         Self {
             state: shown.state,
@@ -195,11 +195,11 @@ pub(crate) fn decades(step: u8) -> f64 {
 }
 
 /// Different values in order of appearance.
-struct Table<T> {
+struct ValueTable<T> {
     places: BTreeMap<T, u32>,
 }
 
-impl<T: Ord + Clone> Table<T> {
+impl<T: Ord + Clone> ValueTable<T> {
     fn starting_with(first: T) -> Self {
         Self {
             places: BTreeMap::from([(first, 0)]),
@@ -243,8 +243,8 @@ fn renumber(list: &mut [Run], new: &[u32]) {
 
 /// Writes the lives of the items, or of the arrows, window by window.
 struct RunRecorder<'a, F> {
-    classes: &'a mut Table<Option<Class>>,
-    labels: &'a mut Table<String>,
+    classes: &'a mut ValueTable<Option<LookClass>>,
+    labels: &'a mut ValueTable<String>,
     label: F,
     are_arrows: bool,
     runs: Vec<ElementRuns>,
@@ -261,7 +261,9 @@ impl<F: Fn(&Shown) -> String> RunRecorder<'_, F> {
                 continue;
             };
             there[id] = true;
-            let class = self.classes.place(Some(Class::of(one, self.are_arrows)));
+            let class = self
+                .classes
+                .place(Some(LookClass::of(one, self.are_arrows)));
             push(&mut life.classes, window, class);
             if one.mark == Some(Mark::Removed) {
                 continue;

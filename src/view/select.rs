@@ -32,7 +32,7 @@ pub(crate) struct Selection {
 
 /// How many connections a topic has.
 #[derive(Clone, Copy, Default)]
-struct Ends {
+struct TopicDegrees {
     publishers: usize,
     subscribers: usize,
     /// How many of both pass the filter of namespaces.
@@ -71,8 +71,8 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     selection
 }
 
-fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Vec<Ends> {
-    let mut all = vec![Ends::default(); elements.topics.len()];
+fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Vec<TopicDegrees> {
+    let mut all = vec![TopicDegrees::default(); elements.topics.len()];
     let publishes = elements.publishes.iter().map(|e| (e, true));
     let subscribes = elements.subscribes.iter().map(|e| (e, false));
     for (edge, publishes) in publishes.chain(subscribes) {
@@ -92,14 +92,14 @@ fn ends(elements: &Elements, nodes: &[Option<Reason>], recorders: &[bool]) -> Ve
 }
 
 /// Whether nothing is known of a topic but that a hidden recorder waits for it: no other end, no message.
-fn is_only_recorded(topic: &Topic, ends: Ends) -> bool {
+fn is_only_recorded(topic: &Topic, ends: TopicDegrees) -> bool {
     let connected = topic.evidence.words().any(|word| word == "connection");
     ends.is_recorded && ends.publishers + ends.subscribers == 0 && !connected
 }
 
 fn topic_reason(
     name: &str,
-    ends: Ends,
+    ends: TopicDegrees,
     names: &BTreeSet<&str>,
     options: &ViewOptions,
 ) -> Option<Reason> {

@@ -6,7 +6,7 @@ use crate::graph::State;
 
 /// What is known so far of an element's present life.
 #[derive(Clone, Copy, Default)]
-struct Life {
+struct PresentLife {
     /// The frame in which it was seen last, counted from 1.
     last: usize,
     look: Option<(State, Degree)>,
@@ -25,7 +25,7 @@ pub(crate) fn settle(
     count: usize,
     shown_of: impl Fn(&mut Frame) -> &mut Vec<Shown>,
 ) {
-    let mut lives = vec![Life::default(); count];
+    let mut lives = vec![PresentLife::default(); count];
     for (at, frame) in (1..).zip(frames.iter_mut()) {
         let length = frame.span.nanos() as f64;
         for shown in shown_of(frame) {
@@ -35,7 +35,7 @@ pub(crate) fn settle(
         }
     }
     // Backwards, what is known at the end of a life is known all through it.
-    let mut lives = vec![Life::default(); count];
+    let mut lives = vec![PresentLife::default(); count];
     let last = frames.len();
     for (at, frame) in frames.iter_mut().rev().enumerate() {
         for shown in shown_of(frame) {
@@ -46,7 +46,7 @@ pub(crate) fn settle(
     }
 }
 
-impl Life {
+impl PresentLife {
     fn forward(&mut self, at: usize, shown: &mut Shown, length: f64) {
         if self.last + 1 != at || shown.mark == Some(Mark::Added) {
             *self = Self::default();

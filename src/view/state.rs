@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::items::{Place, Viewed};
+use super::items::{EdgePlace, Viewed};
 use super::lives::Alive;
 use super::{ArrowKind, Item, ItemKind, Mode, Shown, ViewOptions};
 use crate::evidence::Degree;
@@ -13,9 +13,9 @@ use crate::graph::{EdgeState, Element, Graph, State, TopicState};
 pub(crate) type States = Vec<Option<Shown>>;
 
 /// Gathers what the elements of one window give to an item or arrow.
-struct Gather(States);
+struct StateGather(States);
 
-impl Gather {
+impl StateGather {
     fn new(size: usize) -> Self {
         Self(vec![None; size])
     }
@@ -95,12 +95,12 @@ fn ones<'g, T>(
 }
 
 /// Which items and arrows have a living element at a moment.
-pub(crate) struct Presence {
+pub(crate) struct LivingItems {
     pub(crate) items: Vec<bool>,
     pub(crate) arrows: Vec<bool>,
 }
 
-impl Presence {
+impl LivingItems {
     pub(crate) fn of(viewed: &Viewed, alive: &Alive) -> Self {
         let is = |list: &[bool], id: u32| list.get(id as usize) == Some(&true);
         let lives = |element: &Element| match element {
@@ -175,7 +175,7 @@ fn present_items(
     viewed: &Viewed,
     (alive, paused): (&Alive, &Alive),
 ) -> States {
-    let mut items = Gather::new(viewed.items.len());
+    let mut items = StateGather::new(viewed.items.len());
     let nodes = ones(
         &alive.nodes,
         &paused.nodes,
@@ -259,9 +259,9 @@ fn present_arrows(
     viewed: &Viewed,
     (alive, paused): (&Alive, &Alive),
 ) -> States {
-    let mut arrows = Gather::new(viewed.arrows.len());
+    let mut arrows = StateGather::new(viewed.arrows.len());
     for (at, one) in edges(&alive.publishes, &paused.publishes, &graph.publishes) {
-        if let Some(Place::Arrow(id)) = viewed.publish.get(at as usize)
+        if let Some(EdgePlace::Arrow(id)) = viewed.publish.get(at as usize)
             && shows_topic(one.state, options)
         {
             arrows.add(*id, &one);
@@ -273,7 +273,7 @@ fn present_arrows(
         .collect();
     for (at, one) in edges(&alive.subscribes, &paused.subscribes, &graph.subscribes) {
         let topic = viewed.subscribed.get(at as usize);
-        if let Some(Place::Arrow(id)) = viewed.subscribe.get(at as usize)
+        if let Some(EdgePlace::Arrow(id)) = viewed.subscribe.get(at as usize)
             && topic.is_some_and(|(_, topic)| shown.contains(topic))
         {
             arrows.add(*id, &one);
@@ -291,7 +291,7 @@ fn present_direct(graph: &Graph, viewed: &Viewed, lives: (&Alive, &Alive)) -> St
     let subscribes: BTreeMap<u32, One> =
         edges(&alive.subscribes, &paused.subscribes, &graph.subscribes).collect();
     let topics: BTreeMap<u32, One> = topics(graph, lives).collect();
-    let mut arrows = Gather::new(viewed.arrows.len());
+    let mut arrows = StateGather::new(viewed.arrows.len());
     for (pairs, id) in viewed.pairs.iter().zip(0..) {
         let is_bundle = viewed.arrows.get(id as usize).map(|a| &a.kind) == Some(&ArrowKind::Bundle);
         let (mut last, mut carried) = (None, BTreeSet::new());

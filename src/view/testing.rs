@@ -62,7 +62,7 @@ fn span(index: usize) -> Span {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum EdgeKind {
     Publish,
     Subscribe,
     Node,
@@ -70,7 +70,7 @@ enum Kind {
 }
 
 struct Word<'a> {
-    kind: Kind,
+    kind: EdgeKind,
     node: &'a str,
     topic: &'a str,
     hz: Option<f64>,
@@ -86,11 +86,11 @@ impl<'a> Word<'a> {
             .strip_suffix('~')
             .map_or((text, State::Active), |t| (t, State::Silent));
         let (kind, node, topic) = match (text.split_once('>'), text.split_once('<')) {
-            (Some((node, topic)), _) => (Kind::Publish, node, topic),
-            (_, Some((node, topic))) => (Kind::Subscribe, node, topic),
+            (Some((node, topic)), _) => (EdgeKind::Publish, node, topic),
+            (_, Some((node, topic))) => (EdgeKind::Subscribe, node, topic),
             _ => match text.strip_prefix('=') {
-                Some(topic) => (Kind::Topic, "", topic),
-                None => (Kind::Node, text, ""),
+                Some(topic) => (EdgeKind::Topic, "", topic),
+                None => (EdgeKind::Node, text, ""),
             },
         };
         Self {
@@ -110,13 +110,13 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
     let place = |set: &BTreeSet<&str>, name: &str| {
         u32::try_from(set.iter().position(|n| *n == name).unwrap()).unwrap()
     };
-    let edges = |kind: Kind| {
+    let edges = |kind: EdgeKind| {
         let of_kind = words().filter(|w| w.kind == kind);
         let mut all: Vec<(u32, u32)> = of_kind
             .map(|w| (place(&nodes, w.node), place(&topics, w.topic)))
             .collect();
         all.sort_unstable_by_key(|(node, topic)| {
-            if kind == Kind::Publish {
+            if kind == EdgeKind::Publish {
                 (*node, *topic)
             } else {
                 (*topic, *node)
@@ -135,8 +135,8 @@ fn elements(windows: &[Vec<Word<'_>>]) -> Elements {
             .collect()
     };
     Elements {
-        publishes: edges(Kind::Publish),
-        subscribes: edges(Kind::Subscribe),
+        publishes: edges(EdgeKind::Publish),
+        subscribes: edges(EdgeKind::Subscribe),
         nodes: nodes
             .iter()
             .map(|n| Node {
@@ -203,7 +203,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
             });
         }
     }
-    let edges = |edges: &[Edge], kind: Kind| -> Vec<EdgeState> {
+    let edges = |edges: &[Edge], kind: EdgeKind| -> Vec<EdgeState> {
         let word = |edge: &Edge| {
             let (node, topic) = (
                 elements.nodes[edge.node as usize].name.as_str(),
@@ -227,8 +227,8 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
             })
             .collect()
     };
-    graph.publishes = edges(&elements.publishes, Kind::Publish);
-    graph.subscribes = edges(&elements.subscribes, Kind::Subscribe);
+    graph.publishes = edges(&elements.publishes, EdgeKind::Publish);
+    graph.subscribes = edges(&elements.subscribes, EdgeKind::Subscribe);
     graph
 }
 

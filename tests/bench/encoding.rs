@@ -18,11 +18,11 @@ use std::time::Instant;
 
 use bagreel::internals::draw::paint::raster::Painter;
 use bagreel::internals::draw::picture;
-use bagreel::internals::draw::strip::{Source, strip};
+use bagreel::internals::draw::strip::{StripSource, strip};
 use bagreel::internals::draw::style::Style;
 use bagreel::internals::draw::text::Fonts;
 use bagreel::internals::export::Output;
-use bagreel::internals::export::options::{Choice, Options};
+use bagreel::internals::export::options::{Choice, SequenceOptions};
 use bagreel::internals::export::run;
 use bagreel::internals::export::sequence::Sequence;
 use bagreel::internals::view::{ViewOptions, view};
@@ -55,7 +55,7 @@ fn main() {
     let number = |name: &str| variable(name).and_then(|v| v.parse::<u32>().ok());
     let choice = variable("STRIP").map(|s| Choice::parse(&s).unwrap());
     let mm = number("MM").map(f64::from);
-    let source = Source {
+    let source = StripSource {
         mission: &mission,
         view: &view,
         picture: &picture,
@@ -71,11 +71,11 @@ fn main() {
     )
     .unwrap();
     println!("strip: {:?}", page.remarks);
-    let options = Options {
+    let options = SequenceOptions {
         tween: number("TWEEN").unwrap_or(0),
         max_bytes: number("MOST").map(u64::from),
         strip: choice,
-        ..Options::default()
+        ..SequenceOptions::default()
     };
     let sequence = Sequence {
         mission: &mission,

@@ -72,7 +72,7 @@ fn main() {
                 std::fs::write(file, svg::svg(&graph, &layout)).unwrap();
             }
         };
-        let options = layout::Options {
+        let options = layout::LayoutOptions {
             page: PAGE,
             orientation,
         };

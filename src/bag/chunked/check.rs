@@ -14,7 +14,7 @@ pub(super) struct Behind {
 
 /// The messages found since the last chunk began.
 #[derive(Default)]
-pub(super) struct Told {
+pub(super) struct ToldMessages {
     gather: Gather,
     /// How many messages of the bag have been told, or will be.
     pub(super) messages: u64,
@@ -29,7 +29,7 @@ pub(super) struct Told {
     surplus: u64,
 }
 
-impl Told {
+impl ToldMessages {
     /// Adds one message.
     pub(super) fn add(&mut self, id: ConnectionId, time: Stamp, size: u32, sink: &mut dyn Sink) {
         self.messages += 1;

@@ -4,13 +4,13 @@ use std::io;
 
 use super::Grammar;
 use super::forward::next_chunk;
-use super::index::{Body, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless};
+use super::index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, Query, hand_over, nameless};
 use super::plan::Chunk;
-use super::record::{Record, Stop};
+use super::record::{NoRecord, RecordHead};
 use super::unpack::{Visitor, unpack};
 use crate::bag::adapters::Gather;
 use crate::bag::model::{Sink, Want, lost};
-use crate::bag::source::{FAR, NEAR, Stream};
+use crate::bag::source::{ByteStream, FAR, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
@@ -35,7 +35,7 @@ impl<G: Grammar> Query<'_, G> {
         }
         let text = "chunks were read whole, since their index is missing or wrong";
         sink.notice(Notice::new(NoticeKind::Downgraded, text));
-        let mut stream = Stream::of_file(self.source, chunk.start, chunk.end, FAR);
+        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
         if let Err(why) = self.walk(&mut stream, sink) {
             let text = format!("a chunk is damaged inside: {why}");
             sink.notice(Notice::new(NoticeKind::Damaged, text));
@@ -48,7 +48,7 @@ impl<G: Grammar> Query<'_, G> {
         let Ok(Some(body)) = self.body(chunk) else {
             return;
         };
-        let mut stream = Stream::of_file(self.source, body.range.end, chunk.end, FAR);
+        let mut stream = ByteStream::of_file(self.source, body.range.end, chunk.end, FAR);
         while next_chunk::<G>(&mut stream) {
             let text = "chunks were read that the index does not name";
             sink.notice(Notice::new(NoticeKind::Downgraded, text));
@@ -89,25 +89,25 @@ impl<G: Grammar> Query<'_, G> {
     }
 
     /// The chunk's compression and where its body stands.
-    pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<Body>> {
-        let mut stream = Stream::of_file(self.source, chunk.start, chunk.end, NEAR);
+    pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<ChunkBody>> {
+        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, NEAR);
         let head = match G::next(&mut stream) {
-            Ok(Record::Chunk(head)) => head,
-            Err(Stop::Io(e)) => return Err(e),
+            Ok(RecordHead::Chunk(head)) => head,
+            Err(NoRecord::Io(e)) => return Err(e),
             _ => return Ok(None),
         };
         let start = stream.position();
         let range = start..start.saturating_add(head.packed);
         let how = head.how.filter(|_| range.end <= chunk.end);
-        Ok(how.map(|how| Body { how, range }))
+        Ok(how.map(|how| ChunkBody { how, range }))
     }
 
     /// Reads the chunk that `stream` stands at record by record.
-    fn walk(&self, stream: &mut Stream<'_>, sink: &mut dyn Sink) -> Result<(), String> {
-        let Ok(Record::Chunk(head)) = G::next(stream) else {
+    fn walk(&self, stream: &mut ByteStream<'_>, sink: &mut dyn Sink) -> Result<(), String> {
+        let Ok(RecordHead::Chunk(head)) = G::next(stream) else {
             return Err("it has no readable head".to_owned());
         };
-        let mut walk = Walk {
+        let mut walk = ChunkWalk {
             query: self,
             gather: Gather::default(),
             sink,
@@ -123,18 +123,18 @@ impl<G: Grammar> Query<'_, G> {
 }
 
 /// The messages of a chunk on their way to a sink.
-struct Walk<'a, 's, G> {
+struct ChunkWalk<'a, 's, G> {
     query: &'a Query<'a, G>,
     gather: Gather,
     sink: &'s mut dyn Sink,
 }
 
-impl<G: Grammar> Visitor<G> for Walk<'_, '_, G> {
+impl<G: Grammar> Visitor<G> for ChunkWalk<'_, '_, G> {
     fn message(
         &mut self,
-        stream: &mut Stream<'_>,
+        stream: &mut ByteStream<'_>,
         (raw, time, size): (u32, Stamp, u32),
-    ) -> Result<(), Stop> {
+    ) -> Result<(), NoRecord> {
         let Some(id) = self.query.connections.get(raw) else {
             nameless(self.sink, 1);
             return super::record::pass(stream, u64::from(size));

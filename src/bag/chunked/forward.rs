@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::Grammar;
-use super::check::{Behind, Told};
+use super::check::{Behind, ToldMessages};
 use super::index::{hand_over, nameless};
-use super::record::{ChunkHead, Connections, Record, Stop, pass};
+use super::record::{ChunkHead, Connections, NoRecord, RecordHead, pass};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{MOST_PAYLOAD, Sink, Want};
-use crate::bag::source::Stream;
+use crate::bag::source::ByteStream;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
@@ -19,7 +19,7 @@ const STRIDE: usize = 64 * 1024;
 
 /// What was found on the way.
 #[derive(Debug, Default)]
-pub(super) struct Found {
+pub(super) struct ForwardScan {
     pub(super) compression: BTreeSet<Compression>,
     /// The bag has its end, and nothing was skipped.
     pub(super) complete: bool,
@@ -42,9 +42,9 @@ struct Forward<'s, G> {
     grammar: G,
     connections: Connections,
     wants: Vec<Want>,
-    told: Told,
+    told: ToldMessages,
     early: Early,
-    found: Found,
+    found: ForwardScan,
     allowance: Arc<Allowance>,
     /// How many messages the bag says it holds.
     total: Option<u64>,
@@ -53,17 +53,21 @@ struct Forward<'s, G> {
 }
 
 /// Reads all that `stream` holds from the first record on; `size` is the length of the bag, 0 if it is not known.
-pub(super) fn read<G: Grammar>(stream: &mut Stream<'_>, size: u64, sink: &mut dyn Sink) -> Found {
+pub(super) fn read<G: Grammar>(
+    stream: &mut ByteStream<'_>,
+    size: u64,
+    sink: &mut dyn Sink,
+) -> ForwardScan {
     let mut forward = Forward {
         sink,
         grammar: G::default(),
         connections: Connections::default(),
         wants: Vec::new(),
-        told: Told::default(),
+        told: ToldMessages::default(),
         early: Early::default(),
-        found: Found {
+        found: ForwardScan {
             complete: true,
-            ..Found::default()
+            ..ForwardScan::default()
         },
         allowance: Arc::default(),
         total: None,
@@ -75,10 +79,10 @@ pub(super) fn read<G: Grammar>(stream: &mut Stream<'_>, size: u64, sink: &mut dy
 
 impl<G: Grammar> Forward<'_, G> {
     /// The records of the file itself; answers why and where they end.
-    fn outside(&mut self, stream: &mut Stream<'_>, size: u64) -> (Stop, u64) {
+    fn outside(&mut self, stream: &mut ByteStream<'_>, size: u64) -> (NoRecord, u64) {
         loop {
             let done = match G::next(stream) {
-                Ok(Record::FileEnd { len }) => {
+                Ok(RecordHead::FileEnd { len }) => {
                     return (self.file_end(stream, len), stream.position());
                 }
                 Ok(record) => self.record(stream, record),
@@ -87,7 +91,7 @@ impl<G: Grammar> Forward<'_, G> {
             let at = stream.position();
             match done {
                 Ok(()) => {}
-                Err(Stop::Broken | Stop::Cut) if self.resume(stream) => {}
+                Err(NoRecord::Broken | NoRecord::Cut) if self.resume(stream) => {}
                 Err(stop) => return (stop, at),
             }
             self.sink.progress(at, size);
@@ -96,38 +100,38 @@ impl<G: Grammar> Forward<'_, G> {
 
     fn record(
         &mut self,
-        stream: &mut Stream<'_>,
-        record: Record<G::Description>,
-    ) -> Result<(), Stop> {
-        if self.ended && matches!(record, Record::Chunk(_) | Record::Message { .. }) {
+        stream: &mut ByteStream<'_>,
+        record: RecordHead<G::Description>,
+    ) -> Result<(), NoRecord> {
+        if self.ended && matches!(record, RecordHead::Chunk(_) | RecordHead::Message { .. }) {
             self.ended = false;
             self.damage("messages stand behind what should be the end of the data");
         }
-        if matches!(record, Record::Other { .. }) {
+        if matches!(record, RecordHead::Other { .. }) {
             self.told.interrupt();
         }
         match record {
-            Record::Chunk(head) => self.chunk(stream, &head),
-            Record::Message { raw, time, size } => {
+            RecordHead::Chunk(head) => self.chunk(stream, &head),
+            RecordHead::Message { raw, time, size } => {
                 self.found.compression.insert(Compression::None);
                 self.message(stream, (raw, time, size))
             }
-            Record::Description { what, len } => self.description(stream, &what, len),
-            Record::Index { raw, count, len } => self.index(stream, (raw, count), len),
-            Record::Total { messages, len } => {
+            RecordHead::Description { what, len } => self.description(stream, &what, len),
+            RecordHead::Index { raw, count, len } => self.index(stream, (raw, count), len),
+            RecordHead::Total { messages, len } => {
                 self.total = Some(messages);
                 pass(stream, len)
             }
-            Record::DataEnd { len } => {
+            RecordHead::DataEnd { len } => {
                 self.ended = true;
                 pass(stream, len)
             }
-            Record::FileEnd { len } | Record::Other { len } => pass(stream, len),
+            RecordHead::FileEnd { len } | RecordHead::Other { len } => pass(stream, len),
         }
     }
 
     /// Whether the bag ends here, as it should.
-    fn file_end(&mut self, stream: &mut Stream<'_>, len: u64) -> Stop {
+    fn file_end(&mut self, stream: &mut ByteStream<'_>, len: u64) -> NoRecord {
         self.ended = true;
         if let Err(stop) = pass(stream, len) {
             return stop;
@@ -138,15 +142,15 @@ impl<G: Grammar> Forward<'_, G> {
                 self.damage(&format!(
                     "what stands from byte {at} on is not the end of the bag"
                 ));
-                Stop::End
+                NoRecord::End
             }
-            Ok(_) => Stop::End,
-            Err(e) => Stop::Io(e),
+            Ok(_) => NoRecord::End,
+            Err(e) => NoRecord::Io(e),
         }
     }
 
     /// Passes over what is no record, up to the next chunk; answers whether there is one.
-    fn resume(&mut self, stream: &mut Stream<'_>) -> bool {
+    fn resume(&mut self, stream: &mut ByteStream<'_>) -> bool {
         let from = stream.position();
         let found = next_chunk::<G>(stream);
         if found {
@@ -156,7 +160,7 @@ impl<G: Grammar> Forward<'_, G> {
         found
     }
 
-    fn chunk(&mut self, stream: &mut Stream<'_>, head: &ChunkHead) -> Result<(), Stop> {
+    fn chunk(&mut self, stream: &mut ByteStream<'_>, head: &ChunkHead) -> Result<(), NoRecord> {
         self.settle();
         self.found.compression.extend(head.how);
         if head.misnamed {
@@ -175,13 +179,13 @@ impl<G: Grammar> Forward<'_, G> {
     }
 
     /// The rest of the file as one compressed chunk that was never closed.
-    fn tail(&mut self, stream: &mut Stream<'_>, how: Compression) -> Stop {
+    fn tail(&mut self, stream: &mut ByteStream<'_>, how: Compression) -> NoRecord {
         let mut plain = match self.allowance.open(how, &mut *stream) {
-            Ok(reader) => Stream::of_reader(reader),
-            Err(e) => return Stop::Io(e),
+            Ok(reader) => ByteStream::of_reader(reader),
+            Err(e) => return NoRecord::Io(e),
         };
         match records(&mut plain, u64::MAX, self) {
-            Stop::Broken => Stop::Cut,
+            NoRecord::Broken => NoRecord::Cut,
             stop => stop,
         }
     }
@@ -189,10 +193,10 @@ impl<G: Grammar> Forward<'_, G> {
     /// Compares what an index record says with what was found in the chunk before it.
     fn index(
         &mut self,
-        stream: &mut Stream<'_>,
+        stream: &mut ByteStream<'_>,
         (raw, count): (u32, u32),
         len: u64,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), NoRecord> {
         let Some(id) = self.connections.get(raw) else {
             return pass(stream, len);
         };
@@ -223,7 +227,7 @@ impl<G: Grammar> Forward<'_, G> {
         self.sink.notice(Notice::new(NoticeKind::Damaged, text));
     }
 
-    fn finish(mut self, stop: Stop, at: u64) -> Found {
+    fn finish(mut self, stop: NoRecord, at: u64) -> ForwardScan {
         self.settle();
         let early = self.early.runs.values();
         let homeless =
@@ -239,22 +243,22 @@ impl<G: Grammar> Forward<'_, G> {
             ));
         }
         let (kind, text) = match stop {
-            Stop::End if self.ended || !G::HAS_END => return self.found,
+            NoRecord::End if self.ended || !G::HAS_END => return self.found,
             // What is cut is the index, of which nothing was asked.
-            Stop::End | Stop::Cut | Stop::Broken if self.ended => return self.found,
-            Stop::End => (
+            NoRecord::End | NoRecord::Cut | NoRecord::Broken if self.ended => return self.found,
+            NoRecord::End => (
                 NoticeKind::Truncated,
                 format!("the bag was never finished; it ends at byte {at}"),
             ),
-            Stop::Cut => (
+            NoRecord::Cut => (
                 NoticeKind::Truncated,
                 format!("the bag is cut at byte {at}"),
             ),
-            Stop::Broken => (
+            NoRecord::Broken => (
                 NoticeKind::Damaged,
                 format!("what stands from byte {at} on is no record"),
             ),
-            Stop::Io(e) => (
+            NoRecord::Io(e) => (
                 NoticeKind::Damaged,
                 format!("reading stopped at byte {at}: {e}"),
             ),
@@ -268,9 +272,9 @@ impl<G: Grammar> Forward<'_, G> {
 impl<G: Grammar> Visitor<G> for Forward<'_, G> {
     fn message(
         &mut self,
-        stream: &mut Stream<'_>,
+        stream: &mut ByteStream<'_>,
         (raw, time, size): (u32, Stamp, u32),
-    ) -> Result<(), Stop> {
+    ) -> Result<(), NoRecord> {
         let Some(id) = self.connections.get(raw) else {
             pass(stream, u64::from(size))?;
             self.early.hold(raw, time, size);
@@ -284,10 +288,10 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
 
     fn description(
         &mut self,
-        stream: &mut Stream<'_>,
+        stream: &mut ByteStream<'_>,
         what: &G::Description,
         len: u64,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), NoRecord> {
         if len > MOST_PAYLOAD as u64 {
             return pass(stream, len);
         }
@@ -307,17 +311,17 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
 }
 
 /// The `len` bytes that `stream` stands at, without taking them.
-fn peek_whole<'s>(stream: &'s mut Stream<'_>, len: u64) -> Result<&'s [u8], Stop> {
+fn peek_whole<'s>(stream: &'s mut ByteStream<'_>, len: u64) -> Result<&'s [u8], NoRecord> {
     let len = usize::try_from(len).unwrap_or(usize::MAX);
     let bytes = stream.peek(len.min(MOST_PAYLOAD))?;
     if bytes.len() < len {
-        return Err(Stop::Cut);
+        return Err(NoRecord::Cut);
     }
     Ok(bytes)
 }
 
 /// Goes to where a chunk begins; at the end of the stream there is none.
-pub(super) fn next_chunk<G: Grammar>(stream: &mut Stream<'_>) -> bool {
+pub(super) fn next_chunk<G: Grammar>(stream: &mut ByteStream<'_>) -> bool {
     while let Ok(window) = stream.peek(2 * STRIDE) {
         let len = window.len();
         let mut starts = 0..len.min(STRIDE);

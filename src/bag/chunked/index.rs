@@ -6,10 +6,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Grammar;
-use super::record::{Connections, Record};
+use super::record::{Connections, RecordHead};
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
-use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
@@ -69,32 +69,32 @@ impl Index {
 }
 
 /// Where a chunk's records lie.
-pub(crate) struct Body {
+pub(crate) struct ChunkBody {
     pub(crate) how: Compression,
     pub(crate) range: Range<u64>,
 }
 
-impl Body {
+impl ChunkBody {
     /// Its plain bytes, and the position at which they start. `step` is how much is read at a time if they are plain
     /// in the file.
     pub(crate) fn plain<'a>(
         &self,
-        source: &'a Source,
+        source: &'a FileSource,
         step: usize,
         allowance: &Arc<Allowance>,
-    ) -> io::Result<(Stream<'a>, u64)> {
+    ) -> io::Result<(ByteStream<'a>, u64)> {
         if self.how == Compression::None {
-            let stream = Stream::of_file(source, self.range.start, self.range.end, step);
+            let stream = ByteStream::of_file(source, self.range.start, self.range.end, step);
             return Ok((stream, self.range.start));
         }
-        let packed = Stream::of_file(source, self.range.start, self.range.end, FAR);
-        Ok((Stream::of_reader(allowance.open(self.how, packed)?), 0))
+        let packed = ByteStream::of_file(source, self.range.start, self.range.end, FAR);
+        Ok((ByteStream::of_reader(allowance.open(self.how, packed)?), 0))
     }
 }
 
 /// What is asked for of a bag: the same for all of its chunks.
 pub(super) struct Query<'a, G> {
-    pub(super) source: &'a Source,
+    pub(super) source: &'a FileSource,
     pub(super) allowance: Arc<Allowance>,
     pub(super) connections: &'a Connections,
     /// What is wanted, by connection.
@@ -108,7 +108,7 @@ impl<G: Grammar> Query<'_, G> {
     pub(super) fn tell(
         &self,
         index: &Index,
-        body: impl FnOnce() -> Option<Body>,
+        body: impl FnOnce() -> Option<ChunkBody>,
         sink: &mut dyn Sink,
     ) {
         let wanted = self.wanted(index);
@@ -166,7 +166,7 @@ impl<G: Grammar> Query<'_, G> {
         &self,
         wanted: &[Wanted],
         entries: usize,
-        body: Option<Body>,
+        body: Option<ChunkBody>,
         sink: &mut dyn Sink,
     ) -> Option<Vec<u32>> {
         let mut sizes = vec![0; entries];
@@ -193,7 +193,7 @@ impl<G: Grammar> Query<'_, G> {
 
 /// Tells `sink` one wanted message; answers its size, or nothing if it is not there.
 fn pick<G: Grammar>(
-    stream: &mut Stream<'_>,
+    stream: &mut ByteStream<'_>,
     base: u64,
     one: &Wanted,
     sink: &mut dyn Sink,
@@ -205,7 +205,7 @@ fn pick<G: Grammar>(
         return None;
     }
     let size = match G::next(stream).ok()? {
-        Record::Message { raw, size, .. } if raw == one.raw => size,
+        RecordHead::Message { raw, size, .. } if raw == one.raw => size,
         _ => return None,
     };
     if let Some(data) = wanted_part(stream, size, one.want, sink).ok()? {
@@ -249,11 +249,11 @@ pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
 
 /// Hands over what is wanted of the message that `stream` stands at, and passes over it.
 pub(super) fn hand_over(
-    stream: &mut Stream<'_>,
+    stream: &mut ByteStream<'_>,
     (connection, time, size): (ConnectionId, Stamp, u32),
     want: Want,
     sink: &mut dyn Sink,
-) -> Result<(), super::record::Stop> {
+) -> Result<(), super::record::NoRecord> {
     if let Some(data) = wanted_part(stream, size, want, sink)? {
         sink.message(Message {
             connection,
@@ -288,7 +288,7 @@ pub(crate) fn hand_over_slice(
 
 /// The bytes that are wanted of the message that `stream` stands at; `None` if none are, or too many.
 fn wanted_part<'s>(
-    stream: &'s mut Stream<'_>,
+    stream: &'s mut ByteStream<'_>,
     size: u32,
     want: Want,
     sink: &mut dyn Sink,

@@ -33,7 +33,7 @@ impl Chunk {
 
 /// What the tail says.
 #[derive(Debug, Default)]
-pub(crate) struct Plan {
+pub(crate) struct ChunkPlan {
     pub(crate) connections: Connections,
     /// In the order of the file, none twice, none over another.
     pub(crate) chunks: Vec<Chunk>,
@@ -46,7 +46,7 @@ pub(crate) struct Plan {
 /// More chunks than this are not planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
 pub(crate) const MOST_CHUNKS: usize = 1 << 20;
 
-impl Plan {
+impl ChunkPlan {
     /// How many bytes the longest index takes.
     pub(super) fn longest_index(&self) -> u64 {
         let len = |c: &Chunk| c.index.end - c.index.start;

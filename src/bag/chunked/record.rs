@@ -5,13 +5,13 @@ use std::{fmt, io};
 
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId};
-use crate::bag::source::Stream;
+use crate::bag::source::ByteStream;
 use crate::base::budget::CONNECTIONS;
 use crate::base::time::Stamp;
 
 /// The head of a record; the stream stands behind it. `len` is what follows.
 #[derive(Debug)]
-pub(crate) enum Record<D> {
+pub(crate) enum RecordHead<D> {
     /// A chunk, whose body follows.
     Chunk(ChunkHead),
     /// A message of the connection that the bag calls `raw`; its payload follows.
@@ -53,7 +53,7 @@ pub(crate) struct ChunkHead {
 
 /// Why no record comes.
 #[derive(Debug)]
-pub(crate) enum Stop {
+pub(crate) enum NoRecord {
     /// The bytes end where a record could begin.
     End,
     /// They end inside a record.
@@ -64,7 +64,7 @@ pub(crate) enum Stop {
     Io(io::Error),
 }
 
-impl From<io::Error> for Stop {
+impl From<io::Error> for NoRecord {
     fn from(error: io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::UnexpectedEof => Self::Cut,
@@ -73,7 +73,7 @@ impl From<io::Error> for Stop {
     }
 }
 
-impl fmt::Display for Stop {
+impl fmt::Display for NoRecord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::End => f.write_str("it ends"),
@@ -85,12 +85,12 @@ impl fmt::Display for Stop {
 }
 
 /// Passes over `len` bytes, which must be there: a length that leaves the file is no length, and nothing is passed.
-pub(crate) fn pass(stream: &mut Stream<'_>, len: u64) -> Result<(), Stop> {
+pub(crate) fn pass(stream: &mut ByteStream<'_>, len: u64) -> Result<(), NoRecord> {
     if stream.left().is_some_and(|left| left < len) {
-        return Err(Stop::Cut);
+        return Err(NoRecord::Cut);
     }
     match stream.skip(len)? {
-        n if n < len => Err(Stop::Cut),
+        n if n < len => Err(NoRecord::Cut),
         _ => Ok(()),
     }
 }

@@ -4,23 +4,27 @@ use std::io::{self, Read};
 use std::sync::{Arc, OnceLock};
 
 use super::Grammar;
-use super::record::{ChunkHead, Record, Stop, pass};
+use super::record::{ChunkHead, NoRecord, RecordHead, pass};
 use crate::bag::decompress::{Allowance, Compression};
-use crate::bag::source::Stream;
+use crate::bag::source::ByteStream;
 use crate::base::time::Stamp;
 
 /// What takes in the records of a chunk.
 pub(super) trait Visitor<G: Grammar> {
     /// A message, whose payload `stream` stands at.
-    fn message(&mut self, stream: &mut Stream<'_>, message: (u32, Stamp, u32)) -> Result<(), Stop>;
+    fn message(
+        &mut self,
+        stream: &mut ByteStream<'_>,
+        message: (u32, Stamp, u32),
+    ) -> Result<(), NoRecord>;
 
     /// A description, `len` bytes that `stream` stands at.
     fn description(
         &mut self,
-        stream: &mut Stream<'_>,
+        stream: &mut ByteStream<'_>,
         _what: &G::Description,
         len: u64,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), NoRecord> {
         pass(stream, len)
     }
 }
@@ -31,11 +35,11 @@ pub(super) trait Visitor<G: Grammar> {
 /// # Errors
 /// Where the file ends first or cannot be read on.
 pub(super) fn unpack<G: Grammar>(
-    stream: &mut Stream<'_>,
+    stream: &mut ByteStream<'_>,
     head: &ChunkHead,
     allowance: &Arc<Allowance>,
     visitor: &mut dyn Visitor<G>,
-) -> Result<Option<String>, Stop> {
+) -> Result<Option<String>, NoRecord> {
     let end = stream.position().saturating_add(head.packed);
     let found = match head.how {
         None => Ok(Some(
@@ -49,7 +53,7 @@ pub(super) fn unpack<G: Grammar>(
         .saturating_add(head.padding);
     // A chunk cut by the end of the file is told once, as the cut.
     match stream.skip(rest)? {
-        n if n < rest => Err(Stop::Cut),
+        n if n < rest => Err(NoRecord::Cut),
         _ => found,
     }
 }
@@ -57,20 +61,20 @@ pub(super) fn unpack<G: Grammar>(
 /// The records of a chunk that stand in the file as they are. Nobody looks at their checksum: that would mean reading
 /// every payload.
 fn plain<G: Grammar>(
-    stream: &mut Stream<'_>,
+    stream: &mut ByteStream<'_>,
     end: u64,
     visitor: &mut dyn Visitor<G>,
-) -> Result<Option<String>, Stop> {
+) -> Result<Option<String>, NoRecord> {
     match records(stream, end, visitor) {
-        Stop::End => Ok(None),
-        Stop::Io(e) => Err(Stop::Io(e)),
+        NoRecord::End => Ok(None),
+        NoRecord::Io(e) => Err(NoRecord::Io(e)),
         stop => Ok(Some(stop.to_string())),
     }
 }
 
 /// The records of a compressed chunk.
 fn packed<G: Grammar>(
-    stream: &mut Stream<'_>,
+    stream: &mut ByteStream<'_>,
     head: &ChunkHead,
     how: Compression,
     allowance: &Arc<Allowance>,
@@ -82,30 +86,30 @@ fn packed<G: Grammar>(
         Ok(from) => from,
         Err(e) => return Some(e.to_string()),
     };
-    let mut records_of = Stream::of_reader(Checked {
+    let mut records_of = ByteStream::of_reader(CrcReader {
         from,
         hasher: head.crc.map(|_| crc32fast::Hasher::new()),
         at_end: &crc,
     });
     let stop = records(&mut records_of, u64::MAX, visitor);
     match stop {
-        Stop::End if head.crc.is_some() && crc.get() != head.crc.as_ref() => {
+        NoRecord::End if head.crc.is_some() && crc.get() != head.crc.as_ref() => {
             Some("its checksum is wrong".to_owned())
         }
-        Stop::End if records_of.position() != head.plain => {
+        NoRecord::End if records_of.position() != head.plain => {
             Some("it is not as long as it says".to_owned())
         }
-        Stop::End => None,
+        NoRecord::End => None,
         stop => Some(stop.to_string()),
     }
 }
 
 /// The records up to where `stream` stands at `end`.
 pub(super) fn records<G: Grammar>(
-    stream: &mut Stream<'_>,
+    stream: &mut ByteStream<'_>,
     end: u64,
     visitor: &mut dyn Visitor<G>,
-) -> Stop {
+) -> NoRecord {
     while stream.position() < end {
         let step = match G::next(stream) {
             Ok(record) => one(stream, end, record, visitor),
@@ -115,46 +119,48 @@ pub(super) fn records<G: Grammar>(
             return stop;
         }
     }
-    Stop::End
+    NoRecord::End
 }
 
 fn one<G: Grammar>(
-    stream: &mut Stream<'_>,
+    stream: &mut ByteStream<'_>,
     end: u64,
-    record: Record<G::Description>,
+    record: RecordHead<G::Description>,
     visitor: &mut dyn Visitor<G>,
-) -> Result<(), Stop> {
+) -> Result<(), NoRecord> {
     let left = end.saturating_sub(stream.position());
     match record {
-        Record::Message { raw, time, size } if u64::from(size) <= left => {
+        RecordHead::Message { raw, time, size } if u64::from(size) <= left => {
             visitor.message(stream, (raw, time, size))
         }
-        Record::Description { what, len } if len <= left => visitor.description(stream, &what, len),
+        RecordHead::Description { what, len } if len <= left => {
+            visitor.description(stream, &what, len)
+        }
         // A chunk in a chunk is none.
-        Record::Chunk(head) if head.packed <= left => pass(stream, head.packed),
-        Record::Index { len, .. }
-        | Record::Total { len, .. }
-        | Record::DataEnd { len }
-        | Record::FileEnd { len }
-        | Record::Other { len }
+        RecordHead::Chunk(head) if head.packed <= left => pass(stream, head.packed),
+        RecordHead::Index { len, .. }
+        | RecordHead::Total { len, .. }
+        | RecordHead::DataEnd { len }
+        | RecordHead::FileEnd { len }
+        | RecordHead::Other { len }
             if len <= left =>
         {
             pass(stream, len)
         }
         // A length that leaves the chunk is none.
-        _ => Err(Stop::Broken),
+        _ => Err(NoRecord::Broken),
     }
 }
 
 /// Sums up what is read.
-struct Checked<'a, R> {
+struct CrcReader<'a, R> {
     from: R,
     hasher: Option<crc32fast::Hasher>,
     /// The sum, once everything has been read.
     at_end: &'a OnceLock<u32>,
 }
 
-impl<R: Read> Read for Checked<'_, R> {
+impl<R: Read> Read for CrcReader<'_, R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         let n = self.from.read(into)?;
         match &mut self.hasher {

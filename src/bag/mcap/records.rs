@@ -8,10 +8,10 @@ use std::sync::Arc;
 use mcap::records::op;
 
 use super::{Described, Mcap};
-use crate::bag::chunked::{ChunkHead, Connections, Record, Stop};
+use crate::bag::chunked::{ChunkHead, Connections, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId, Encoding};
-use crate::bag::source::Stream;
+use crate::bag::source::ByteStream;
 use crate::base::budget::DEFINITIONS;
 use crate::base::time::Stamp;
 
@@ -26,69 +26,69 @@ pub(super) const FOOTER: u64 = 20;
 const DATA_END: u64 = 4;
 
 /// Takes the head of the next record.
-pub(super) fn next(stream: &mut Stream<'_>) -> Result<Record<Described>, Stop> {
+pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>, NoRecord> {
     let (kind, len) = head(stream)?;
     // One flipped bit makes a chunk an index, or the end of the file.
     let is_common = matches!(kind, op::MESSAGE | op::SCHEMA | op::CHANNEL | op::CHUNK);
     if !is_common && is_chunk_of(stream.peek(CHUNK_HEAD + 32)?, len) {
         let chunk = chunk(stream, len)?;
-        return Ok(Record::Chunk(ChunkHead {
+        return Ok(RecordHead::Chunk(ChunkHead {
             misnamed: true,
             ..chunk
         }));
     }
     Ok(match kind {
         // Zeros where the disk was full.
-        0 => return Err(Stop::Broken),
-        op::CHUNK => Record::Chunk(chunk(stream, len)?),
+        0 => return Err(NoRecord::Broken),
+        op::CHUNK => RecordHead::Chunk(chunk(stream, len)?),
         op::MESSAGE => message(stream, len)?,
         op::MESSAGE_INDEX => index(stream, len)?,
-        op::STATISTICS => Record::Total {
-            messages: Cursor(stream.peek(8)?).u64().ok_or(Stop::Cut)?,
+        op::STATISTICS => RecordHead::Total {
+            messages: FieldCursor(stream.peek(8)?).u64().ok_or(NoRecord::Cut)?,
             len,
         },
-        op::SCHEMA => Record::Description {
+        op::SCHEMA => RecordHead::Description {
             what: Described::Schema,
             len,
         },
-        op::CHANNEL => Record::Description {
+        op::CHANNEL => RecordHead::Description {
             what: Described::Channel,
             len,
         },
-        op::DATA_END if len == DATA_END => Record::DataEnd { len },
-        op::FOOTER if len == FOOTER => Record::FileEnd { len },
-        op::DATA_END | op::FOOTER => return Err(Stop::Broken),
-        _ => Record::Other { len },
+        op::DATA_END if len == DATA_END => RecordHead::DataEnd { len },
+        op::FOOTER if len == FOOTER => RecordHead::FileEnd { len },
+        op::DATA_END | op::FOOTER => return Err(NoRecord::Broken),
+        _ => RecordHead::Other { len },
     })
 }
 
 /// Takes a record's kind and the length of what `stream` then stands at.
-pub(super) fn head(stream: &mut Stream<'_>) -> Result<(u8, u64), Stop> {
+pub(super) fn head(stream: &mut ByteStream<'_>) -> Result<(u8, u64), NoRecord> {
     let head = stream.peek(9)?;
     if head.is_empty() {
-        return Err(Stop::End);
+        return Err(NoRecord::End);
     }
-    let mut cursor = Cursor(head);
+    let mut cursor = FieldCursor(head);
     let (Some(kind), Some(len)) = (cursor.u8(), cursor.u64()) else {
-        return Err(Stop::Cut);
+        return Err(NoRecord::Cut);
     };
     stream.advance(9);
     Ok((kind, len))
 }
 
 /// Takes what stands before a message's payload.
-fn message(stream: &mut Stream<'_>, len: u64) -> Result<Record<Described>, Stop> {
+fn message(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>, NoRecord> {
     let size = len.checked_sub(MESSAGE_HEAD as u64);
     let size = size.and_then(|size| u32::try_from(size).ok());
-    let mut cursor = Cursor(stream.peek(MESSAGE_HEAD)?);
+    let mut cursor = FieldCursor(stream.peek(MESSAGE_HEAD)?);
     let (channel, _sequence) = (cursor.u16(), cursor.u32());
     let (log_time, publish_time) = (cursor.u64(), cursor.u64());
     let (Some(raw), Some(time), Some(_)) = (channel, log_time, publish_time) else {
-        return Err(Stop::Cut);
+        return Err(NoRecord::Cut);
     };
-    let size = size.ok_or(Stop::Broken)?;
+    let size = size.ok_or(NoRecord::Broken)?;
     stream.advance(MESSAGE_HEAD);
-    Ok(Record::Message {
+    Ok(RecordHead::Message {
         raw: u32::from(raw),
         time: Stamp::from_nanos(time),
         size,
@@ -96,16 +96,16 @@ fn message(stream: &mut Stream<'_>, len: u64) -> Result<Record<Described>, Stop>
 }
 
 /// Looks at the head of a message index, whose entries fill the rest of it.
-fn index(stream: &mut Stream<'_>, len: u64) -> Result<Record<Described>, Stop> {
-    let mut cursor = Cursor(stream.peek(6)?);
+fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>, NoRecord> {
+    let mut cursor = FieldCursor(stream.peek(6)?);
     let (channel, entries) = (cursor.u16(), cursor.u32().map(u64::from));
     let (Some(channel), Some(entries)) = (channel, entries) else {
-        return Err(Stop::Cut);
+        return Err(NoRecord::Cut);
     };
     if entries > len.saturating_sub(6) || entries % ENTRY as u64 != 0 {
-        return Err(Stop::Broken);
+        return Err(NoRecord::Broken);
     }
-    Ok(Record::Index {
+    Ok(RecordHead::Index {
         raw: u32::from(channel),
         count: u32::try_from(entries / ENTRY as u64).unwrap_or(u32::MAX),
         len,
@@ -119,10 +119,10 @@ const MOST_PADDING: u64 = 4096;
 const CHUNK_HEAD: usize = 8 + 8 + 8 + 4;
 
 /// Takes what stands before a chunk's records.
-pub(super) fn chunk(stream: &mut Stream<'_>, len: u64) -> Result<ChunkHead, Stop> {
+pub(super) fn chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<ChunkHead, NoRecord> {
     let bytes = stream.peek(256)?;
     let total = bytes.len();
-    let mut cursor = Cursor(bytes);
+    let mut cursor = FieldCursor(bytes);
     let mut read = || {
         let (first, last, plain) = (cursor.u64()?, cursor.u64()?, cursor.u64()?);
         let crc = cursor.u32()?;
@@ -135,10 +135,14 @@ pub(super) fn chunk(stream: &mut Stream<'_>, len: u64) -> Result<ChunkHead, Stop
         Some((times, plain, crc, how, packed))
     };
     let Some((times, plain, crc, how, packed)) = read() else {
-        return Err(if total < 256 { Stop::Cut } else { Stop::Broken });
+        return Err(if total < 256 {
+            NoRecord::Cut
+        } else {
+            NoRecord::Broken
+        });
     };
     let skip = total - cursor.0.len();
-    let room = len.checked_sub(skip as u64).ok_or(Stop::Broken)?;
+    let room = len.checked_sub(skip as u64).ok_or(NoRecord::Broken)?;
     stream.advance(skip);
     let packed = packed.min(room);
     Ok(ChunkHead {
@@ -165,13 +169,13 @@ pub(super) fn is_chunk(bytes: &[u8]) -> bool {
     if bytes.first() != Some(&op::CHUNK) {
         return false;
     }
-    let mut cursor = Cursor(&bytes[1..]);
+    let mut cursor = FieldCursor(&bytes[1..]);
     cursor.u64().is_some_and(|len| is_chunk_of(cursor.0, len))
 }
 
 /// Whether a record of `len` bytes that begin so is a chunk: its two lengths agree.
 fn is_chunk_of(bytes: &[u8], len: u64) -> bool {
-    let mut rest = Cursor(bytes.get(CHUNK_HEAD..).unwrap_or_default());
+    let mut rest = FieldCursor(bytes.get(CHUNK_HEAD..).unwrap_or_default());
     let Some(name) = rest.bytes() else {
         return false;
     };
@@ -181,9 +185,9 @@ fn is_chunk_of(bytes: &[u8], len: u64) -> bool {
 }
 
 /// Fields one after the other, never past the end.
-pub(super) struct Cursor<'a>(pub(super) &'a [u8]);
+pub(super) struct FieldCursor<'a>(pub(super) &'a [u8]);
 
-impl<'a> Cursor<'a> {
+impl<'a> FieldCursor<'a> {
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
         let (field, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
@@ -221,14 +225,14 @@ impl<'a> Cursor<'a> {
 }
 
 /// A schema: the name of a type and its definition.
-pub(super) struct Schema {
+pub(super) struct SchemaRecord {
     name: Arc<str>,
     definition: Option<Arc<str>>,
 }
 
 /// Adds what a schema record says. A second one of the same id is passed over.
 pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
-    let mut cursor = Cursor(record);
+    let mut cursor = FieldCursor(record);
     let id = cursor.u16()?;
     if grammar.schemas.contains_key(&id) {
         return None;
@@ -242,7 +246,9 @@ pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
     grammar.held += data.len();
     let definition = text.filter(|_| grammar.held < DEFINITIONS).map(Arc::from);
     let name = name.into();
-    grammar.schemas.insert(id, Schema { name, definition });
+    grammar
+        .schemas
+        .insert(id, SchemaRecord { name, definition });
     Some(())
 }
 
@@ -252,7 +258,7 @@ pub(super) fn channel(
     record: &[u8],
     known: &Connections,
 ) -> Option<(u32, Connection)> {
-    let mut cursor = Cursor(record);
+    let mut cursor = FieldCursor(record);
     let (id, schema) = (u32::from(cursor.u16()?), cursor.u16()?);
     if known.get(id).is_some() {
         return None;
@@ -280,7 +286,7 @@ pub(super) fn channel(
 
 /// What ROS keeps in a channel's metadata.
 fn describe(connection: &mut Connection, metadata: &[u8]) {
-    let mut cursor = Cursor(metadata);
+    let mut cursor = FieldCursor(metadata);
     while let (Some(key), Some(value)) = (cursor.text(), cursor.text()) {
         match key.as_str() {
             _ if value.is_empty() => {}

@@ -5,20 +5,21 @@ use std::io;
 use mcap::MAGIC;
 use mcap::records::{Record as Parsed, Statistics, op};
 
-use super::records::{self, Cursor, FOOTER, HEAD};
+use super::records::{self, FOOTER, FieldCursor, HEAD};
 use super::{Described, Mcap};
 use crate::bag::chunked::{
-    Chunk, Grammar as _, IndexSum, MOST_CHUNKS, Plan, Record, Stop, Unindexed, Used, pass,
+    Chunk, ChunkPlan, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead, Unindexed, Used,
+    pass,
 };
 use crate::bag::model::MOST_PAYLOAD;
-use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::time::Stamp;
 
 /// As many as there are ids for channels.
 const MOST_CHANNELS: usize = 1 << 16;
 
 /// Reads the end of `source`.
-pub(super) fn read(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
+pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
     let start = match footer(source)? {
         Ok(start) => start,
         Err(reason) => return Ok(Err(reason)),
@@ -27,7 +28,7 @@ pub(super) fn read(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
     summary.plan.body = MAGIC.len() as u64..start;
     match summary.records(source) {
         Ok(()) => {}
-        Err(Stop::Io(e)) => return Err(e),
+        Err(NoRecord::Io(e)) => return Err(e),
         Err(_) => return Ok(Unindexed::because("its summary is damaged")),
     }
     Ok(summary.settle(source))
@@ -37,13 +38,13 @@ pub(super) fn read(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
 const END: usize = 9 + 20 + 8;
 
 /// Where the summary begins.
-fn footer(source: &Source) -> io::Result<Result<u64, Unindexed>> {
+fn footer(source: &FileSource) -> io::Result<Result<u64, Unindexed>> {
     let mut bytes = [0; END];
     let Some(at) = source.len().checked_sub(bytes.len() as u64) else {
         return Ok(Unindexed::because("it is cut"));
     };
     let got = source.read_at(at, &mut bytes)?;
-    let mut cursor = Cursor(&bytes[..got]);
+    let mut cursor = FieldCursor(&bytes[..got]);
     let head = (cursor.u8(), cursor.u64());
     if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(FOOTER)) {
         return Ok(Unindexed::because("its end is missing"));
@@ -63,7 +64,7 @@ fn footer(source: &Source) -> io::Result<Result<u64, Unindexed>> {
 /// What has been read of a summary.
 #[derive(Default)]
 struct Summary {
-    plan: Plan,
+    plan: ChunkPlan,
     grammar: Mcap,
     used: Used,
     statistics: Option<Statistics>,
@@ -72,21 +73,21 @@ struct Summary {
 }
 
 impl Summary {
-    fn records(&mut self, source: &Source) -> Result<(), Stop> {
-        let mut stream = Stream::of_file(source, self.plan.body.end, source.len(), FAR);
+    fn records(&mut self, source: &FileSource) -> Result<(), NoRecord> {
+        let mut stream = ByteStream::of_file(source, self.plan.body.end, source.len(), FAR);
         let mut channels: Vec<Vec<u8>> = Vec::new();
         loop {
             let (kind, len) = match records::head(&mut stream) {
-                Ok((op::FOOTER, _)) | Err(Stop::End) => break,
+                Ok((op::FOOTER, _)) | Err(NoRecord::End) => break,
                 head => head?,
             };
             if len > MOST_PAYLOAD as u64 {
-                return Err(Stop::Broken);
+                return Err(NoRecord::Broken);
             }
             let wanted = usize::try_from(len).unwrap_or(usize::MAX);
             let record = stream.peek(wanted)?;
             if record.len() < wanted {
-                return Err(Stop::Cut);
+                return Err(NoRecord::Cut);
             }
             match kind {
                 op::SCHEMA => drop(records::schema(&mut self.grammar, record)),
@@ -94,10 +95,11 @@ impl Summary {
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
                 op::STATISTICS => self.statistics = statistics(record),
                 op::CHUNK_INDEX => {
-                    let (chunk, size) = chunk_index(record, &mut self.used).ok_or(Stop::Broken)?;
+                    let (chunk, size) =
+                        chunk_index(record, &mut self.used).ok_or(NoRecord::Broken)?;
                     self.blind |= chunk.promised.is_none() && size > 0;
                     if self.plan.chunks.len() >= MOST_CHUNKS {
-                        return Err(Stop::Broken);
+                        return Err(NoRecord::Broken);
                     }
                     self.plan.chunks.push(chunk);
                 }
@@ -118,7 +120,7 @@ impl Summary {
     }
 
     /// Orders the chunks and decides whether they hold all messages.
-    fn settle(mut self, source: &Source) -> Result<Plan, Unindexed> {
+    fn settle(mut self, source: &FileSource) -> Result<ChunkPlan, Unindexed> {
         let chunks = &mut self.plan.chunks;
         chunks.sort_by_key(|c| c.start);
         chunks.dedup_by_key(|c| c.start);
@@ -148,26 +150,26 @@ impl Summary {
 }
 
 /// Looks between the chunks, where other records may stand, but no messages that the summary does not know of.
-fn gaps(source: &Source, plan: &Plan) -> Result<(), Unindexed> {
+fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
     let mut free = plan.body.start;
     let ends = plan.chunks.iter().map(|c| (c.start, c.end));
     for (start, end) in ends.chain([(plan.body.end, plan.body.end)]) {
         if start < free || end > plan.body.end {
             return Unindexed::because("its index names chunks where none can be");
         }
-        let mut stream = Stream::of_file(source, free, start, NEAR);
+        let mut stream = ByteStream::of_file(source, free, start, NEAR);
         while stream.position() < start {
             match Mcap::next(&mut stream) {
-                Ok(Record::Chunk(_) | Record::Message { .. }) => {
+                Ok(RecordHead::Chunk(_) | RecordHead::Message { .. }) => {
                     return Unindexed::because("its summary does not name all of its messages");
                 }
                 Ok(
-                    Record::Description { len, .. }
-                    | Record::Index { len, .. }
-                    | Record::Total { len, .. }
-                    | Record::DataEnd { len }
-                    | Record::FileEnd { len }
-                    | Record::Other { len },
+                    RecordHead::Description { len, .. }
+                    | RecordHead::Index { len, .. }
+                    | RecordHead::Total { len, .. }
+                    | RecordHead::DataEnd { len }
+                    | RecordHead::FileEnd { len }
+                    | RecordHead::Other { len },
                 ) if pass(&mut stream, len).is_ok() => {}
                 // What is no record hides no message that could be read.
                 _ => break,
@@ -188,7 +190,7 @@ fn statistics(record: &[u8]) -> Option<Statistics> {
 
 /// What a chunk index record says, and the length of the chunk's records.
 fn chunk_index(record: &[u8], used: &mut Used) -> Option<(Chunk, u64)> {
-    let mut cursor = Cursor(record);
+    let mut cursor = FieldCursor(record);
     let (first, last) = (cursor.u64()?, cursor.u64()?);
     let (start, len) = (cursor.u64()?, cursor.u64()?);
     let offsets = cursor.bytes()?;
@@ -215,7 +217,7 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<(Chunk, u64)> {
 /// 15 bytes and 16 for each message. `None` if they do not, or if there are none.
 fn promised(offsets: &[u8], start: u64, end: u64, used: &mut Used) -> Option<IndexSum> {
     let mut places = Vec::with_capacity(offsets.len() / 10);
-    let mut cursor = Cursor(offsets);
+    let mut cursor = FieldCursor(offsets);
     while let (Some(channel), Some(at)) = (cursor.u16(), cursor.u64()) {
         places.push((at, channel));
     }

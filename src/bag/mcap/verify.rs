@@ -11,7 +11,7 @@ use crate::bag::adapters::Gather;
 use crate::bag::chunked::{Connections, Grammar as _, hand_over_slice, nameless, pass};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Sink, Want};
-use crate::bag::source::{FAR, Source, Stream};
+use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::time::Stamp;
 
 /// Longer records are not looked into, in bytes.
@@ -30,9 +30,9 @@ struct Crate<'s> {
 ///
 /// # Errors
 /// Why it did not get to the end: a wrong checksum, a cut, or anything else that is not as the format has it.
-pub(super) fn read(source: &Source, sink: &mut dyn Sink) -> Result<(), String> {
+pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), String> {
     bound(source)?;
-    let mut from = Stream::of_file(source, 0, source.len(), FAR);
+    let mut from = ByteStream::of_file(source, 0, source.len(), FAR);
     let options = LinearReaderOptions::default()
         .with_validate_chunk_crcs(true)
         .with_validate_data_section_crc(true)
@@ -53,8 +53,8 @@ pub(super) fn read(source: &Source, sink: &mut dyn Sink) -> Result<(), String> {
 
 /// Walks the plain chunks as the crate will, and refuses what it could not bear: it subtracts the length of a record from
 /// what is left of the chunk, its head included, before it compares them.
-fn bound(source: &Source) -> Result<(), String> {
-    let mut stream = Stream::of_file(source, 0, source.len(), FAR);
+fn bound(source: &FileSource) -> Result<(), String> {
+    let mut stream = ByteStream::of_file(source, 0, source.len(), FAR);
     Mcap::begin(&mut stream);
     while let Ok((kind, len)) = records::head(&mut stream) {
         let end = stream.position().saturating_add(len);

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::{Described, Rosbag1};
-use crate::bag::chunked::{ChunkHead, Record, Stop};
+use crate::bag::chunked::{ChunkHead, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId, Encoding};
-use crate::bag::source::Stream;
+use crate::bag::source::ByteStream;
 use crate::base::budget::DEFINITIONS;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::time::Stamp;
@@ -50,24 +50,24 @@ pub(super) enum Header {
 const LONGEST_HEADER: usize = 1 << 20;
 
 /// Takes the head of the next record.
-pub(super) fn next(stream: &mut Stream<'_>) -> Result<Record<Described>, Stop> {
+pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>, NoRecord> {
     let (header, len) = header(stream)?;
     let size = len;
     let len = u64::from(len);
     Ok(match header {
-        Header::Chunk { compression, size } => Record::Chunk(chunk(&compression, size, len)),
-        Header::Message { raw, time } => Record::Message { raw, time, size },
-        Header::Connection { raw, topic } => Record::Description {
+        Header::Chunk { compression, size } => RecordHead::Chunk(chunk(&compression, size, len)),
+        Header::Message { raw, time } => RecordHead::Message { raw, time, size },
+        Header::Connection { raw, topic } => RecordHead::Description {
             what: Described { raw, topic },
             len,
         },
         // Its length comes from its count: writers of 2010 put a wrong one.
-        Header::Index { raw, count } => Record::Index {
+        Header::Index { raw, count } => RecordHead::Index {
             raw,
             count,
-            len: u64::from(count.checked_mul(ENTRY).ok_or(Stop::Broken)?),
+            len: u64::from(count.checked_mul(ENTRY).ok_or(NoRecord::Broken)?),
         },
-        _ => Record::Other { len },
+        _ => RecordHead::Other { len },
     })
 }
 
@@ -87,20 +87,20 @@ fn chunk(compression: &[u8], size: u32, len: u64) -> ChunkHead {
 }
 
 /// Takes the header of the next record, and the length that it states of the data that `stream` then stands at.
-pub(super) fn header(stream: &mut Stream<'_>) -> Result<(Header, u32), Stop> {
+pub(super) fn header(stream: &mut ByteStream<'_>) -> Result<(Header, u32), NoRecord> {
     let head = stream.peek(4)?;
     if head.is_empty() {
-        return Err(Stop::End);
+        return Err(NoRecord::End);
     }
-    let header_len = u32_at(head, 0).ok_or(Stop::Cut)? as usize;
+    let header_len = u32_at(head, 0).ok_or(NoRecord::Cut)? as usize;
     // No record is without fields; where the disk was full, zeros stand.
     if header_len == 0 || header_len > LONGEST_HEADER {
-        return Err(Stop::Broken);
+        return Err(NoRecord::Broken);
     }
     let whole = stream.peek(header_len + 8)?;
-    let header = whole.get(4..4 + header_len).ok_or(Stop::Cut)?;
-    let data_len = u32_at(whole, 4 + header_len).ok_or(Stop::Cut)?;
-    let record = parse(header).ok_or(Stop::Broken)?;
+    let header = whole.get(4..4 + header_len).ok_or(NoRecord::Cut)?;
+    let data_len = u32_at(whole, 4 + header_len).ok_or(NoRecord::Cut)?;
+    let record = parse(header).ok_or(NoRecord::Broken)?;
     stream.advance(header_len + 8);
     Ok((record, data_len))
 }
@@ -110,7 +110,7 @@ pub(super) const ENTRY: u32 = 12;
 
 /// What a header says; `None` if it is none: a field without a name, or longer than the header.
 pub(super) fn parse(header: &[u8]) -> Option<Header> {
-    let mut fields = Fields::default();
+    let mut fields = HeaderFields::default();
     let mut rest = header;
     while !rest.is_empty() {
         let (name, value, after) = field(rest)?;
@@ -128,12 +128,12 @@ const MOST_FIELDS: usize = 12;
 
 /// The names and values in a header.
 #[derive(Default)]
-struct Fields<'a> {
+struct HeaderFields<'a> {
     all: [(&'a [u8], &'a [u8]); MOST_FIELDS],
     count: usize,
 }
 
-impl<'a> Fields<'a> {
+impl<'a> HeaderFields<'a> {
     fn get(&self, name: &[u8]) -> Option<&'a [u8]> {
         let mut all = self.all[..self.count].iter();
         all.find(|(found, _)| *found == name)

@@ -5,19 +5,19 @@ use std::io;
 use super::records::{self, ENTRY, Header};
 use super::{Described, Rosbag1};
 use crate::bag::chunked::{
-    Chunk, Grammar as _, IndexSum, MOST_CHUNKS, Plan, Stop, Unindexed, Used,
+    Chunk, ChunkPlan, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, Unindexed, Used,
 };
 use crate::bag::model::MOST_PAYLOAD;
-use crate::bag::source::{FAR, NEAR, Source, Stream};
+use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 
 /// Reads the head and the tail of `source`.
-pub(super) fn read(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
-    let mut stream = Stream::of_file(source, 0, source.len(), NEAR);
+pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
+    let mut stream = ByteStream::of_file(source, 0, source.len(), NEAR);
     Rosbag1::begin(&mut stream);
     let (header, len) = match records::header(&mut stream) {
         Ok(found) => found,
-        Err(Stop::Io(e)) => return Err(e),
+        Err(NoRecord::Io(e)) => return Err(e),
         Err(_) => return Ok(Unindexed::because("its head is damaged")),
     };
     let Header::Bag {
@@ -39,7 +39,7 @@ pub(super) fn read(source: &Source) -> io::Result<Result<Plan, Unindexed>> {
     tail.plan.notices.extend(encrypted(&encryptor));
     match tail.records(source, (connections, chunks)) {
         Ok(()) => Ok(tail.settle()),
-        Err(Stop::Io(e)) => Err(e),
+        Err(NoRecord::Io(e)) => Err(e),
         Err(_) => Ok(Unindexed::because("its index is cut or damaged")),
     }
 }
@@ -66,15 +66,15 @@ fn encrypted(encryptor: &str) -> Option<Notice> {
 /// What has been read of a tail.
 #[derive(Default)]
 struct Tail {
-    plan: Plan,
+    plan: ChunkPlan,
     grammar: Rosbag1,
     used: Used,
 }
 
 impl Tail {
     /// The records of the tail: `expected` connections and chunks. What follows them does not matter.
-    fn records(&mut self, source: &Source, expected: (u32, u32)) -> Result<(), Stop> {
-        let mut stream = Stream::of_file(source, self.plan.body.end, source.len(), FAR);
+    fn records(&mut self, source: &FileSource, expected: (u32, u32)) -> Result<(), NoRecord> {
+        let mut stream = ByteStream::of_file(source, self.plan.body.end, source.len(), FAR);
         let (mut connections, mut chunks) = (0, 0);
         while (connections, chunks) != expected {
             let (header, len) = records::header(&mut stream)?;
@@ -92,28 +92,28 @@ impl Tail {
             }
             let too_many = self.plan.chunks.len() > MOST_CHUNKS;
             if connections > expected.0 || chunks > expected.1 || too_many {
-                return Err(Stop::Broken);
+                return Err(NoRecord::Broken);
             }
             let left = end.saturating_sub(stream.position());
             if stream.skip(left)? < left {
-                return Err(Stop::Cut);
+                return Err(NoRecord::Cut);
             }
         }
         // The head may lie as well as the tail.
         match records::header(&mut stream) {
-            Ok((Header::ChunkInfo { .. }, _)) => Err(Stop::Broken),
+            Ok((Header::ChunkInfo { .. }, _)) => Err(NoRecord::Broken),
             _ => Ok(()),
         }
     }
 
     fn connection(
         &mut self,
-        stream: &mut Stream<'_>,
+        stream: &mut ByteStream<'_>,
         what: &Described,
         len: u32,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), NoRecord> {
         if len as usize > MOST_PAYLOAD {
-            return Err(Stop::Broken);
+            return Err(NoRecord::Broken);
         }
         let data = stream.peek(len as usize)?;
         let connections = &mut self.plan.connections;
@@ -123,7 +123,12 @@ impl Tail {
         Ok(())
     }
 
-    fn chunk(&mut self, stream: &mut Stream<'_>, header: &Header, len: u32) -> Result<(), Stop> {
+    fn chunk(
+        &mut self,
+        stream: &mut ByteStream<'_>,
+        header: &Header,
+        len: u32,
+    ) -> Result<(), NoRecord> {
         let Header::ChunkInfo {
             pos,
             start,
@@ -131,7 +136,7 @@ impl Tail {
             count,
         } = *header
         else {
-            return Err(Stop::Broken);
+            return Err(NoRecord::Broken);
         };
         let promised = self.promised(stream, count, len)?;
         self.plan.chunks.push(Chunk {
@@ -148,18 +153,18 @@ impl Tail {
     /// The counts of a chunk info record.
     fn promised(
         &mut self,
-        stream: &mut Stream<'_>,
+        stream: &mut ByteStream<'_>,
         count: u32,
         len: u32,
-    ) -> Result<IndexSum, Stop> {
+    ) -> Result<IndexSum, NoRecord> {
         let mut sum = IndexSum::default();
         if u64::from(count) * 8 > u64::from(len) {
-            return Err(Stop::Broken);
+            return Err(NoRecord::Broken);
         }
         for _ in 0..count {
             let pair = stream.peek(8)?;
-            let raw = records::u32_at(pair, 0).ok_or(Stop::Cut)?;
-            let messages = records::u32_at(pair, 4).ok_or(Stop::Cut)?;
+            let raw = records::u32_at(pair, 0).ok_or(NoRecord::Cut)?;
+            let messages = records::u32_at(pair, 4).ok_or(NoRecord::Cut)?;
             sum.add(raw, messages);
             if messages > 0 {
                 self.used.add(raw);
@@ -170,7 +175,7 @@ impl Tail {
     }
 
     /// Orders the chunks and tells each where it ends.
-    fn settle(mut self) -> Result<Plan, Unindexed> {
+    fn settle(mut self) -> Result<ChunkPlan, Unindexed> {
         let body = self.plan.body.clone();
         let chunks = &mut self.plan.chunks;
         if chunks.is_empty() && body.end > body.start {

@@ -9,19 +9,20 @@ use super::records::{self, ENTRY, Header};
 use super::{Described, Rosbag1};
 use crate::bag::adapters::Gather;
 use crate::bag::chunked::{
-    Body, Connections, Grammar as _, Plan, Stop, Verified, hand_over_slice, nameless, pass,
+    ChunkBody, ChunkPlan, Connections, Grammar as _, NoRecord, SecondReading, hand_over_slice,
+    nameless, pass,
 };
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{Sink, Want};
-use crate::bag::source::{FAR, Source, Stream};
+use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::time::Stamp;
 
 /// The largest chunk that the crate may unpack into memory, in bytes.
 const LARGEST_CHUNK: u32 = 256 << 20;
 
 /// Tells `sink` all that the crate finds. `plan` says where the index is: without one the crate does not read.
-pub(super) fn read(source: &Source, plan: &Plan, sink: &mut dyn Sink) -> Verified {
-    let mut verified = Verified::default();
+pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -> SecondReading {
+    let mut verified = SecondReading::default();
     let bag = bound(source, plan, &mut verified).and_then(|()| {
         let bag = RosBag::new(source.path()).map_err(|e| e.to_string())?;
         // An iterator of the crate answers an error for ever, so the first one ends the walk.
@@ -45,13 +46,17 @@ pub(super) fn read(source: &Source, plan: &Plan, sink: &mut dyn Sink) -> Verifie
 
 /// Walks the chunks as the crate will, and refuses what it could not bear: it unpacks a chunk before it looks at its
 /// size.
-fn bound(source: &Source, plan: &Plan, verified: &mut Verified) -> Result<(), String> {
+fn bound(
+    source: &FileSource,
+    plan: &ChunkPlan,
+    verified: &mut SecondReading,
+) -> Result<(), String> {
     let allowance = Arc::default();
-    let mut stream = Stream::of_file(source, plan.body.start, plan.body.end, FAR);
+    let mut stream = ByteStream::of_file(source, plan.body.start, plan.body.end, FAR);
     loop {
         let (header, len) = match records::header(&mut stream) {
             Ok(found) => found,
-            Err(Stop::End) => return Ok(()),
+            Err(NoRecord::End) => return Ok(()),
             Err(_) => return Err("the chunks are not one behind the other".to_owned()),
         };
         let start = stream.position();
@@ -62,7 +67,7 @@ fn bound(source: &Source, plan: &Plan, verified: &mut Verified) -> Result<(), St
                     .ok_or("a chunk is compressed in an unknown way")?;
                 verified.compression.insert(how);
                 let range = start..start + u64::from(len);
-                bound_chunk(source, &Body { how, range }, size, &allowance)?;
+                bound_chunk(source, &ChunkBody { how, range }, size, &allowance)?;
             }
             Header::Index { count, .. } if count.checked_mul(ENTRY) == Some(len) => {}
             _ => return Err("a record among the chunks is not what it should be".to_owned()),
@@ -72,8 +77,8 @@ fn bound(source: &Source, plan: &Plan, verified: &mut Verified) -> Result<(), St
 
 /// Refuses a chunk that is not as long as it says, or too long.
 fn bound_chunk(
-    source: &Source,
-    body: &Body,
+    source: &FileSource,
+    body: &ChunkBody,
     size: u32,
     allowance: &Arc<Allowance>,
 ) -> Result<(), String> {
@@ -89,8 +94,8 @@ fn bound_chunk(
 
 /// How long a chunk is when unpacked; at most one more than `most`.
 fn unpacked_len(
-    source: &Source,
-    body: &Body,
+    source: &FileSource,
+    body: &ChunkBody,
     most: u32,
     allowance: &Arc<Allowance>,
 ) -> io::Result<u64> {

@@ -14,12 +14,12 @@ use crate::base::yaml::{self, Value};
 pub(super) struct Metadata {
     /// Names of storage files, as written.
     pub(super) files: Vec<String>,
-    pub(super) topics: BTreeMap<String, Topic>,
+    pub(super) topics: BTreeMap<String, TopicMetadata>,
     pub(super) facts: Vec<(String, String)>,
 }
 
 /// What it says of a topic.
-pub(super) struct Topic {
+pub(super) struct TopicMetadata {
     pub(super) type_name: Arc<str>,
     pub(super) encoding: String,
     pub(super) qos: Option<Arc<str>>,
@@ -83,9 +83,9 @@ fn understand(root: &Value) -> Metadata {
     metadata
 }
 
-fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> Topic {
+fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> TopicMetadata {
     let some = |text: &str| (!text.is_empty()).then(|| Arc::from(text));
-    Topic {
+    TopicMetadata {
         type_name: text("type").into(),
         encoding: text("serialization_format").to_owned(),
         qos: match topic.get("offered_qos_profiles") {

@@ -33,9 +33,9 @@ impl From<rusqlite::Error> for Refusal {
 const LONGEST_VALUE: i32 = 64 << 20;
 
 /// A row of a query; columns count from 0. SQLite does not enforce the types of columns.
-pub(super) struct Row<'r>(&'r rusqlite::Row<'r>);
+pub(super) struct QueryRow<'r>(&'r rusqlite::Row<'r>);
 
-impl Row<'_> {
+impl QueryRow<'_> {
     /// A column's whole number; `None` if it holds none.
     pub(super) fn integer(&self, column: usize) -> Option<i64> {
         match self.0.get_ref(column).ok()? {
@@ -111,12 +111,12 @@ impl Db {
         &self,
         sql: &str,
         args: &[i64],
-        mut visit: impl FnMut(&Row<'_>) -> ControlFlow<()>,
+        mut visit: impl FnMut(&QueryRow<'_>) -> ControlFlow<()>,
     ) -> Result<(), Refusal> {
         let mut query = self.0.prepare(sql)?;
         let mut rows = query.query(rusqlite::params_from_iter(args))?;
         while let Some(row) = rows.next()? {
-            if visit(&Row(row)).is_break() {
+            if visit(&QueryRow(row)).is_break() {
                 break;
             }
         }
@@ -128,7 +128,7 @@ impl Db {
         &self,
         sql: &str,
         args: &[i64],
-        pick: impl Fn(&Row<'_>) -> Option<T>,
+        pick: impl Fn(&QueryRow<'_>) -> Option<T>,
     ) -> Result<Option<T>, Refusal> {
         let mut picked = None;
         self.each(sql, args, |row| {

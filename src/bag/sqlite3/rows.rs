@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use super::Bag;
-use super::db::{Db, Refusal, Row};
+use super::Sqlite3Bag;
+use super::db::{Db, QueryRow, Refusal};
 use crate::bag::adapters::Gather;
 use crate::bag::decompress::{Allowance, zstd_payload};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
@@ -12,14 +12,14 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
 /// Rows whose ids lie between these, both included.
-pub(super) type Part = (i64, i64);
+pub(super) type RowRange = (i64, i64);
 
 /// What a Zstandard frame begins with.
 pub(super) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 /// Reads rows of one bag; shared by threads.
-pub(super) struct Rows<'a> {
-    bag: &'a Bag,
+pub(super) struct RowReader<'a> {
+    bag: &'a Sqlite3Bag,
     sql: String,
     /// The same without payloads.
     bare: String,
@@ -34,7 +34,7 @@ pub(super) struct Rows<'a> {
 
 /// Rows that say nothing, or not all.
 #[derive(Default)]
-struct Lost {
+struct LostRows {
     orphans: u64,
     odd: u64,
     payloads: u64,
@@ -42,19 +42,19 @@ struct Lost {
 
 /// From which end rows are read.
 #[derive(Clone, Copy, PartialEq)]
-enum Way {
+enum Direction {
     Up,
     Down,
 }
 
 /// A part that is being read.
-struct Reading<'a, 's> {
-    rows: &'a Rows<'a>,
+struct RowReading<'a, 's> {
+    rows: &'a RowReader<'a>,
     /// What has not been told.
-    left: Part,
+    left: RowRange,
     /// A row came that had been told: the pages of a damaged table can form a ring.
     repeated: bool,
-    lost: Lost,
+    lost: LostRows,
     gather: Gather,
     sink: &'s mut dyn Sink,
 }
@@ -62,14 +62,14 @@ struct Reading<'a, 's> {
 /// So many payloads that cannot be read are passed over, one by one.
 const MOST_RETRIES: u64 = 1000;
 
-impl Reading<'_, '_> {
+impl RowReading<'_, '_> {
     /// Tells the rows that are left, from one end on. Of a row whose payload is damaged the time is told.
-    fn on(&mut self, way: Way) -> Result<(), String> {
+    fn on(&mut self, way: Direction) -> Result<(), String> {
         let order = match way {
             // SQLite goes through the rows in their order unless there is a range, which has an index.
-            Way::Up if !self.rows.bag.ready.damaged => "",
-            Way::Up => " ORDER BY rowid",
-            Way::Down => " ORDER BY rowid DESC",
+            Direction::Up if !self.rows.bag.ready.damaged => "",
+            Direction::Up => " ORDER BY rowid",
+            Direction::Down => " ORDER BY rowid DESC",
         };
         let db = Db::open(&self.rows.bag.ready).map_err(|e| e.to_string())?;
         loop {
@@ -83,7 +83,7 @@ impl Reading<'_, '_> {
             let bare = format!(
                 "{} ORDER BY rowid{} LIMIT 1",
                 self.rows.bare,
-                if way == Way::Up { "" } else { " DESC" }
+                if way == Direction::Up { "" } else { " DESC" }
             );
             let again = self.lost.payloads < MOST_RETRIES && self.some(&db, &bare, way).is_ok();
             if !again || self.left == before {
@@ -94,7 +94,7 @@ impl Reading<'_, '_> {
     }
 
     /// Tells the rows of a query, and narrows what is left.
-    fn some(&mut self, db: &Db, sql: &str, way: Way) -> Result<(), Refusal> {
+    fn some(&mut self, db: &Db, sql: &str, way: Direction) -> Result<(), Refusal> {
         let in_order = self.rows.in_order;
         self.repeated = false;
         db.each(sql, &[self.left.0, self.left.1], |row| {
@@ -104,8 +104,8 @@ impl Reading<'_, '_> {
                 return ControlFlow::Break(());
             }
             match (id, way) {
-                (Some(id), Way::Up) => self.left.0 = id.saturating_add(1),
-                (Some(id), Way::Down) => self.left.1 = id.saturating_sub(1),
+                (Some(id), Direction::Up) => self.left.0 = id.saturating_add(1),
+                (Some(id), Direction::Down) => self.left.1 = id.saturating_sub(1),
                 (None, _) => {}
             }
             match (row.integer(1), row.integer(2)) {
@@ -123,9 +123,9 @@ impl Reading<'_, '_> {
     }
 }
 
-impl<'a> Rows<'a> {
+impl<'a> RowReader<'a> {
     /// The rows of `bag` inside `range`.
-    pub(super) fn new(bag: &'a Bag, wants: &'a [Want], range: Option<Span>) -> Self {
+    pub(super) fn new(bag: &'a Sqlite3Bag, wants: &'a [Want], range: Option<Span>) -> Self {
         let sized = !bag.packed || wants.iter().all(|w| *w >= Want::Sizes);
         Self {
             bag,
@@ -139,20 +139,20 @@ impl<'a> Rows<'a> {
     }
 
     /// Tells `sink` the rows of a part. Where a page is damaged, the rows behind it are read from the other end.
-    pub(super) fn read(&self, part: Part, sink: &mut dyn Sink) {
+    pub(super) fn read(&self, part: RowRange, sink: &mut dyn Sink) {
         let mut gather = Gather::default();
         gather.sizeless = !self.sized;
-        let mut reading = Reading {
+        let mut reading = RowReading {
             rows: self,
             left: part,
             repeated: false,
-            lost: Lost::default(),
+            lost: LostRows::default(),
             gather,
             sink,
         };
-        let mut told = reading.on(Way::Up);
+        let mut told = reading.on(Direction::Up);
         if told.is_err() && reading.left.0 <= reading.left.1 {
-            told = told.and(reading.on(Way::Down));
+            told = told.and(reading.on(Direction::Down));
         }
         reading.gather.flush(reading.sink);
         reading.lost.tell(reading.sink);
@@ -164,7 +164,7 @@ impl<'a> Rows<'a> {
 
     fn row(
         &self,
-        row: &Row<'_>,
+        row: &QueryRow<'_>,
         id: ConnectionId,
         time: Stamp,
         gather: &mut Gather,
@@ -191,7 +191,7 @@ impl<'a> Rows<'a> {
 }
 
 /// Which rows' payloads are wanted, in SQL.
-fn wanted(bag: &Bag, wants: &[Want]) -> String {
+fn wanted(bag: &Sqlite3Bag, wants: &[Want]) -> String {
     let wanted = |want: Want| want > Want::Sizes || bag.packed && want == Want::Sizes;
     let ids = bag
         .ids
@@ -208,7 +208,7 @@ fn wanted(bag: &Bag, wants: &[Want]) -> String {
 
 /// The query for a part's rows: id, topic, time, length, and the payload where `which` says so. SQLite leaves payloads
 /// that nobody asks for on the disk.
-fn sql(bag: &Bag, which: &str, range: Option<Span>) -> String {
+fn sql(bag: &Sqlite3Bag, which: &str, range: Option<Span>) -> String {
     // The index of times may be damaged where the rows are not; the sign keeps SQLite from it.
     let time = if bag.ready.damaged {
         "+timestamp"
@@ -252,7 +252,7 @@ fn tell_payload(
     Some(size)
 }
 
-impl Lost {
+impl LostRows {
     fn tell(&self, sink: &mut dyn Sink) {
         let kinds = [
             (

@@ -1,8 +1,8 @@
 //! The band of phases with its running numbers, the time axis, and the phases' names: what all figures share.
 
-use super::canvas::{Canvas, HAIRLINE, Type, ink};
-use super::notes::{Item, Run, flow};
-use super::source::Source;
+use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
+use super::notes::{TextRun, Unbroken, flow};
+use super::source::FigureSource;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
@@ -41,7 +41,7 @@ pub(crate) fn clock(nanos: i64) -> String {
 }
 
 /// The band from `y` down; phases of an odd number are darker, ramps are hatched.
-pub(crate) fn band(canvas: &mut Canvas<'_>, axis: &Axis, y: f64, phases: &[Phase]) {
+pub(crate) fn band(canvas: &mut PaperCanvas<'_>, axis: &Axis, y: f64, phases: &[Phase]) {
     for (k, phase) in phases.iter().enumerate() {
         let (left, right) = (axis.x(phase.span.start), axis.x(phase.span.end));
         let rect = Rect::new(left, y, right - left, HEIGHT);
@@ -57,7 +57,7 @@ pub(crate) fn band(canvas: &mut Canvas<'_>, axis: &Axis, y: f64, phases: &[Phase
     }
 }
 
-fn hatch(canvas: &mut Canvas<'_>, rect: Rect) {
+fn hatch(canvas: &mut PaperCanvas<'_>, rect: Rect) {
     let stroke = Stroke::solid(ink::RULE, HAIRLINE);
     let mut x = rect.x + 1.0;
     while x < rect.right() {
@@ -68,7 +68,7 @@ fn hatch(canvas: &mut Canvas<'_>, rect: Rect) {
 }
 
 /// The axis at `y` with its times below; answers where it ends below.
-pub(crate) fn axis(canvas: &mut Canvas<'_>, axis: &Axis, y: f64, has_unit: bool) -> f64 {
+pub(crate) fn axis(canvas: &mut PaperCanvas<'_>, axis: &Axis, y: f64, has_unit: bool) -> f64 {
     let ruler = Stroke::solid(ink::TEXT, HAIRLINE);
     canvas.line(Point::new(axis.left, y), Point::new(axis.right, y), &ruler);
     let whole = axis.span.nanos();
@@ -99,7 +99,7 @@ pub(crate) fn axis(canvas: &mut Canvas<'_>, axis: &Axis, y: f64, has_unit: bool)
 }
 
 /// What a phase is called in a figure: `navigation (+4)`, `picking (+4 −4)`, `boot (11)`, `row (=)`, `(+2) as 3`.
-pub(crate) fn title(source: &Source<'_>, k: usize) -> String {
+pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
     let Some(phase) = source.phases.get(k) else {
         return String::new();
     };
@@ -122,8 +122,8 @@ pub(crate) fn title(source: &Source<'_>, k: usize) -> String {
 /// The names of the phases from `y` on: at their places on at most two lines where `axis` has room, else as running
 /// text. Answers where they end.
 pub(crate) fn names(
-    canvas: &mut Canvas<'_>,
-    source: &Source<'_>,
+    canvas: &mut PaperCanvas<'_>,
+    source: &FigureSource<'_>,
     width: f64,
     y: f64,
     at: Option<&Axis>,
@@ -132,13 +132,13 @@ pub(crate) fn names(
     if let Some(end) = at.and_then(|axis| staircase(canvas, source, axis, y, &titles)) {
         return end;
     }
-    let items: Vec<Item> = titles
+    let items: Vec<Unbroken> = titles
         .iter()
         .enumerate()
         .map(|(k, title)| {
             vec![
-                Run::Words(Type::Strong, ink::TEXT, format!("{} ", k + 1)),
-                Run::Words(Type::Small, ink::TEXT, title.clone()),
+                TextRun::Words(Type::Strong, ink::TEXT, format!("{} ", k + 1)),
+                TextRun::Words(Type::Small, ink::TEXT, title.clone()),
             ]
         })
         .collect();
@@ -148,8 +148,8 @@ pub(crate) fn names(
 /// From the right: a label stands a line lower than every later one that it overlaps, so that no leader crosses a
 /// text. `None` where that takes more than three lines.
 fn staircase(
-    canvas: &mut Canvas<'_>,
-    source: &Source<'_>,
+    canvas: &mut PaperCanvas<'_>,
+    source: &FigureSource<'_>,
     axis: &Axis,
     y: f64,
     titles: &[String],

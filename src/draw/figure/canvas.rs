@@ -76,7 +76,7 @@ impl Sizes {
 }
 
 /// A drawing in the making. Everything is in millimetres, y down.
-pub(crate) struct Canvas<'a> {
+pub(crate) struct PaperCanvas<'a> {
     pub(crate) fonts: &'a Fonts,
     pub(crate) sizes: Sizes,
     /// Pixels of the scene per millimetre.
@@ -84,7 +84,7 @@ pub(crate) struct Canvas<'a> {
     groups: Vec<Group>,
 }
 
-impl<'a> Canvas<'a> {
+impl<'a> PaperCanvas<'a> {
     pub(crate) fn new(fonts: &'a Fonts, sizes: Sizes, scale: f64) -> Self {
         Self {
             fonts,

@@ -1,10 +1,10 @@
 //! The course of a mission at its smallest: life lines without words, for the strip below frames.
 
 use super::groups;
-use super::lives::Lives;
-use super::rows::Row;
-use super::source::Source;
-use super::tracks::{Bar, Life};
+use super::lives::LivesFigure;
+use super::rows::FigureRow;
+use super::source::FigureSource;
+use super::tracks::{SendingBar, TrackLife};
 use crate::base::time::{Span, Stamp};
 use crate::graph::NodeId;
 
@@ -21,16 +21,16 @@ pub struct Course {
 /// A node, a topic, some of them that come and go together, or all that live throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CourseRow {
-    pub(crate) lives: Vec<Life>,
-    pub(crate) bars: Vec<Bar>,
+    pub(crate) lives: Vec<TrackLife>,
+    pub(crate) bars: Vec<SendingBar>,
 }
 
 impl Course {
     /// The course in at most `most` rows: of nodes, else of groups, of which those that change least are left out; of
     /// topics where publishers are unknown.
-    pub(crate) fn new(source: &Source<'_>, most: usize) -> Self {
+    pub(crate) fn new(source: &FigureSource<'_>, most: usize) -> Self {
         let by_topics = !source.knows_publishers();
-        let mut lives = Lives::new(source, by_topics);
+        let mut lives = LivesFigure::new(source, by_topics);
         // By nodes, for a group has another name.
         let node = |at: usize| lives.tracks.get(at)?.nodes.first().copied();
         let handed = lives.handovers.iter();
@@ -38,7 +38,7 @@ impl Course {
             .filter_map(|h| Some((h.at, node(h.from)?, node(h.to)?)))
             .collect();
         if rows(&lives).len() > most && !by_topics {
-            lives = Lives::of(source, groups::tracks(source, &lives.tracks));
+            lives = LivesFigure::of(source, groups::tracks(source, &lives.tracks));
         }
         let mut chosen = rows(&lives);
         if chosen.len() > most {
@@ -65,17 +65,17 @@ impl Course {
 }
 
 /// The rows of some lives, with the tracks they stand for.
-fn rows(lives: &Lives<'_>) -> Vec<(Vec<usize>, CourseRow)> {
-    let row = |row: &Row| match row {
-        Row::Space(_) => None,
-        Row::Track(at, ..) => {
+fn rows(lives: &LivesFigure<'_>) -> Vec<(Vec<usize>, CourseRow)> {
+    let row = |row: &FigureRow| match row {
+        FigureRow::Space(_) => None,
+        FigureRow::Track(at, ..) => {
             let track = lives.tracks.get(*at)?;
             let (lives, bars) = (track.lives.clone(), track.bars.clone());
             Some((vec![*at], CourseRow { lives, bars }))
         }
-        Row::Folded(all, _) => {
+        FigureRow::Folded(all, _) => {
             let span = lives.source.span();
-            let bars = vec![Bar { span, share: 1.0 }];
+            let bars = vec![SendingBar { span, share: 1.0 }];
             let lives = Vec::new();
             Some((all.clone(), CourseRow { lives, bars }))
         }

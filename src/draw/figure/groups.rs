@@ -5,14 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::incidents::configurations;
-use super::source::{Source, merged};
-use super::tracks::{Bar, Life, Track};
+use super::source::{FigureSource, merged};
+use super::tracks::{SendingBar, Track, TrackLife};
 use crate::base::name::namespace;
 use crate::base::time::Span;
 
 /// Some nodes that are drawn as one.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Group {
+pub(crate) struct NodeGroup {
     pub(crate) space: String,
     /// The phases it lives in, 0..; all of them where there are no phases.
     pub(crate) phases: BTreeSet<usize>,
@@ -21,7 +21,7 @@ pub(crate) struct Group {
 }
 
 /// The phases that each of these roles lives in: those whose configuration holds it, else the one it is first seen in.
-pub(crate) fn phases_of(source: &Source<'_>, tracks: &[Track]) -> Vec<BTreeSet<usize>> {
+pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTreeSet<usize>> {
     let found = configurations(source);
     let of = |track: &Track| {
         let inside = (0..found.len()).filter(|k| found[*k].names.contains(&track.name));
@@ -35,7 +35,7 @@ pub(crate) fn phases_of(source: &Source<'_>, tracks: &[Track]) -> Vec<BTreeSet<u
 }
 
 /// The groups of some tracks, by namespace and first phase.
-pub(crate) fn groups(source: &Source<'_>, tracks: &[Track]) -> Vec<Group> {
+pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<NodeGroup> {
     let phases = phases_of(source, tracks);
     let mut all: BTreeMap<(&str, Vec<usize>), Vec<usize>> = BTreeMap::new();
     for (at, (track, phases)) in tracks.iter().zip(&phases).enumerate() {
@@ -43,7 +43,7 @@ pub(crate) fn groups(source: &Source<'_>, tracks: &[Track]) -> Vec<Group> {
         all.entry(key).or_default().push(at);
     }
     all.into_iter()
-        .map(|((space, phases), members)| Group {
+        .map(|((space, phases), members)| NodeGroup {
             space: space.to_owned(),
             phases: phases.into_iter().collect(),
             members,
@@ -52,7 +52,7 @@ pub(crate) fn groups(source: &Source<'_>, tracks: &[Track]) -> Vec<Group> {
 }
 
 /// A row per group: alive while a member is, busy by what all send.
-pub(crate) fn tracks(source: &Source<'_>, tracks: &[Track]) -> Vec<Track> {
+pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<Track> {
     groups(source, tracks)
         .iter()
         .map(|group| match group.members[..] {
@@ -62,11 +62,11 @@ pub(crate) fn tracks(source: &Source<'_>, tracks: &[Track]) -> Vec<Track> {
         .collect()
 }
 
-fn together(source: &Source<'_>, group: &Group, tracks: &[Track]) -> Track {
+fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Track]) -> Track {
     let members = || group.members.iter().map(|at| &tracks[*at]);
     let lives = members().flat_map(|t| &t.lives).map(|l| l.span).collect();
     let whole = source.span();
-    let life = |span: Span| Life {
+    let life = |span: Span| TrackLife {
         span,
         begins: members().any(|t| {
             t.lives
@@ -77,7 +77,7 @@ fn together(source: &Source<'_>, group: &Group, tracks: &[Track]) -> Track {
         is_inferred: false,
     };
     let sends = members().flat_map(|t| &t.bars).map(|b| b.span).collect();
-    let bar = |span: Span| Bar { span, share: 1.0 };
+    let bar = |span: Span| SendingBar { span, share: 1.0 };
     let first = members().next();
     let more = group.members.len() - 1;
     let name = first.map_or_else(String::new, |t| format!("{} +{more}", t.name));

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::source::{Source, merged};
-use super::tracks::{Bar, Track, steps};
+use super::source::{FigureSource, merged};
+use super::tracks::{SendingBar, Track, steps};
 use crate::base::name::{last_part, namespace};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
@@ -44,7 +44,7 @@ pub(crate) struct Handover {
 }
 
 /// The incidents to mark, in order of time, and how many smaller ones are not.
-pub(crate) fn incidents(source: &Source<'_>, tracks: &[Track]) -> (Vec<Incident>, usize) {
+pub(crate) fn incidents(source: &FigureSource<'_>, tracks: &[Track]) -> (Vec<Incident>, usize) {
     let mut all = Vec::new();
     for (at, track) in tracks.iter().enumerate() {
         all.extend(returns(source, at, track));
@@ -58,7 +58,7 @@ pub(crate) fn incidents(source: &Source<'_>, tracks: &[Track]) -> (Vec<Incident>
 }
 
 /// Rows that were gone, or silent in topics, and are back.
-fn returns(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
+fn returns(source: &FigureSource<'_>, at: usize, track: &Track) -> Vec<Incident> {
     let whole = source.span();
     let gap = |from: Stamp, to: Stamp, what: &str| {
         let away = to.since(from);
@@ -91,7 +91,7 @@ fn returns(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
 const SECOND: i64 = 1_000_000_000;
 
 /// Steps of the rates of single publications, or of the topic that the row is.
-fn rates(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
+fn rates(source: &FigureSource<'_>, at: usize, track: &Track) -> Vec<Incident> {
     let mut all = Vec::new();
     let bridged = source.span().nanos() / BRIDGED;
     if let Some(topic) = track.topic {
@@ -123,7 +123,7 @@ fn rates(source: &Source<'_>, at: usize, track: &Track) -> Vec<Incident> {
 }
 
 fn stepped(
-    source: &Source<'_>,
+    source: &FigureSource<'_>,
     at: usize,
     (stretch, sent): (Span, &[f64]),
     what: &str,
@@ -132,7 +132,7 @@ fn stepped(
     let pairs = bars.windows(2).filter_map(|pair| {
         let (from, to) = (pair[0].share, pair[1].share);
         let factor = (from / to).max(to / from);
-        let counted = |b: &Bar| b.share * b.span.nanos() as f64 / 1e9 >= COUNTED;
+        let counted = |b: &SendingBar| b.share * b.span.nanos() as f64 / 1e9 >= COUNTED;
         let is_marked = pair.iter().all(counted) && factor >= STEP.0 && (from - to).abs() >= STEP.1;
         let change = words::rate_change(words::significant(from, 2), words::significant(to, 2));
         is_marked.then(|| Incident {
@@ -157,7 +157,7 @@ pub(crate) fn relative<'t>(topic: &'t str, node: &str) -> &'t str {
 }
 
 /// The majority graph of every phase.
-pub(crate) fn configurations(source: &Source<'_>) -> Vec<Configuration> {
+pub(crate) fn configurations(source: &FigureSource<'_>) -> Vec<Configuration> {
     let mission = source.mission;
     let of = |p: &crate::mission::ledger::Phase| {
         configuration_of(&mission.elements, &mission.activity, p.span)
@@ -167,7 +167,7 @@ pub(crate) fn configurations(source: &Source<'_>) -> Vec<Configuration> {
 
 /// Topics whose main sender in a phase differs from that in the phase before, put together by the two rows; the first
 /// few of them, and how many more there are.
-pub(crate) fn handovers(source: &Source<'_>, tracks: &[Track]) -> (Vec<Handover>, usize) {
+pub(crate) fn handovers(source: &FigureSource<'_>, tracks: &[Track]) -> (Vec<Handover>, usize) {
     let row = |role: &str| tracks.iter().position(|t| &*t.name == role);
     let found = configurations(source);
     let mut all: Vec<Handover> = Vec::new();

@@ -1,19 +1,19 @@
 //! The legend of a figure of lives: only what is drawn.
 
-use super::canvas::{Canvas, Type, ink};
-use super::lives::{Lives, cross, start};
-use super::notes::{Item, Run, Sign};
-use super::rows::Row;
+use super::canvas::{PaperCanvas, Type, ink};
+use super::lives::{LivesFigure, cross, start};
+use super::notes::{InlineSign, TextRun, Unbroken};
+use super::rows::FigureRow;
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::Stroke;
 
 /// Every sign that `lives` draws, with its words.
-pub(crate) fn items(lives: &Lives<'_>) -> Vec<Item> {
+pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     let open: Vec<_> = lives
         .rows
         .iter()
         .filter_map(|row| match row {
-            Row::Track(at, ..) => lives.tracks.get(*at),
+            FigureRow::Track(at, ..) => lives.tracks.get(*at),
             _ => None,
         })
         .collect();
@@ -23,7 +23,7 @@ pub(crate) fn items(lives: &Lives<'_>) -> Vec<Item> {
         let alive: i64 = t.lives.iter().map(|l| l.span.nanos()).sum();
         alive - busy > alive / 50
     });
-    let all: [(bool, Sign, &str); 6] = [
+    let all: [(bool, InlineSign, &str); 6] = [
         (
             open.iter().any(|t| !t.bars.is_empty()),
             (3.2, bar),
@@ -44,24 +44,24 @@ pub(crate) fn items(lives: &Lives<'_>) -> Vec<Item> {
         ),
     ];
     let drawn = all.into_iter().filter(|(is, ..)| *is);
-    let item = |(_, sign, words): (bool, Sign, &str)| {
-        let words = Run::Words(Type::Small, ink::QUIET, words.to_owned());
-        vec![Run::Sign(sign), words]
+    let item = |(_, sign, words): (bool, InlineSign, &str)| {
+        let words = TextRun::Words(Type::Small, ink::QUIET, words.to_owned());
+        vec![TextRun::Sign(sign), words]
     };
     drawn.map(item).collect()
 }
 
-fn bar(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+fn bar(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     canvas.fill(Rect::new(x, y - 1.0, 1.6, 2.0), ink::BAR);
     canvas.fill(Rect::new(x + 1.6, y - 0.4, 1.6, 0.8), ink::BAR);
 }
 
-fn thin(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+fn thin(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let stroke = Stroke::solid(ink::LINE, 0.28);
     canvas.line(Point::new(x, y), Point::new(x + 3.2, y), &stroke);
 }
 
-fn dashed(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+fn dashed(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let stroke = Stroke {
         color: ink::LINE,
         width: 0.28,
@@ -70,15 +70,15 @@ fn dashed(canvas: &mut Canvas<'_>, x: f64, y: f64) {
     canvas.line(Point::new(x, y), Point::new(x + 3.2, y), &stroke);
 }
 
-fn tick(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+fn tick(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     start(canvas, x + 0.3, y);
 }
 
-fn end(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+fn end(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     cross(canvas, x + 0.6, y);
 }
 
-fn arrow(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+fn arrow(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let stroke = Stroke::solid(ink::CHANGED, 0.3);
     let (from, tip) = (Point::new(x + 0.55, y), Point::new(x + 3.2, y));
     canvas.line(from, Point::new(x + 2.2, y), &stroke);

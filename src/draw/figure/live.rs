@@ -1,20 +1,21 @@
 //! Life lines as time goes: what a frame adds to rows that stand still.
 
-use super::canvas::{Canvas, Type, ink};
-use super::lives::{Lives, Place, thick};
-use super::rows::Row;
-use super::tracks::{Bar, Track};
+use super::canvas::{PaperCanvas, Type, ink};
+use super::lives::{LivesFigure, RowPlace, thick};
+use super::rows::FigureRow;
+use super::tracks::{SendingBar, Track};
 use crate::base::name::last_part;
 use crate::base::time::Stamp;
 
-impl Lives<'_> {
+impl LivesFigure<'_> {
     /// The same with a row for everything, nothing folded, nothing lettered and nothing handed over.
     pub(crate) fn opened(mut self) -> Self {
         let tracks = &self.tracks;
-        let open = |row: Row| match row {
-            Row::Folded(mut all, _) => {
+        let open = |row: FigureRow| match row {
+            FigureRow::Folded(mut all, _) => {
                 all.sort_by(|a, b| tracks[*a].name.cmp(&tracks[*b].name));
-                let row = |at: usize| Row::Track(at, last_part(&tracks[at].name).to_owned(), true);
+                let row =
+                    |at: usize| FigureRow::Track(at, last_part(&tracks[at].name).to_owned(), true);
                 all.into_iter().map(row).collect()
             }
             row => vec![row],
@@ -44,9 +45,12 @@ impl Lives<'_> {
             left += 1;
             let rows = std::mem::take(&mut self.rows);
             let titles = rows.iter().zip(rows.iter().skip(1).map(Some).chain([None]));
-            let is_empty = |(row, next): &(&Row, Option<&Row>)| {
-                matches!(row, Row::Space(_))
-                    && !matches!(next, Some(Row::Track(_, _, true) | Row::Folded(..)))
+            let is_empty = |(row, next): &(&FigureRow, Option<&FigureRow>)| {
+                matches!(row, FigureRow::Space(_))
+                    && !matches!(
+                        next,
+                        Some(FigureRow::Track(_, _, true) | FigureRow::Folded(..))
+                    )
             };
             let kept = titles.filter(|pair| !is_empty(pair));
             self.rows = kept.map(|(row, _)| row.clone()).collect();
@@ -57,13 +61,13 @@ impl Lives<'_> {
     /// The rows of single tracks with the middles of their lines.
     pub(crate) fn lines<'l>(
         &'l self,
-        canvas: &Canvas<'_>,
-        place: &Place,
+        canvas: &PaperCanvas<'_>,
+        place: &RowPlace,
     ) -> Vec<(f64, &'l Track, &'l str, bool)> {
         let (top, pitch) = (self.top(place), canvas.sizes.pitch());
         let rows = self.rows.iter().enumerate();
-        let line = |(k, row): (usize, &'l Row)| match row {
-            Row::Track(at, label, inside) => {
+        let line = |(k, row): (usize, &'l FigureRow)| match row {
+            FigureRow::Track(at, label, inside) => {
                 let y = top + (k as f64 + 0.5) * pitch;
                 Some((y, self.tracks.get(*at)?, label.as_str(), *inside))
             }
@@ -75,8 +79,8 @@ impl Lives<'_> {
     /// The names of the rows: those for which `is_now` holds stand out.
     pub(crate) fn names(
         &self,
-        canvas: &mut Canvas<'_>,
-        place: &Place,
+        canvas: &mut PaperCanvas<'_>,
+        place: &RowPlace,
         is_now: &dyn Fn(&Track) -> bool,
     ) {
         let room = place.axis.left - place.left - 1.2;
@@ -89,10 +93,10 @@ impl Lives<'_> {
     }
 
     /// What was sent until a moment.
-    pub(crate) fn past(&self, canvas: &mut Canvas<'_>, place: &Place, until: Stamp) {
+    pub(crate) fn past(&self, canvas: &mut PaperCanvas<'_>, place: &RowPlace, until: Stamp) {
         for (y, track, ..) in self.lines(canvas, place) {
             for bar in track.bars.iter().filter(|b| b.span.start < until) {
-                let mut bar: Bar = *bar;
+                let mut bar: SendingBar = *bar;
                 bar.span.end = bar.span.end.min(until);
                 thick(canvas, place, y, &bar, ink::BAR);
             }

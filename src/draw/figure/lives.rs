@@ -7,11 +7,11 @@
 //! its groups by `into_groups`.
 
 use super::band::{self, Axis};
-use super::canvas::{Canvas, HAIRLINE, Type, ink};
+use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::incidents::{Handover, Incident, handovers, incidents, relative};
-use super::rows::{Row, folded_label, rows};
-use super::source::Source;
-use super::tracks::{Bar, Life, Track, of_nodes, of_topics};
+use super::rows::{FigureRow, folded_label, rows};
+use super::source::FigureSource;
+use super::tracks::{SendingBar, Track, TrackLife, of_nodes, of_topics};
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
@@ -29,10 +29,10 @@ const APART: f64 = 2.3;
 pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
 
 /// Everything that a figure of lives says.
-pub(crate) struct Lives<'a> {
-    pub(crate) source: &'a Source<'a>,
+pub(crate) struct LivesFigure<'a> {
+    pub(crate) source: &'a FigureSource<'a>,
     pub(crate) tracks: Vec<Track>,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<FigureRow>,
     pub(crate) incidents: Vec<Incident>,
     /// How many smaller ones have no letter.
     pub(crate) unmarked: usize,
@@ -41,7 +41,7 @@ pub(crate) struct Lives<'a> {
 
 /// Where the rows of a figure stand, in millimetres.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct RowPlace {
     /// The top of the band.
     pub(crate) top: f64,
     /// Where names begin.
@@ -56,9 +56,9 @@ pub(crate) struct Place {
     pub(crate) is_live: bool,
 }
 
-impl<'a> Lives<'a> {
+impl<'a> LivesFigure<'a> {
     /// The lives of nodes, or of topics.
-    pub(crate) fn new(source: &'a Source<'a>, by_topics: bool) -> Self {
+    pub(crate) fn new(source: &'a FigureSource<'a>, by_topics: bool) -> Self {
         let tracks = if by_topics {
             of_topics(source)
         } else {
@@ -68,7 +68,7 @@ impl<'a> Lives<'a> {
     }
 
     /// The lives of these rows.
-    pub(crate) fn of(source: &'a Source<'a>, tracks: Vec<Track>) -> Self {
+    pub(crate) fn of(source: &'a FigureSource<'a>, tracks: Vec<Track>) -> Self {
         let (incidents, mut unmarked) = incidents(source, &tracks);
         let (handovers, more) = handovers(source, &tracks);
         unmarked += more;
@@ -84,7 +84,7 @@ impl<'a> Lives<'a> {
     }
 
     /// The height of band, rows and axis in millimetres.
-    pub(crate) fn height(&self, canvas: &Canvas<'_>) -> f64 {
+    pub(crate) fn height(&self, canvas: &PaperCanvas<'_>) -> f64 {
         let band = if self.source.phases.is_empty() {
             0.0
         } else {
@@ -94,31 +94,33 @@ impl<'a> Lives<'a> {
     }
 
     /// How wide the column of names is: the widest, at most 36 % of `width`.
-    pub(crate) fn names_width(&self, canvas: &Canvas<'_>, width: f64) -> f64 {
-        let one = |row: &Row| match row {
-            Row::Space(name) => canvas.width(name, Type::Head),
-            Row::Track(_, label, inside) => {
+    pub(crate) fn names_width(&self, canvas: &PaperCanvas<'_>, width: f64) -> f64 {
+        let one = |row: &FigureRow| match row {
+            FigureRow::Space(name) => canvas.width(name, Type::Head),
+            FigureRow::Track(_, label, inside) => {
                 canvas.width(label, Type::Name) + if *inside { 1.2 } else { 0.0 }
             }
-            Row::Folded(all, _) => canvas.width(&folded_label(&self.tracks, all), Type::Name) + 1.2,
+            FigureRow::Folded(all, _) => {
+                canvas.width(&folded_label(&self.tracks, all), Type::Name) + 1.2
+            }
         };
         let widest = self.rows.iter().map(one).fold(8.0, f64::max);
         (widest + 1.2).min(width * 0.36)
     }
 
     /// Where the rows begin.
-    pub(crate) fn top(&self, place: &Place) -> f64 {
+    pub(crate) fn top(&self, place: &RowPlace) -> f64 {
         let has_band = !self.source.phases.is_empty();
         place.top + if has_band { band::HEIGHT + 0.9 } else { 0.0 }
     }
 
     /// Where they end, at the axis.
-    pub(crate) fn bottom(&self, canvas: &Canvas<'_>, place: &Place) -> f64 {
+    pub(crate) fn bottom(&self, canvas: &PaperCanvas<'_>, place: &RowPlace) -> f64 {
         self.top(place) + self.rows.len() as f64 * canvas.sizes.pitch() + 0.4
     }
 
     /// Draws band, rows, marks and axis; answers where the axis ends below.
-    pub(crate) fn draw(&self, canvas: &mut Canvas<'_>, place: &Place) -> f64 {
+    pub(crate) fn draw(&self, canvas: &mut PaperCanvas<'_>, place: &RowPlace) -> f64 {
         let pitch = canvas.sizes.pitch();
         let top = self.top(place);
         let bottom = self.bottom(canvas, place);
@@ -148,7 +150,7 @@ impl<'a> Lives<'a> {
     }
 
     /// The band, its columns behind the rows, and the heads of the other columns.
-    fn columns(&self, canvas: &mut Canvas<'_>, place: &Place, bottom: f64) {
+    fn columns(&self, canvas: &mut PaperCanvas<'_>, place: &RowPlace, bottom: f64) {
         let phases = self.source.phases;
         let middle = place.top + band::HEIGHT / 2.0;
         if !phases.is_empty() {
@@ -197,14 +199,14 @@ impl<'a> Lives<'a> {
         self.tracks.first().is_some_and(|t| t.topic.is_some())
     }
 
-    fn row(&self, canvas: &mut Canvas<'_>, place: &Place, y: f64, row: &Row) {
+    fn row(&self, canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, row: &FigureRow) {
         let room = place.axis.left - place.left - 1.2;
         match row {
-            Row::Space(name) => {
+            FigureRow::Space(name) => {
                 let name = canvas.cut(name, Type::Head, room);
                 canvas.text(place.left, y, Type::Head, ink::TEXT, &name);
             }
-            Row::Track(at, label, inside) => {
+            FigureRow::Track(at, label, inside) => {
                 let indent = if *inside { 1.2 } else { 0.0 };
                 if !place.is_live {
                     let label = canvas.cut(label, Type::Name, room - indent);
@@ -217,12 +219,19 @@ impl<'a> Lives<'a> {
                     talk(canvas, self.source, track, (x, y, width));
                 }
             }
-            Row::Folded(all, space) => self.folded(canvas, place, y, all, space),
+            FigureRow::Folded(all, space) => self.folded(canvas, place, y, all, space),
         }
     }
 
     /// Rows that live throughout: one light bar.
-    fn folded(&self, canvas: &mut Canvas<'_>, place: &Place, y: f64, all: &[usize], space: &str) {
+    fn folded(
+        &self,
+        canvas: &mut PaperCanvas<'_>,
+        place: &RowPlace,
+        y: f64,
+        all: &[usize],
+        space: &str,
+    ) {
         let room = place.axis.left - place.left - 2.4;
         let label = canvas.cut(&folded_label(&self.tracks, all), Type::Name, room);
         canvas.text(place.left + 1.2, y, Type::Name, ink::QUIET, &label);
@@ -245,8 +254,8 @@ impl<'a> Lives<'a> {
     /// The arrows of hand-overs; answers where they and their labels stand: x, from y, to y.
     fn arrows(
         &self,
-        canvas: &mut Canvas<'_>,
-        place: &Place,
+        canvas: &mut PaperCanvas<'_>,
+        place: &RowPlace,
         y_of: impl Fn(usize) -> Option<f64>,
     ) -> Vec<(f64, f64, f64)> {
         let mut taken: Vec<(f64, f64, f64)> = Vec::new();
@@ -290,8 +299,8 @@ impl<'a> Lives<'a> {
 
 /// A circled letter at a moment of a row, out of the way of what stands there.
 fn letter(
-    canvas: &mut Canvas<'_>,
-    place: &Place,
+    canvas: &mut PaperCanvas<'_>,
+    place: &RowPlace,
     (at, y): (Stamp, f64),
     k: usize,
     taken: &mut Vec<(f64, f64, f64)>,
@@ -331,7 +340,7 @@ pub(crate) fn sign(k: usize) -> String {
         .map_or_else(String::new, String::from)
 }
 
-fn rate(canvas: &mut Canvas<'_>, place: &Place, y: f64, hz: Option<f64>) {
+fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>) {
     let Some(right) = place.rates else { return };
     // Two digits from 1 Hz on, one below: more is not known, and not needed.
     let digits = |hz: f64| if hz < 0.95 { 1 } else { 2 };
@@ -341,7 +350,7 @@ fn rate(canvas: &mut Canvas<'_>, place: &Place, y: f64, hz: Option<f64>) {
 }
 
 /// The lives and the bars of a row, its starts and its ends.
-fn lines(canvas: &mut Canvas<'_>, place: &Place, y: f64, track: &Track) {
+fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) {
     for life in &track.lives {
         thin(canvas, place, y, life);
     }
@@ -359,7 +368,7 @@ fn lines(canvas: &mut Canvas<'_>, place: &Place, y: f64, track: &Track) {
     }
 }
 
-fn thin(canvas: &mut Canvas<'_>, place: &Place, y: f64, life: &Life) {
+fn thin(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, life: &TrackLife) {
     let dash = if life.is_inferred {
         vec![0.55, 0.5]
     } else {
@@ -375,7 +384,13 @@ fn thin(canvas: &mut Canvas<'_>, place: &Place, y: f64, life: &Life) {
 }
 
 /// A stretch of sending.
-pub(crate) fn thick(canvas: &mut Canvas<'_>, place: &Place, y: f64, bar: &Bar, color: Color) {
+pub(crate) fn thick(
+    canvas: &mut PaperCanvas<'_>,
+    place: &RowPlace,
+    y: f64,
+    bar: &SendingBar,
+    color: Color,
+) {
     let high = (BAR.0 + BAR.1 * bar.share) * canvas.sizes.pitch();
     let (from, to) = (place.axis.x(bar.span.start), place.axis.x(bar.span.end));
     let wide = (to - from).max(0.25);
@@ -383,14 +398,14 @@ pub(crate) fn thick(canvas: &mut Canvas<'_>, place: &Place, y: f64, bar: &Bar, c
 }
 
 /// The mark of a start.
-pub(crate) fn start(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+pub(crate) fn start(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let high = TICK.1 * canvas.sizes.pitch();
     let rect = Rect::new(x - TICK.0 / 2.0, y - high / 2.0, TICK.0, high);
     canvas.fill(rect, ink::ADDED);
 }
 
 /// The mark of an end.
-pub(crate) fn cross(canvas: &mut Canvas<'_>, x: f64, y: f64) {
+pub(crate) fn cross(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let stroke = Stroke::solid(ink::REMOVED, 0.38);
     let (a, b) = (CROSS, CROSS * 1.35);
     canvas.line(Point::new(x - a, y - b), Point::new(x + a, y + b), &stroke);
@@ -398,7 +413,12 @@ pub(crate) fn cross(canvas: &mut Canvas<'_>, x: f64, y: f64) {
 }
 
 /// What a node sends, the fastest first, and what it receives, as far as there is room.
-fn talk(canvas: &mut Canvas<'_>, source: &Source<'_>, track: &Track, place: (f64, f64, f64)) {
+fn talk(
+    canvas: &mut PaperCanvas<'_>,
+    source: &FigureSource<'_>,
+    track: &Track,
+    place: (f64, f64, f64),
+) {
     let (x, y, width) = place;
     let name = &track.name;
     if let Some(topic) = track.topic {
@@ -453,7 +473,7 @@ fn talk(canvas: &mut Canvas<'_>, source: &Source<'_>, track: &Track, place: (f64
     }
 }
 
-fn sent_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
+fn sent_by<'s>(source: &'s FigureSource<'_>, track: &Track) -> Vec<&'s str> {
     let mut rated: Vec<(f64, &str)> = Vec::new();
     for edge in source.publications(&track.nodes) {
         let count: f64 = source.sent(edge).iter().sum();
@@ -479,7 +499,7 @@ fn sent_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
     names
 }
 
-fn received_by<'s>(source: &'s Source<'_>, track: &Track) -> Vec<&'s str> {
+fn received_by<'s>(source: &'s FigureSource<'_>, track: &Track) -> Vec<&'s str> {
     let all = &source.mission.elements.subscribes;
     let own = all.iter().filter(|e| {
         track.nodes.contains(&e.node) && source.shows(e.topic) && !source.is_hub(e.topic)

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::band::{self, Axis};
-use super::canvas::{Canvas, HAIRLINE, Type, ink};
+use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::groups::{groups, phases_of};
 use super::notes::{flow, sentence};
-use super::page::{FITTING, Sheet, filter_that_fits, nothing};
-use super::place::{Placed, place, rooms};
+use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
+use super::place::{PlacedPanel, place, rooms};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
-use super::{MOST_HEIGHT, Rows};
+use super::{MOST_HEIGHT, RowKind};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
@@ -29,7 +29,7 @@ const NAMED: usize = 4;
 const MOST_NODES: usize = 120;
 
 /// One box: what is written in it.
-enum Look {
+enum MapBox {
     /// A node by its label, and its phases.
     Pill(String, String),
     /// Nodes without a known partner.
@@ -39,25 +39,25 @@ enum Look {
 }
 
 /// A map laid out.
-struct Drawn {
-    looks: Vec<Look>,
+struct MapDrawing {
+    looks: Vec<MapBox>,
     spaces: Vec<String>,
     talks: Vec<Talk>,
     labels: Vec<Vec<Vec<String>>>,
-    placed: Placed,
+    placed: PlacedPanel,
     /// Nodes of no framed namespace without a known partner: told in a note.
     alone: Vec<String>,
 }
 
 /// The figure, on the ladder from nodes to groups to refusal.
-pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
+pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let tracks = of_nodes(sheet.source);
     if tracks.is_empty() {
         return Err(nothing(sheet.source));
     }
     let asked = sheet.options.rows;
     let few = tracks.len() <= MOST_NODES;
-    let nodes = (asked != Some(Rows::Groups) && few)
+    let nodes = (asked != Some(RowKind::Groups) && few)
         .then(|| page(sheet, &tracks, false))
         .flatten();
     let is_low = |s: &Scene, most: f64| s.size.h <= most * super::canvas::PX_PER_MM;
@@ -67,7 +67,7 @@ pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
     {
         return Ok((scene.clone(), Vec::new()));
     }
-    let grouped = (asked != Some(Rows::Nodes))
+    let grouped = (asked != Some(RowKind::Nodes))
         .then(|| page(sheet, &tracks, true))
         .flatten();
     if let Some(scene) = grouped.filter(|s| is_low(s, MOST_HEIGHT)) {
@@ -88,7 +88,7 @@ pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
     }
 }
 
-fn too_large(sheet: &Sheet<'_>, tracks: &[Track]) -> Error {
+fn too_large(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Error {
     let width = sheet.options.width_mm;
     let many = words::count(tracks.len(), "node");
     let hint = if width < 181.0 && page_at(sheet, tracks, 181.0) {
@@ -100,19 +100,19 @@ fn too_large(sheet: &Sheet<'_>, tracks: &[Track]) -> Error {
 }
 
 /// Whether groups would fit at another width.
-fn page_at(sheet: &Sheet<'_>, tracks: &[Track], width: f64) -> bool {
-    let options = super::Options {
+fn page_at(sheet: &FigureSheet<'_>, tracks: &[Track], width: f64) -> bool {
+    let options = super::FigureOptions {
         width_mm: width,
         ..sheet.options.clone()
     };
-    let wider = Sheet {
+    let wider = FigureSheet {
         options: &options,
         ..*sheet
     };
     page(&wider, tracks, true).is_some_and(|s| super::page::fits(&s))
 }
 
-fn page(sheet: &Sheet<'_>, tracks: &[Track], is_grouped: bool) -> Option<Scene> {
+fn page(sheet: &FigureSheet<'_>, tracks: &[Track], is_grouped: bool) -> Option<Scene> {
     let width = sheet.options.width_mm;
     let mut canvas = sheet.canvas();
     let drawn = if is_grouped {
@@ -131,8 +131,8 @@ fn page(sheet: &Sheet<'_>, tracks: &[Track], is_grouped: bool) -> Option<Scene> 
 
 /// Band, names and notes below the drawing, which ends at `end`; answers where they end.
 fn below(
-    canvas: &mut Canvas<'_>,
-    sheet: &Sheet<'_>,
+    canvas: &mut PaperCanvas<'_>,
+    sheet: &FigureSheet<'_>,
     end: f64,
     (is_grouped, left_out, many): (bool, usize, usize),
     alone: &[String],
@@ -183,7 +183,11 @@ fn below(
 }
 
 /// Every node as a pill, namespaces as frames.
-fn of_pills(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option<Drawn> {
+fn of_pills(
+    sheet: &FigureSheet<'_>,
+    canvas: &PaperCanvas<'_>,
+    tracks: &[Track],
+) -> Option<MapDrawing> {
     let source = sheet.source;
     let talks = Talks::new(source, tracks);
     let own: Vec<Option<usize>> = (0..tracks.len()).map(Some).collect();
@@ -214,7 +218,7 @@ fn of_pills(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option<
     let mut vertices = Vec::new();
     let mut vertex = vec![None; tracks.len()];
     for at in linked.iter().copied() {
-        let look = Look::Pill(label(&tracks[at]), phases[at].clone());
+        let look = MapBox::Pill(label(&tracks[at]), phases[at].clone());
         vertex[at] = Some(vertices.len());
         vertices.push(sized(canvas, &look, home(&tracks[at]), source.phases.len()));
         looks.push(look);
@@ -226,7 +230,7 @@ fn of_pills(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option<
             .map(|at| (label(&tracks[at]), phases[at].clone()))
             .collect();
         for part in alone.chunks(8) {
-            let look = Look::List(part.to_vec());
+            let look = MapBox::List(part.to_vec());
             vertices.push(sized(canvas, &look, space, source.phases.len()));
             looks.push(look);
         }
@@ -241,11 +245,15 @@ fn of_pills(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option<
         })
         .collect();
     let drawn = finished(sheet, canvas, (looks, vertices, spaces, talks), 1)?;
-    Some(Drawn { alone, ..drawn })
+    Some(MapDrawing { alone, ..drawn })
 }
 
 /// Every group as a box.
-fn of_groups(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option<Drawn> {
+fn of_groups(
+    sheet: &FigureSheet<'_>,
+    canvas: &PaperCanvas<'_>,
+    tracks: &[Track],
+) -> Option<MapDrawing> {
     let source = sheet.source;
     let groups = groups(source, tracks);
     let mut vertex = vec![None; tracks.len()];
@@ -264,7 +272,7 @@ fn of_groups(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option
             lines.push(format!("+{more} more"));
         }
         let phases = ranges(&group.phases, source.phases.len());
-        let look = Look::Group(group.space.clone(), phases, lines, group.phases.clone());
+        let look = MapBox::Group(group.space.clone(), phases, lines, group.phases.clone());
         vertices.push(sized(canvas, &look, None, source.phases.len()));
         looks.push(look);
     }
@@ -275,11 +283,11 @@ fn of_groups(sheet: &Sheet<'_>, canvas: &Canvas<'_>, tracks: &[Track]) -> Option
 }
 
 fn finished(
-    sheet: &Sheet<'_>,
-    canvas: &Canvas<'_>,
-    (looks, vertices, spaces, talks): (Vec<Look>, Vec<Vertex>, Vec<String>, Vec<Talk>),
+    sheet: &FigureSheet<'_>,
+    canvas: &PaperCanvas<'_>,
+    (looks, vertices, spaces, talks): (Vec<MapBox>, Vec<Vertex>, Vec<String>, Vec<Talk>),
     most: usize,
-) -> Option<Drawn> {
+) -> Option<MapDrawing> {
     let link = |t: &Talk| Link {
         from: t.from,
         to: t.to,
@@ -300,7 +308,7 @@ fn finished(
     let engine = engine("layered").ok()?;
     let placed = place(&plan, &rooms, sheet.options.width_mm - 0.4, engine)?;
     let aside = (sheet.options.width_mm - placed.size.w) / 2.0;
-    Some(Drawn {
+    Some(MapDrawing {
         looks,
         spaces,
         talks,
@@ -324,22 +332,22 @@ pub(crate) fn ranges(phases: &BTreeSet<usize>, many: usize) -> String {
     runs.collect::<Vec<_>>().join(",")
 }
 
-fn sized(canvas: &Canvas<'_>, look: &Look, cluster: Option<usize>, phases: usize) -> Vertex {
+fn sized(canvas: &PaperCanvas<'_>, look: &MapBox, cluster: Option<usize>, phases: usize) -> Vertex {
     let line = canvas.sizes.pitch();
     let named = |(name, phases): &(String, String)| {
         let gap = if phases.is_empty() { 0.0 } else { 1.0 };
         canvas.width(name, Type::Name) + gap + canvas.width(phases, Type::Head)
     };
     let size = match look {
-        Look::Pill(name, phases) => Size::new(
+        MapBox::Pill(name, phases) => Size::new(
             named(&(name.clone(), phases.clone())) + 2.2,
             PILL.max(line + 0.5),
         ),
-        Look::List(all) => {
+        MapBox::List(all) => {
             let widest = all.iter().map(named).fold(0.0, f64::max);
             Size::new(widest + 1.6, line * 0.9 * all.len() as f64 + 0.8)
         }
-        Look::Group(space, own, lines, _) => {
+        MapBox::Group(space, own, lines, _) => {
             let widest = lines
                 .iter()
                 .map(|l| canvas.width(l, Type::Name))
@@ -359,7 +367,7 @@ fn sized(canvas: &Canvas<'_>, look: &Look, cluster: Option<usize>, phases: usize
     }
 }
 
-fn paint(canvas: &mut Canvas<'_>, sheet: &Sheet<'_>, drawn: &Drawn) {
+fn paint(canvas: &mut PaperCanvas<'_>, sheet: &FigureSheet<'_>, drawn: &MapDrawing) {
     let placed = &drawn.placed;
     let frame = Stroke::solid(ink::FOLDED, HAIRLINE);
     canvas.begin("namespaces");
@@ -381,9 +389,9 @@ fn paint(canvas: &mut Canvas<'_>, sheet: &Sheet<'_>, drawn: &Drawn) {
     canvas.begin("nodes");
     for (look, rect) in drawn.looks.iter().zip(&placed.boxes) {
         match look {
-            Look::Pill(name, phases) => pill(canvas, *rect, name, phases),
-            Look::List(all) => list(canvas, *rect, all),
-            Look::Group(space, own, lines, cells) => {
+            MapBox::Pill(name, phases) => pill(canvas, *rect, name, phases),
+            MapBox::List(all) => list(canvas, *rect, all),
+            MapBox::Group(space, own, lines, cells) => {
                 let many = sheet.source.phases.len();
                 group(canvas, *rect, (space, own, lines), cells, many);
             }
@@ -391,7 +399,7 @@ fn paint(canvas: &mut Canvas<'_>, sheet: &Sheet<'_>, drawn: &Drawn) {
     }
 }
 
-fn pill(canvas: &mut Canvas<'_>, rect: Rect, name: &str, phases: &str) {
+fn pill(canvas: &mut PaperCanvas<'_>, rect: Rect, name: &str, phases: &str) {
     let fill = if phases.is_empty() {
         ink::BAND[1]
     } else {
@@ -404,7 +412,7 @@ fn pill(canvas: &mut Canvas<'_>, rect: Rect, name: &str, phases: &str) {
     canvas.text_end(rect.right() - 1.1, y, Type::Head, ink::ADDED, phases);
 }
 
-fn list(canvas: &mut Canvas<'_>, rect: Rect, all: &[(String, String)]) {
+fn list(canvas: &mut PaperCanvas<'_>, rect: Rect, all: &[(String, String)]) {
     let stroke = Stroke {
         color: ink::RULE,
         width: HAIRLINE,
@@ -420,7 +428,7 @@ fn list(canvas: &mut Canvas<'_>, rect: Rect, all: &[(String, String)]) {
 }
 
 fn group(
-    canvas: &mut Canvas<'_>,
+    canvas: &mut PaperCanvas<'_>,
     rect: Rect,
     (space, own, lines): (&str, &str, &[String]),
     cells: &BTreeSet<usize>,

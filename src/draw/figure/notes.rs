@@ -1,34 +1,39 @@
 //! Running text below a figure: runs of words and signs that wrap at the width.
 
-use super::canvas::{Canvas, Type};
+use super::canvas::{PaperCanvas, Type};
 use crate::base::geometry::Point;
 use crate::draw::style::Color;
 
 /// A small drawing inside a text: its width in millimetres, and what draws it with its left end and its middle line.
-pub(crate) type Sign = (f64, fn(&mut Canvas<'_>, f64, f64));
+pub(crate) type InlineSign = (f64, fn(&mut PaperCanvas<'_>, f64, f64));
 
 /// A part of a text.
-pub(crate) enum Run {
+pub(crate) enum TextRun {
     Words(Type, Color, String),
-    Sign(Sign),
+    Sign(InlineSign),
 }
 
 /// What is kept on one line if it can be.
-pub(crate) type Item = Vec<Run>;
+pub(crate) type Unbroken = Vec<TextRun>;
 
 /// The room between items.
 const GAP: f64 = 2.6;
 
 /// Writes items one after another from `y`, the top, on; wraps before an item that does not fit, and inside one that
 /// is wider than a line. Answers where the next line would begin.
-pub(crate) fn flow(canvas: &mut Canvas<'_>, width: f64, y: f64, items: &[Item]) -> f64 {
+pub(crate) fn flow(canvas: &mut PaperCanvas<'_>, width: f64, y: f64, items: &[Unbroken]) -> f64 {
     flow_at(canvas, Point::new(0.0, y), width, items)
 }
 
 /// The same from a top left corner on.
-pub(crate) fn flow_at(canvas: &mut Canvas<'_>, corner: Point, width: f64, items: &[Item]) -> f64 {
+pub(crate) fn flow_at(
+    canvas: &mut PaperCanvas<'_>,
+    corner: Point,
+    width: f64,
+    items: &[Unbroken],
+) -> f64 {
     let line = canvas.sizes.line();
-    let mut pen = Place {
+    let mut pen = NotePlace {
         left: corner.x,
         x: 0.0,
         y: corner.y + line / 2.0,
@@ -54,11 +59,11 @@ pub(crate) fn flow_at(canvas: &mut Canvas<'_>, corner: Point, width: f64, items:
 }
 
 /// A sentence of ordinary words.
-pub(crate) fn sentence(color: Color, text: impl Into<String>) -> Item {
-    vec![Run::Words(Type::Small, color, text.into())]
+pub(crate) fn sentence(color: Color, text: impl Into<String>) -> Unbroken {
+    vec![TextRun::Words(Type::Small, color, text.into())]
 }
 
-struct Place {
+struct NotePlace {
     left: f64,
     /// From the left.
     x: f64,
@@ -67,19 +72,19 @@ struct Place {
     line: f64,
 }
 
-impl Place {
+impl NotePlace {
     fn wrap(&mut self) {
         self.x = 0.0;
         self.y += self.line;
     }
 
-    fn put(&mut self, canvas: &mut Canvas<'_>, run: &Run) {
+    fn put(&mut self, canvas: &mut PaperCanvas<'_>, run: &TextRun) {
         match run {
-            Run::Sign((width, draw)) => {
+            TextRun::Sign((width, draw)) => {
                 draw(canvas, self.left + self.x, self.y);
                 self.x += width + 0.8;
             }
-            Run::Words(of, color, text) => {
+            TextRun::Words(of, color, text) => {
                 let mut rest = text.as_str();
                 while !rest.is_empty() {
                     let (now, after) = self.split(canvas, *of, rest);
@@ -96,7 +101,7 @@ impl Place {
     }
 
     /// As many words as fit on this line, at least one word on an empty line.
-    fn split<'t>(&self, canvas: &Canvas<'_>, of: Type, text: &'t str) -> (&'t str, &'t str) {
+    fn split<'t>(&self, canvas: &PaperCanvas<'_>, of: Type, text: &'t str) -> (&'t str, &'t str) {
         let room = self.width - self.x + 0.01;
         if canvas.width(text.trim_end(), of) <= room {
             return (text, "");
@@ -112,9 +117,9 @@ impl Place {
     }
 }
 
-fn run_width(canvas: &Canvas<'_>, run: &Run) -> f64 {
+fn run_width(canvas: &PaperCanvas<'_>, run: &TextRun) -> f64 {
     match run {
-        Run::Sign((width, _)) => width + 0.8,
-        Run::Words(of, _, text) => canvas.width(text, *of),
+        TextRun::Sign((width, _)) => width + 0.8,
+        TextRun::Words(of, _, text) => canvas.width(text, *of),
     }
 }

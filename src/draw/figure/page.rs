@@ -1,13 +1,13 @@
 //! A page with one figure: the ladder from nodes to groups to refusal, and what stands below the drawing.
 
 use super::band::{Axis, clock, names};
-use super::canvas::{Canvas, PX_PER_MM, Sizes, Type, ink};
-use super::lives::{Lives, Place, WIDE, sign};
-use super::notes::{Item, Run, flow, sentence};
-use super::rows::Row;
-use super::source::Source;
+use super::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
+use super::lives::{LivesFigure, RowPlace, WIDE, sign};
+use super::notes::{TextRun, Unbroken, flow, sentence};
+use super::rows::FigureRow;
+use super::source::FigureSource;
 use super::tracks::Track;
-use super::{Kind, MOST_HEIGHT, Options, Rows, legend};
+use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind, legend};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::base::name::last_part;
@@ -22,25 +22,25 @@ const SHORTEST_AXIS: f64 = 15.0;
 pub(crate) const FITTING: usize = 40;
 
 /// What a page is made of.
-pub(crate) struct Sheet<'a> {
-    pub(crate) source: &'a Source<'a>,
+pub(crate) struct FigureSheet<'a> {
+    pub(crate) source: &'a FigureSource<'a>,
     pub(crate) fonts: &'a Fonts,
     pub(crate) sizes: Sizes,
-    pub(crate) options: &'a Options,
+    pub(crate) options: &'a FigureOptions,
 }
 
-impl<'a> Sheet<'a> {
+impl<'a> FigureSheet<'a> {
     /// The figure and what the user should know of it.
     pub(crate) fn draw(&self) -> Result<(Scene, Vec<String>)> {
         match self.options.kind {
-            Kind::Lives => self.lives(),
-            Kind::Map => super::map::draw(self),
-            Kind::Steps => super::steps::draw(self),
+            FigureKind::Lives => self.lives(),
+            FigureKind::Map => super::map::draw(self),
+            FigureKind::Steps => super::steps::draw(self),
         }
     }
 
-    pub(crate) fn canvas(&self) -> Canvas<'a> {
-        Canvas::new(self.fonts, self.sizes, PX_PER_MM)
+    pub(crate) fn canvas(&self) -> PaperCanvas<'a> {
+        PaperCanvas::new(self.fonts, self.sizes, PX_PER_MM)
     }
 
     /// The title of the page: what it is, and of which bag.
@@ -54,20 +54,23 @@ impl<'a> Sheet<'a> {
 
     fn lives(&self) -> Result<(Scene, Vec<String>)> {
         let by_topics = match self.options.rows {
-            Some(rows) => rows == Rows::Topics,
+            Some(rows) => rows == RowKind::Topics,
             None => !self.source.knows_publishers(),
         };
-        let first = Lives::new(self.source, by_topics);
+        let first = LivesFigure::new(self.source, by_topics);
         if first.rows.is_empty() {
             return Err(nothing(self.source));
         }
-        let is_grouped = self.options.rows == Some(Rows::Groups);
+        let is_grouped = self.options.rows == Some(RowKind::Groups);
         let (mut scene, mut remarks) = (None, Vec::new());
         if !is_grouped {
             scene = self.lives_page(&first).filter(fits);
         }
-        if scene.is_none() && !by_topics && matches!(self.options.rows, None | Some(Rows::Groups)) {
-            let groups = Lives::of(
+        if scene.is_none()
+            && !by_topics
+            && matches!(self.options.rows, None | Some(RowKind::Groups))
+        {
+            let groups = LivesFigure::of(
                 self.source,
                 super::groups::tracks(self.source, &first.tracks),
             );
@@ -84,7 +87,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// The page of some lives, whatever its height.
-    fn lives_page(&self, lives: &Lives<'_>) -> Option<Scene> {
+    fn lives_page(&self, lives: &LivesFigure<'_>) -> Option<Scene> {
         let width = self.options.width_mm;
         let mut canvas = self.canvas();
         let place = lives_place(lives, &canvas, width)?;
@@ -112,7 +115,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// Why it does not fit, and which namespace would.
-    fn too_high(&self, lives: &Lives<'_>) -> Error {
+    fn too_high(&self, lives: &LivesFigure<'_>) -> Error {
         let canvas = self.canvas();
         let width = self.options.width_mm;
         if lives_place(lives, &canvas, width).is_none() {
@@ -172,7 +175,7 @@ fn top_space(name: &str) -> Option<&str> {
 }
 
 /// Why there is nothing to draw: filters leave nothing, or the bag tells of no node.
-pub(crate) fn nothing(source: &Source<'_>) -> Error {
+pub(crate) fn nothing(source: &FigureSource<'_>) -> Error {
     if source.shown_topics().next().is_some() && source.knows_no_node() {
         return Error::usage(
             "no node of this mission is known, so there is nobody to draw",
@@ -190,7 +193,7 @@ pub(crate) fn fits(scene: &Scene) -> bool {
 }
 
 /// The columns of a page of lives; `None` where too little is left for the time axis.
-fn lives_place(lives: &Lives<'_>, canvas: &Canvas<'_>, width: f64) -> Option<Place> {
+fn lives_place(lives: &LivesFigure<'_>, canvas: &PaperCanvas<'_>, width: f64) -> Option<RowPlace> {
     let names = lives.names_width(canvas, width.min(WIDE.0));
     let talk = if width >= WIDE.0 { WIDE.1 + 1.8 } else { 0.0 };
     let right = width - talk - 5.2;
@@ -200,7 +203,7 @@ fn lives_place(lives: &Lives<'_>, canvas: &Canvas<'_>, width: f64) -> Option<Pla
     } else {
         0.0
     };
-    (right - left >= SHORTEST_AXIS).then_some(Place {
+    (right - left >= SHORTEST_AXIS).then_some(RowPlace {
         top,
         left: 0.0,
         axis: Axis {
@@ -215,23 +218,23 @@ fn lives_place(lives: &Lives<'_>, canvas: &Canvas<'_>, width: f64) -> Option<Pla
 }
 
 /// The letters explained, in order of time.
-fn incident_items(lives: &Lives<'_>) -> Vec<Item> {
+fn incident_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     let start = lives.source.span().start;
     let item = |(k, incident): (usize, &super::incidents::Incident)| {
         let at = clock(incident.at.since(start));
         vec![
-            Run::Words(Type::Strong, ink::CHANGED, format!("{} ", sign(k))),
-            Run::Words(Type::Small, ink::TEXT, format!("{at} {}", incident.text)),
+            TextRun::Words(Type::Strong, ink::CHANGED, format!("{} ", sign(k))),
+            TextRun::Words(Type::Small, ink::TEXT, format!("{at} {}", incident.text)),
         ]
     };
     lives.incidents.iter().enumerate().map(item).collect()
 }
 
 /// What is folded where no column tells it, and what has no letter.
-fn lives_notes(lives: &Lives<'_>, is_told: bool) -> Vec<Item> {
+fn lives_notes(lives: &LivesFigure<'_>, is_told: bool) -> Vec<Unbroken> {
     let mut items = Vec::new();
     for row in lives.rows.iter().filter(|_| !is_told) {
-        if let Row::Folded(all, space) = row {
+        if let FigureRow::Folded(all, space) = row {
             let names: Vec<&str> = all
                 .iter()
                 .map(|at| last_part(&lives.tracks[*at].name))

@@ -1,8 +1,8 @@
 //! One step as a panel: its boxes by what became of them, its arrows, its words.
 
-use super::canvas::{Canvas, HAIRLINE, Type, ink};
-use super::notes::{Item, flow_at, sentence};
-use super::place::Placed;
+use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
+use super::notes::{Unbroken, flow_at, sentence};
+use super::place::PlacedPanel;
 use super::talks::Talk;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Stroke;
@@ -21,14 +21,14 @@ pub(crate) enum Fate {
 }
 
 /// One box of a panel.
-pub(crate) struct Look {
+pub(crate) struct PanelBox {
     pub(crate) fate: Fate,
     /// The namespace of its names, `/robot2`; empty for that of the whole panel.
     pub(crate) space: String,
     pub(crate) lines: Vec<String>,
 }
 
-impl Look {
+impl PanelBox {
     /// Whether the namespace has a line of its own: where it is long, or stands for several names.
     fn has_head(&self) -> bool {
         match self.space.as_str() {
@@ -39,7 +39,7 @@ impl Look {
     }
 
     /// The room it takes.
-    pub(crate) fn size(&self, canvas: &Canvas<'_>) -> Size {
+    pub(crate) fn size(&self, canvas: &PaperCanvas<'_>) -> Size {
         let names = self
             .lines
             .iter()
@@ -61,10 +61,10 @@ pub(crate) struct Panel {
     pub(crate) heading: (String, String),
     /// The namespace of the names that have none before them; empty if there is none.
     pub(crate) home: String,
-    pub(crate) looks: Vec<Look>,
+    pub(crate) looks: Vec<PanelBox>,
     pub(crate) talks: Vec<(Talk, Fate)>,
     pub(crate) labels: Vec<Vec<Vec<String>>>,
-    pub(crate) placed: Option<Placed>,
+    pub(crate) placed: Option<PlacedPanel>,
     pub(crate) notes: Vec<(Color, String)>,
     pub(crate) height: f64,
     /// How much of it the notes take.
@@ -74,7 +74,7 @@ pub(crate) struct Panel {
 }
 
 /// Notes as running text.
-pub(crate) fn items(notes: &[(Color, String)]) -> Vec<Item> {
+pub(crate) fn items(notes: &[(Color, String)]) -> Vec<Unbroken> {
     let item = |(color, text): &(Color, String)| sentence(*color, text.as_str());
     notes.iter().map(item).collect()
 }
@@ -88,7 +88,7 @@ pub(crate) fn type_of(fate: Fate) -> Type {
 }
 
 /// Draws a panel into its frame.
-pub(crate) fn paint(canvas: &mut Canvas<'_>, panel: &Panel, rect: Rect) {
+pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
     canvas.frame(rect, 0.4, ink::PAPER, &Stroke::solid(ink::FOLDED, HAIRLINE));
     let (x, width) = (rect.x + INSIDE, rect.w - 2.0 * INSIDE);
     let y = rect.y + INSIDE * 0.8 + canvas.cap(Type::Head) / 2.0 + 0.2;
@@ -127,7 +127,7 @@ pub(crate) fn paint(canvas: &mut Canvas<'_>, panel: &Panel, rect: Rect) {
     }
 }
 
-fn boxed(canvas: &mut Canvas<'_>, look: &Look, rect: Rect) {
+fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
     let (fill, color, dash, width) = match look.fate {
         Fate::Began => (ink::ADDED_FILL, ink::ADDED, Vec::new(), 0.38),
         Fate::Ended => (ink::PAPER, ink::REMOVED, vec![1.1, 0.7], 0.38),
@@ -159,7 +159,7 @@ fn boxed(canvas: &mut Canvas<'_>, look: &Look, rect: Rect) {
 }
 
 /// A disc with a plus or a minus at a corner.
-fn badge(canvas: &mut Canvas<'_>, at: Point, fate: Fate, color: Color) {
+fn badge(canvas: &mut PaperCanvas<'_>, at: Point, fate: Fate, color: Color) {
     canvas.disc(at, 0.75, color, &Stroke::default());
     let sign = Stroke::solid(ink::PAPER, 0.26);
     canvas.line(

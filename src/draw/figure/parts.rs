@@ -26,14 +26,14 @@ pub(crate) fn shelves(sizes: &[Size], width: f64) -> (Vec<Point>, Size) {
 }
 
 /// Some vertices with all that links them, or frames them together.
-pub(crate) struct Part {
+pub(crate) struct MapPart {
     pub(crate) vertices: Vec<usize>,
     pub(crate) links: Vec<usize>,
     pub(crate) clusters: Vec<usize>,
 }
 
 /// The parts of a plan, in the order of their first vertices.
-pub(crate) fn parts(plan: &Plan) -> Vec<Part> {
+pub(crate) fn parts(plan: &Plan) -> Vec<MapPart> {
     let mut of: Vec<usize> = (0..plan.vertices.len()).collect();
     let clusters = plan.clusters.len();
     loop {
@@ -60,7 +60,7 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Part> {
     let mut roots = of.clone();
     roots.sort_unstable();
     roots.dedup();
-    let part = |root: usize| Part {
+    let part = |root: usize| MapPart {
         vertices: (0..of.len()).filter(|at| of[*at] == root).collect(),
         links: (0..plan.links.len())
             .filter(|at| of[plan.links[*at].from] == root)
@@ -74,7 +74,7 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Part> {
     roots.into_iter().map(part).collect()
 }
 
-impl Part {
+impl MapPart {
     pub(crate) fn plan(&self, whole: &Plan) -> Plan {
         let new = |old: usize| self.vertices.binary_search(&old).unwrap_or(0);
         let mut plan = Plan::default();

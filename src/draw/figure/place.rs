@@ -1,12 +1,12 @@
 //! Boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed afterwards.
 
-use super::canvas::{Canvas, Type, ink};
+use super::canvas::{PaperCanvas, Type, ink};
 use super::labels::{self, Room, Spot};
-use super::parts::{PARTED, Part, parts, shelves};
+use super::parts::{MapPart, PARTED, parts, shelves};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Step, Stroke};
 use crate::draw::style::Color;
-use crate::layout::{Engine, Layout, Options, Orientation, Plan, Route, lay_out};
+use crate::layout::{Engine, Layout, LayoutOptions, Orientation, Plan, Route, lay_out};
 
 /// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings. The
 /// tightest comes first: where it is too wide, all are.
@@ -21,7 +21,7 @@ const ASPECT: f64 = 0.45;
 const PIECES: u32 = 8;
 /// A drawing in millimetres, its top left corner at (0, 0).
 #[derive(Clone, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedPanel {
     pub(crate) size: Size,
     pub(crate) boxes: Vec<Rect>,
     pub(crate) clusters: Vec<Rect>,
@@ -42,14 +42,14 @@ pub(crate) fn place(
     labels: &[Vec<Size>],
     width: f64,
     engine: &Searcher,
-) -> Option<Placed> {
+) -> Option<PlacedPanel> {
     let wanted = labels.iter().filter(|l| !l.is_empty()).count();
     let parts = parts(plan);
-    let tried: Vec<Vec<Placed>> = parts
+    let tried: Vec<Vec<PlacedPanel>> = parts
         .iter()
         .map(|part| candidates(&part.plan(plan), &part.labels(labels), width, engine))
         .collect();
-    let mut best: Option<Choice> = None;
+    let mut best: Option<Arrangement> = None;
     for chosen in choices(&tried, width)? {
         let sizes: Vec<Size> = chosen
             .iter()
@@ -60,19 +60,19 @@ pub(crate) fn place(
         let parts = || chosen.iter().zip(&tried).map(|(at, all)| &all[*at]);
         let lost: usize = parts().map(|p| p.left_out).sum();
         let excess = lost.saturating_sub(wanted / TENTH);
-        let faults: f64 = parts().map(Placed::faults).sum();
+        let faults: f64 = parts().map(PlacedPanel::faults).sum();
         let cost = size.h + faults + excess as f64 * EXCESS;
         if best.as_ref().is_none_or(|b| cost < b.cost) {
             let parts = chosen.into_iter().zip(corners).collect();
-            best = Some(Choice { cost, parts, size });
+            best = Some(Arrangement { cost, parts, size });
         }
     }
-    let Choice {
+    let Arrangement {
         parts: chosen,
         size,
         ..
     } = best?;
-    let mut whole = Placed::empty(plan, labels.len(), size);
+    let mut whole = PlacedPanel::empty(plan, labels.len(), size);
     for ((part, all), (at, corner)) in parts.iter().zip(tried).zip(chosen) {
         if let Some(placed) = all.into_iter().nth(at) {
             whole.take(part, placed.moved(corner.x, corner.y));
@@ -82,15 +82,15 @@ pub(crate) fn place(
 }
 
 /// A drawing for every part, by place among its candidates, and where it stands.
-struct Choice {
+struct Arrangement {
     cost: f64,
     parts: Vec<(usize, Point)>,
     size: Size,
 }
 
 /// Ways to take one candidate of every part: for each of the largest part the others beside it, where they fit.
-fn choices(tried: &[Vec<Placed>], width: f64) -> Option<Vec<Vec<usize>>> {
-    let area = |all: &Vec<Placed>| all.iter().map(|p| p.size.w * p.size.h).fold(0.0, f64::max);
+fn choices(tried: &[Vec<PlacedPanel>], width: f64) -> Option<Vec<Vec<usize>>> {
+    let area = |all: &Vec<PlacedPanel>| all.iter().map(|p| p.size.w * p.size.h).fold(0.0, f64::max);
     let order = |a: &usize, b: &usize| area(&tried[*a]).total_cmp(&area(&tried[*b])).then(b.cmp(a));
     let Some(largest) = (0..tried.len()).max_by(order) else {
         return Some(vec![Vec::new()]);
@@ -120,15 +120,20 @@ const TENTH: usize = 10;
 const EXCESS: f64 = 3.0;
 
 /// The cheapest drawing of a part that is at most this wide, else the narrowest.
-fn choice(all: &[Placed], most: f64) -> Option<usize> {
-    let cost = |p: &Placed| p.size.h + p.faults();
+fn choice(all: &[PlacedPanel], most: f64) -> Option<usize> {
+    let cost = |p: &PlacedPanel| p.size.h + p.faults();
     let fitting = (0..all.len()).filter(|at| all[*at].size.w <= most);
     let best = fitting.min_by(|a, b| cost(&all[*a]).total_cmp(&cost(&all[*b])));
     best.or_else(|| (0..all.len()).min_by(|a, b| all[*a].size.w.total_cmp(&all[*b].size.w)))
 }
 
 /// Every drawing of a part that fits. The ways are searched side by side, for searching is most of a figure's time.
-fn candidates(plan: &Plan, labels: &[Vec<Size>], width: f64, engine: &Searcher) -> Vec<Placed> {
+fn candidates(
+    plan: &Plan,
+    labels: &[Vec<Size>],
+    width: f64,
+    engine: &Searcher,
+) -> Vec<PlacedPanel> {
     if plan.links.is_empty() {
         let way = (Orientation::LeftRight, false);
         return tightened(plan, labels, width, engine, way);
@@ -157,10 +162,10 @@ fn tightened(
     width: f64,
     engine: &Searcher,
     (orientation, is_labelled): (Orientation, bool),
-) -> Vec<Placed> {
+) -> Vec<PlacedPanel> {
     let mut all = Vec::new();
     for tightness in TIGHTNESS {
-        let options = Options {
+        let options = LayoutOptions {
             page: Size::new(width * tightness, width * ASPECT * tightness),
             orientation: Some(orientation),
         };
@@ -178,7 +183,7 @@ fn tightened(
         if wide > width + 0.001 {
             continue;
         }
-        all.push(Placed::new(plan, &layout, labels, tightness, width));
+        all.push(PlacedPanel::new(plan, &layout, labels, tightness, width));
         if plan.links.is_empty() {
             // Nothing else would come of more room.
             break;
@@ -199,7 +204,7 @@ fn scaled(plan: &Plan, by: f64) -> Plan {
     plan
 }
 
-impl Placed {
+impl PlacedPanel {
     /// Room for a whole plan, in which nothing stands yet.
     fn empty(plan: &Plan, labels: usize, size: Size) -> Self {
         Self {
@@ -215,7 +220,7 @@ impl Placed {
     }
 
     /// Takes in a part.
-    fn take(&mut self, part: &Part, placed: Self) {
+    fn take(&mut self, part: &MapPart, placed: Self) {
         for (at, rect) in part.vertices.iter().zip(placed.boxes) {
             self.boxes[*at] = rect;
         }
@@ -337,7 +342,7 @@ impl Placed {
     /// Draws one arrow.
     pub(crate) fn arrow(
         &self,
-        canvas: &mut Canvas<'_>,
+        canvas: &mut PaperCanvas<'_>,
         at: usize,
         color: Color,
         width: f64,
@@ -362,7 +367,12 @@ impl Placed {
     }
 
     /// Draws the label of one arrow: the lines of that alternative that found room, centred.
-    pub(crate) fn label(&self, canvas: &mut Canvas<'_>, at: usize, alternatives: &[Vec<String>]) {
+    pub(crate) fn label(
+        &self,
+        canvas: &mut PaperCanvas<'_>,
+        at: usize,
+        alternatives: &[Vec<String>],
+    ) {
         let Some((centre, k)) = self.labels.get(at).copied().flatten() else {
             return;
         };
@@ -377,7 +387,7 @@ impl Placed {
 }
 
 /// The room that each alternative of a label takes.
-pub(crate) fn rooms(canvas: &Canvas<'_>, alternatives: &[Vec<String>]) -> Vec<Size> {
+pub(crate) fn rooms(canvas: &PaperCanvas<'_>, alternatives: &[Vec<String>]) -> Vec<Size> {
     let room = |lines: &Vec<String>| {
         let widths = lines.iter().map(|l| canvas.width(l, Type::Small));
         let widest = widths.fold(0.0, f64::max);

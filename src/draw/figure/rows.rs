@@ -17,7 +17,7 @@ const FEWEST_FOLDED: usize = 3;
 
 /// One row of the figure.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Row {
+pub(crate) enum FigureRow {
     /// The title of a namespace.
     Space(String),
     /// A track, by place, with its label; members of a titled namespace are indented.
@@ -26,7 +26,7 @@ pub(crate) enum Row {
     Folded(Vec<usize>, String),
 }
 
-impl Row {
+impl FigureRow {
     /// Whether it stands for this track.
     pub(crate) fn holds(&self, track: usize) -> bool {
         match self {
@@ -43,7 +43,7 @@ pub(crate) fn rows(
     whole: Span,
     incidents: &[Incident],
     handovers: &[Handover],
-) -> Vec<Row> {
+) -> Vec<FigureRow> {
     let marked: BTreeSet<usize> = incidents
         .iter()
         .map(|i| i.track)
@@ -74,12 +74,12 @@ fn of_space(
     marked: &BTreeSet<usize>,
     space: &str,
     own: Vec<usize>,
-) -> Vec<Row> {
+) -> Vec<FigureRow> {
     if let [only] = own[..] {
         let name = tracks[only].name.trim_start_matches('/');
-        return vec![Row::Track(only, name.to_owned(), false)];
+        return vec![FigureRow::Track(only, name.to_owned(), false)];
     }
-    let mut rows = vec![Row::Space(space.to_owned())];
+    let mut rows = vec![FigureRow::Space(space.to_owned())];
     let is_folded = |at: &usize| !marked.contains(at) && is_throughout(&tracks[*at], whole);
     let folded: Vec<usize> = own.iter().copied().filter(is_folded).collect();
     let folded = if folded.len() < FEWEST_FOLDED {
@@ -90,11 +90,11 @@ fn of_space(
     let open = own.into_iter().filter(|at| !folded.contains(at));
     let open = in_order(tracks, whole, open.collect());
     if !folded.is_empty() {
-        rows.push(Row::Folded(folded, space.to_owned()));
+        rows.push(FigureRow::Folded(folded, space.to_owned()));
     }
     rows.extend(open.into_iter().map(|at| {
         let label = last_part(&tracks[at].name).to_owned();
-        Row::Track(at, label, true)
+        FigureRow::Track(at, label, true)
     }));
     rows
 }

@@ -13,7 +13,7 @@ use crate::mission::phases::knows_publishers;
 use crate::view::NameFilter;
 
 /// The mission as figures see it: roles, without housekeeping, recorders and what filters leave out.
-pub(crate) struct Source<'a> {
+pub(crate) struct FigureSource<'a> {
     pub(crate) mission: &'a Mission,
     /// Roles with their nodes.
     pub(crate) roles: BTreeMap<Arc<str>, Vec<NodeId>>,
@@ -25,7 +25,7 @@ pub(crate) struct Source<'a> {
     pub(crate) is_named: bool,
 }
 
-impl<'a> Source<'a> {
+impl<'a> FigureSource<'a> {
     /// What passes both filters.
     pub(crate) fn new(
         mission: &'a Mission,

@@ -4,16 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::band::{clock, title};
-use super::canvas::{Canvas, PX_PER_MM, ink};
+use super::canvas::{PX_PER_MM, PaperCanvas, ink};
 use super::groups::groups;
 use super::incidents::configurations;
-use super::notes::{Item, flow, sentence};
-use super::page::{FITTING, Sheet, filter_that_fits, nothing};
-use super::panel::{Fate, INSIDE, Look, Panel, items, paint};
-use super::place::{Placed, place, rooms};
+use super::notes::{Unbroken, flow, sentence};
+use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
+use super::panel::{Fate, INSIDE, Panel, PanelBox, items, paint};
+use super::place::{PlacedPanel, place, rooms};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
-use super::{MOST_HEIGHT, Rows};
+use super::{MOST_HEIGHT, RowKind};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
@@ -35,7 +35,7 @@ const BETWEEN: f64 = 2.0;
 
 /// What panels are made from.
 struct Studio<'s> {
-    sheet: &'s Sheet<'s>,
+    sheet: &'s FigureSheet<'s>,
     tracks: Vec<Track>,
     talks: Talks<'s>,
     found: Vec<Configuration>,
@@ -44,7 +44,7 @@ struct Studio<'s> {
 }
 
 /// The figure.
-pub(crate) fn draw(sheet: &Sheet<'_>) -> Result<(Scene, Vec<String>)> {
+pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let tracks = of_nodes(sheet.source);
     if tracks.is_empty() {
         return Err(nothing(sheet.source));
@@ -142,7 +142,7 @@ impl Studio<'_> {
         let width = self.sheet.options.width_mm;
         let hint = match self.sheet.options.rows {
             _ if width < 181.0 => "`--width 181mm` has more room".to_owned(),
-            Some(Rows::Nodes) => "`--rows groups` makes it smaller".to_owned(),
+            Some(RowKind::Nodes) => "`--rows groups` makes it smaller".to_owned(),
             _ => filter_that_fits(&self.tracks, FITTING, "--ns-filter", "node"),
         };
         Error::usage(format!("a step is wider than {width} mm"), hint)
@@ -187,7 +187,7 @@ impl Studio<'_> {
         let fates: Vec<Fate> = boxes.iter().map(|(fate, _)| *fate).collect();
         let talks = self.talks(k, &vertex, &fates, &handed);
         let home = self.home(&boxes);
-        let looks: Vec<Look> = boxes
+        let looks: Vec<PanelBox> = boxes
             .iter()
             .enumerate()
             .map(|(at, (fate, members))| {
@@ -237,7 +237,7 @@ impl Studio<'_> {
     fn boxes(&self, kinds: &[(Fate, &BTreeSet<usize>)]) -> Vec<(Fate, Vec<usize>)> {
         let many: usize = kinds.iter().map(|(_, own)| own.len()).sum();
         let grouped = match self.sheet.options.rows {
-            Some(rows) => rows == Rows::Groups,
+            Some(rows) => rows == RowKind::Groups,
             None => many > ONE_BY_ONE,
         };
         let mut all = Vec::new();
@@ -370,7 +370,7 @@ impl Studio<'_> {
         members: &[usize],
         named: Option<usize>,
         home: Option<&str>,
-    ) -> Look {
+    ) -> PanelBox {
         let name = |at: usize| last_part(&self.tracks[at].name).to_owned();
         let lines = match (named, members) {
             (Some(first), members) if members.len() > 1 => {
@@ -387,7 +387,7 @@ impl Studio<'_> {
         };
         let space = members.first().map_or("/", |at| self.space(*at));
         let space = if Some(space) == home { "" } else { space };
-        Look {
+        PanelBox {
             fate,
             space: space.to_owned(),
             lines,
@@ -396,12 +396,12 @@ impl Studio<'_> {
 
     fn placed(
         &self,
-        canvas: &Canvas<'_>,
-        looks: &[Look],
+        canvas: &PaperCanvas<'_>,
+        looks: &[PanelBox],
         talks: &[(Talk, Fate)],
         labels: &[Vec<Vec<String>>],
-    ) -> Option<Placed> {
-        let vertex = |look: &Look| Vertex {
+    ) -> Option<PlacedPanel> {
+        let vertex = |look: &PanelBox| Vertex {
             size: look.size(canvas),
             outline: Outline::Box,
             cluster: None,
@@ -438,7 +438,7 @@ impl Studio<'_> {
         }
         let y = ends.into_iter().fold(0.0, f64::max);
         canvas.begin("notes");
-        let mut items: Vec<Item> = Vec::new();
+        let mut items: Vec<Unbroken> = Vec::new();
         if !sheet.options.is_bare {
             let text = "+ solid: began. − dashed: ended. Double: its topic changed hands. Thin: who is linked to them.";
             items.push(sentence(ink::QUIET, text));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::source::Source;
+use super::source::FigureSource;
 use super::tracks::Track;
 use crate::base::name::last_part;
 use crate::base::words;
@@ -28,7 +28,7 @@ impl Talk {
 
     /// What a label may say, the best first: the fastest `most` topics and how many more, one of them on two lines, on
     /// one line.
-    pub(crate) fn labels(&self, source: &Source<'_>, most: usize) -> Vec<Vec<String>> {
+    pub(crate) fn labels(&self, source: &FigureSource<'_>, most: usize) -> Vec<Vec<String>> {
         let mut names: Vec<String> = Vec::new();
         for (topic, _) in &self.topics {
             let name = words::shorten(last_part(source.topic(*topic)), LONGEST).into_owned();
@@ -54,7 +54,7 @@ impl Talk {
 const LONGEST: usize = 22;
 
 /// The presence of an edge, cell by cell.
-struct Heard {
+struct EdgePresence {
     track: usize,
     topic: TopicId,
     cells: Vec<bool>,
@@ -64,13 +64,13 @@ struct Heard {
 
 /// Every edge of the tracks, so that talks of any stretch can be told.
 pub(crate) struct Talks<'a> {
-    source: &'a Source<'a>,
-    sends: Vec<Heard>,
-    hears: Vec<Heard>,
+    source: &'a FigureSource<'a>,
+    sends: Vec<EdgePresence>,
+    hears: Vec<EdgePresence>,
 }
 
 impl<'a> Talks<'a> {
-    pub(crate) fn new(source: &'a Source<'a>, tracks: &[Track]) -> Self {
+    pub(crate) fn new(source: &'a FigureSource<'a>, tracks: &[Track]) -> Self {
         let elements = &source.mission.elements;
         let mut track_of = vec![None; elements.nodes.len()];
         for (at, track) in tracks.iter().enumerate() {
@@ -84,12 +84,12 @@ impl<'a> Talks<'a> {
         let heard = |edges: &[crate::graph::Edge],
                      states: &dyn Fn(usize) -> &'a [EdgeState],
                      sent: bool| {
-            let mut all: Vec<Option<Heard>> = (0..)
+            let mut all: Vec<Option<EdgePresence>> = (0..)
                 .zip(edges)
                 .map(|(id, edge)| {
                     let shown = source.shows(edge.topic) && !source.is_hub(edge.topic);
                     let track = track_of.get(edge.node as usize).copied().flatten();
-                    track.filter(|_| shown).map(|track| Heard {
+                    track.filter(|_| shown).map(|track| EdgePresence {
                         track,
                         topic: edge.topic,
                         cells: vec![false; cells.len()],
@@ -106,7 +106,7 @@ impl<'a> Talks<'a> {
                     }
                 }
             }
-            all.into_iter().flatten().collect::<Vec<Heard>>()
+            all.into_iter().flatten().collect::<Vec<EdgePresence>>()
         };
         Self {
             source,
@@ -175,7 +175,7 @@ impl<'a> Talks<'a> {
 }
 
 /// Messages per second of a publication while it sends; 0 where that is not known.
-fn rate(source: &Source<'_>, edge: u32) -> f64 {
+fn rate(source: &FigureSource<'_>, edge: u32) -> f64 {
     let count: f64 = source.sent(edge).iter().sum();
     let seconds = source
         .sending(edge)

@@ -1,12 +1,16 @@
 //! A figure for `LaTeX`: the line that includes it, and a caption that says what is drawn.
 
 use super::band::{clock, title};
-use super::source::Source;
-use super::{Figure, Kind, Options};
+use super::source::FigureSource;
+use super::{Figure, FigureKind, FigureOptions};
 use crate::base::words;
 
 /// The caption: what is drawn, the phases with their times, bag and length, the legend in words.
-pub(crate) fn caption(source: &Source<'_>, options: &Options, remarks: &[String]) -> String {
+pub(crate) fn caption(
+    source: &FigureSource<'_>,
+    options: &FigureOptions,
+    remarks: &[String],
+) -> String {
     let mut parts = vec![what(options.kind).to_owned()];
     if !source.phases.is_empty() {
         let start = source.span().start;
@@ -32,27 +36,27 @@ pub(crate) fn caption(source: &Source<'_>, options: &Options, remarks: &[String]
     parts.join(" ")
 }
 
-fn what(kind: Kind) -> &'static str {
+fn what(kind: FigureKind) -> &'static str {
     match kind {
-        Kind::Lives => "What was alive when, how busily it sent, and what changed.",
-        Kind::Map => "Who talks to whom, and in which phases.",
-        Kind::Steps => {
+        FigureKind::Lives => "What was alive when, how busily it sent, and what changed.",
+        FigureKind::Map => "Who talks to whom, and in which phases.",
+        FigureKind::Steps => {
             "The reconfigurations one after the other: what began, what ended, what changed hands."
         }
     }
 }
 
-fn legend(kind: Kind) -> &'static str {
+fn legend(kind: FigureKind) -> &'static str {
     match kind {
-        Kind::Lives => {
+        FigureKind::Lives => {
             "Bars: it sends, as high as its rate against the row's highest; thin lines: silent, dashed: alive by inference; \
              tick: starts; cross: ends; arrows from a dot: a topic changes hands; circled letters: returns and steps of rates."
         }
-        Kind::Map => {
+        FigureKind::Map => {
             "Numbers: the phases that a node lives in, none for all; arrows: topics, thicker for more messages per second, dashed \
              if inferred; dashed frames: nodes without a known partner."
         }
-        Kind::Steps => {
+        FigureKind::Steps => {
             "Solid with plus: began; dashed with minus: ended; double frame: a topic changed hands; thin: their neighbours."
         }
     }
@@ -90,7 +94,7 @@ fn escaped(text: &str) -> String {
 }
 
 /// The file that includes `picture`, a file name.
-pub(crate) fn file(figure: &Figure, picture: &str, options: &Options) -> String {
+pub(crate) fn file(figure: &Figure, picture: &str, options: &FigureOptions) -> String {
     let star = if options.width_mm > 120.0 { "*" } else { "" };
     format!(
         "% Written by bagreel. Needs \\usepackage{{graphicx}}.\n\\begin{{figure{star}}}[t]\n  \\centering\n  \

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::levels::levels;
-use super::source::{Source, merged};
+use super::source::{FigureSource, merged};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::graph::{EdgeId, NodeId, TopicId};
@@ -23,7 +23,7 @@ const ENOUGH: f64 = 6.0;
 
 /// One life of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Life {
+pub(crate) struct TrackLife {
     pub(crate) span: Span,
     /// Whether it began during the recording.
     pub(crate) begins: bool,
@@ -35,7 +35,7 @@ pub(crate) struct Life {
 
 /// A stretch of sending at one rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bar {
+pub(crate) struct SendingBar {
     pub(crate) span: Span,
     /// Its share of the row's highest rate, above 0 to 1.
     pub(crate) share: f64,
@@ -48,8 +48,8 @@ pub(crate) struct Track {
     pub(crate) name: Arc<str>,
     pub(crate) nodes: Vec<NodeId>,
     pub(crate) topic: Option<TopicId>,
-    pub(crate) lives: Vec<Life>,
-    pub(crate) bars: Vec<Bar>,
+    pub(crate) lives: Vec<TrackLife>,
+    pub(crate) bars: Vec<SendingBar>,
     /// Messages per second while it sends; `None` where it never does, or nobody knows.
     pub(crate) hz: Option<f64>,
 }
@@ -65,19 +65,19 @@ impl Track {
 }
 
 /// A row per role.
-pub(crate) fn of_nodes(source: &Source<'_>) -> Vec<Track> {
+pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Track> {
     let roles = source.roles.iter();
     let tracks = roles.map(|(role, nodes)| node(source, role, nodes));
     tracks.filter(|t| !t.lives.is_empty()).collect()
 }
 
 /// A row per topic that carried a message.
-pub(crate) fn of_topics(source: &Source<'_>) -> Vec<Track> {
+pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Track> {
     let tracks = source.shown_topics().map(|t| topic(source, t));
     tracks.filter(|t| !t.lives.is_empty()).collect()
 }
 
-fn node(source: &Source<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
+fn node(source: &FigureSource<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
     let edges = source.publications(nodes);
     let whole = source.span();
     let each: Vec<(EdgeId, Vec<Span>)> = edges.iter().map(|e| (*e, source.sending(*e))).collect();
@@ -111,7 +111,7 @@ fn node(source: &Source<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
     }
 }
 
-fn topic(source: &Source<'_>, id: TopicId) -> Track {
+fn topic(source: &FigureSource<'_>, id: TopicId) -> Track {
     let whole = source.span();
     let sends = merged(source.topic_sending(id), silence(whole));
     let sent = source.topic_sent(id);
@@ -142,9 +142,9 @@ fn rate(sent: &[f64], spans: &[Span]) -> Option<f64> {
     (count >= 2.0 && seconds > 1e-3).then(|| count / seconds)
 }
 
-fn capped(span: Span, whole: Span, is_inferred: bool) -> Life {
+fn capped(span: Span, whole: Span, is_inferred: bool) -> TrackLife {
     let present = PRESENT.0.max(whole.nanos() / PRESENT.1);
-    Life {
+    TrackLife {
         span,
         begins: span.start.since(whole.start) > present,
         ends: whole.end.since(span.end) > whole.nanos() / CUT,
@@ -153,7 +153,7 @@ fn capped(span: Span, whole: Span, is_inferred: bool) -> Life {
 }
 
 /// The lives of some nodes that are one role: runs of cells, their ends sharpened by exact signs.
-fn lives(source: &Source<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<Life> {
+fn lives(source: &FigureSource<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<TrackLife> {
     let cells = &source.mission.activity.cells;
     let known: Vec<Option<Degree>> = cells
         .iter()
@@ -195,8 +195,8 @@ fn lives(source: &Source<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<Life> {
 }
 
 /// The bars of a row: its stretches of sending, cut where the rate makes a step.
-fn bars(source: &Source<'_>, sends: &[Span], sent: &[f64]) -> Vec<Bar> {
-    let mut all: Vec<Bar> = Vec::new();
+fn bars(source: &FigureSource<'_>, sends: &[Span], sent: &[f64]) -> Vec<SendingBar> {
+    let mut all: Vec<SendingBar> = Vec::new();
     for stretch in sends {
         all.extend(steps(source, *stretch, sent));
     }
@@ -208,7 +208,7 @@ fn bars(source: &Source<'_>, sends: &[Span], sent: &[f64]) -> Vec<Bar> {
 }
 
 /// One stretch of sending as pieces of one rate each; their `share` is that rate.
-pub(crate) fn steps(source: &Source<'_>, stretch: Span, sent: &[f64]) -> Vec<Bar> {
+pub(crate) fn steps(source: &FigureSource<'_>, stretch: Span, sent: &[f64]) -> Vec<SendingBar> {
     let cells = &source.mission.activity.cells;
     let from = cells.partition_point(|c| c.span.end <= stretch.start);
     let to = cells.partition_point(|c| c.span.start < stretch.end);
@@ -237,7 +237,7 @@ pub(crate) fn steps(source: &Source<'_>, stretch: Span, sent: &[f64]) -> Vec<Bar
     for run in level.chunk_by(|a, b| a.total_cmp(b).is_eq()) {
         let end = at + run.len();
         let time: f64 = (at..end).map(seconds).sum();
-        bars.push(Bar {
+        bars.push(SendingBar {
             span: Span {
                 start: cells[at].span.start.max(stretch.start),
                 end: cells[end - 1].span.end.min(stretch.end),

@@ -3,7 +3,7 @@
 //! It runs inside `<img>`. Whoever asks for less motion gets a still of everything that ever was, because the rules for
 //! the classes hold only where motion is welcome; a reader that knows no animation shows the busiest window.
 
-use super::classes::{self, Classes, Detail, ElementLook, bars};
+use super::classes::{self, ClassDetail, Classes, ElementLook, bars};
 use super::xml::Xml;
 use crate::base::words::{self, visible};
 use crate::draw::picture::{Union, rate_label};
@@ -60,7 +60,7 @@ struct Play<'a> {
 
 impl Play<'_> {
     fn document(&self) -> String {
-        let detail = Detail {
+        let detail = ClassDetail {
             is_fine: false,
             has_names: false,
         };

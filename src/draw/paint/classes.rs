@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 use crate::base::geometry::Point;
 use crate::draw::paint::xml::{Xml, units};
-use crate::draw::picture::{Part, Union};
+use crate::draw::picture::{Union, UnionElement};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
 use crate::view::runs::Runs;
@@ -19,7 +19,7 @@ use crate::view::{Mark, View};
 
 /// How much is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Detail {
+pub(crate) struct ClassDetail {
     /// Coordinates to a tenth of a pixel, not whole pixels.
     pub is_fine: bool,
     /// Names, as attributes and for hovering.
@@ -32,7 +32,7 @@ pub(crate) struct Classes<'a> {
     view: &'a View,
     union: &'a Union,
     style: &'a Style,
-    detail: Detail,
+    detail: ClassDetail,
 }
 
 /// What stands inside the group of an element before and after its drawing.
@@ -47,7 +47,12 @@ pub(crate) trait ElementLook {
 
 impl<'a> Classes<'a> {
     /// The graph of a view whose union is `union`.
-    pub(crate) fn new(view: &'a View, union: &'a Union, style: &'a Style, detail: Detail) -> Self {
+    pub(crate) fn new(
+        view: &'a View,
+        union: &'a Union,
+        style: &'a Style,
+        detail: ClassDetail,
+    ) -> Self {
         Self {
             view,
             union,
@@ -112,7 +117,7 @@ impl<'a> Classes<'a> {
     fn element(
         &self,
         xml: &mut Xml,
-        part: &Part,
+        part: &UnionElement,
         what: &str,
         data: &[(&str, &str)],
         look: &dyn ElementLook,
@@ -269,7 +274,7 @@ fn decimal(units: i64, parts: i64) -> String {
 
 /// Path data as short as it gets: steps from point to point, lines where a curve is straight.
 fn path(steps: &[Step], parts: i64) -> String {
-    let mut pen = Pen {
+    let mut pen = ClassPen {
         out: String::new(),
         here: (0, 0),
         parts,
@@ -300,7 +305,7 @@ fn path(steps: &[Step], parts: i64) -> String {
     pen.out
 }
 
-struct Pen {
+struct ClassPen {
     out: String,
     /// In units.
     here: (i64, i64),
@@ -308,7 +313,7 @@ struct Pen {
     last: char,
 }
 
-impl Pen {
+impl ClassPen {
     fn grid(&self, p: Point) -> (i64, i64) {
         (units(p.x, self.parts), units(p.y, self.parts))
     }

@@ -28,24 +28,24 @@ const LINE: f64 = 15.0;
 
 /// A view with what every DOT file of it shares: unique ids and, for the profile `rqt`, one layout.
 #[derive(Clone, Debug)]
-pub(crate) struct Drawing<'a> {
+pub(crate) struct DotView<'a> {
     elements: &'a Elements,
     view: &'a View,
     style: Style,
-    ids: names::Ids,
+    ids: names::DotIds,
     /// Sizes, with full names as labels.
     plan: Plan,
     layout: Option<Layout>,
 }
 
-impl<'a> Drawing<'a> {
+impl<'a> DotView<'a> {
     /// Prepares a view; its colours for changes come from `style`.
     pub(crate) fn new(mission: &'a Mission, view: &'a View, style: Style) -> Self {
         Self {
             elements: &mission.elements,
             view,
             style,
-            ids: names::Ids::new(view),
+            ids: names::DotIds::new(view),
             plan: Plan::default(),
             layout: None,
         }
@@ -55,7 +55,7 @@ impl<'a> Drawing<'a> {
     #[must_use]
     pub(crate) fn laid_out(mut self, fonts: &Fonts) -> Self {
         self.plan = plan(self.view, fonts);
-        let options = layout::Options {
+        let options = layout::LayoutOptions {
             page: Size::new(1600.0, 900.0),
             orientation: Some(Orientation::LeftRight),
         };

@@ -25,7 +25,7 @@ const PT_PER_MM: f64 = 72.0 / 25.4;
 /// How far the controls of a quarter of a circle lie from its ends, in radii.
 const QUARTER: f64 = 0.552_284_75;
 /// A page and its entry in the outline.
-pub(crate) struct Sheet {
+pub(crate) struct PdfPage {
     /// What is on it.
     pub(crate) scene: Scene,
     /// What the outline calls it.
@@ -37,7 +37,7 @@ pub(crate) struct Sheet {
 /// # Errors
 /// What the writer of PDF refuses, in its own words.
 pub(crate) fn write(
-    sheets: impl Iterator<Item = Sheet>,
+    sheets: impl Iterator<Item = PdfPage>,
     fonts: &Fonts,
 ) -> std::result::Result<Vec<u8>, String> {
     // What every TeX takes as a figure.
@@ -50,7 +50,7 @@ pub(crate) fn write(
         .files()
         .map(|f| Font::new(f.to_vec().into(), 0))
         .collect();
-    let pen = Pen { fonts, faces };
+    let pen = PdfPen { fonts, faces };
     let mut outline = Outline::new();
     let mut title = None;
     for (place, sheet) in sheets.enumerate() {
@@ -91,13 +91,13 @@ fn point(p: Point) -> geom::Point {
 }
 
 /// What draws scenes on a page.
-struct Pen<'a> {
+struct PdfPen<'a> {
     fonts: &'a Fonts,
     /// In the order of [`Fonts::files`].
     faces: Vec<Option<Font>>,
 }
 
-impl Pen<'_> {
+impl PdfPen<'_> {
     fn page(&self, surface: &mut Surface<'_>, scene: &Scene) {
         let all = Rect::new(0.0, 0.0, scene.size.w, scene.size.h);
         shape(

@@ -37,7 +37,7 @@ const MOST_PIXELS: f64 = 64e6;
 const MOST_KEPT: usize = 1000;
 
 /// A group, read once: its tree and the tiles of the page that it may touch.
-struct Drawn {
+struct RasterGroup {
     tree: Tree,
     tiles: Tiles,
 }
@@ -52,16 +52,16 @@ pub struct Painter {
 /// Drawn groups by their SVG: those of late, and those that were of late before them.
 #[derive(Default)]
 struct Kept {
-    new: HashMap<String, Arc<Drawn>>,
-    old: HashMap<String, Arc<Drawn>>,
+    new: HashMap<String, Arc<RasterGroup>>,
+    old: HashMap<String, Arc<RasterGroup>>,
 }
 
 impl Kept {
-    fn get(&self, text: &str) -> Option<Arc<Drawn>> {
+    fn get(&self, text: &str) -> Option<Arc<RasterGroup>> {
         self.new.get(text).or_else(|| self.old.get(text)).cloned()
     }
 
-    fn insert(&mut self, text: String, drawn: Arc<Drawn>) {
+    fn insert(&mut self, text: String, drawn: Arc<RasterGroup>) {
         if self.new.len() >= MOST_KEPT {
             self.old = std::mem::take(&mut self.new);
         }
@@ -97,11 +97,11 @@ impl Painter {
     pub fn paint(&self, scene: &Scene, scale: f64) -> Result<Pixels> {
         let read = |group| self.read(scene, group);
         let drawn: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
-        Ok(Sheet::covered(scene, &drawn, scale)?.pixels)
+        Ok(PixelSheet::covered(scene, &drawn, scale)?.pixels)
     }
 
     /// The group's tree, from memory where it was drawn before.
-    fn read(&self, scene: &Scene, group: &Group) -> Result<Arc<Drawn>> {
+    fn read(&self, scene: &Scene, group: &Group) -> Result<Arc<RasterGroup>> {
         let text = svg::write_alone(scene, group);
         let known = self.kept.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(drawn) = known.get(&text) {
@@ -117,7 +117,7 @@ impl Painter {
             )
         })?;
         let tiles = Tiles::under(group, scene.size, &self.fonts);
-        let drawn = Arc::new(Drawn { tree, tiles });
+        let drawn = Arc::new(RasterGroup { tree, tiles });
         let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
         kept.insert(text, Arc::clone(&drawn));
         Ok(drawn)
@@ -125,13 +125,13 @@ impl Painter {
 }
 
 /// A sheet of pixels to draw on.
-struct Sheet {
+struct PixelSheet {
     /// All of them opaque, so that what tiny-skia calls premultiplied is plain.
     pixels: Pixels,
     scale: f64,
 }
 
-impl Sheet {
+impl PixelSheet {
     /// An empty sheet for the scene.
     fn of(scene: &Scene, scale: f64) -> Result<Self> {
         let (w, h) = (
@@ -162,7 +162,7 @@ impl Sheet {
     }
 
     /// A sheet with the whole scene on it.
-    fn covered(scene: &Scene, drawn: &[Arc<Drawn>], scale: f64) -> Result<Self> {
+    fn covered(scene: &Scene, drawn: &[Arc<RasterGroup>], scale: f64) -> Result<Self> {
         let mut sheet = Self::of(scene, scale)?;
         for group in drawn {
             sheet.draw(group);
@@ -171,7 +171,7 @@ impl Sheet {
     }
 
     /// Draws the whole scene over what was there.
-    fn cover(&mut self, scene: &Scene, drawn: &[Arc<Drawn>]) {
+    fn cover(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>]) {
         let background = opaque(scene.background);
         for pixel in self.pixels.rgba.chunks_exact_mut(4) {
             pixel.copy_from_slice(&background);
@@ -181,7 +181,7 @@ impl Sheet {
         }
     }
 
-    fn draw(&mut self, drawn: &Drawn) {
+    fn draw(&mut self, drawn: &RasterGroup) {
         #[expect(clippy::cast_possible_truncation, reason = "a scale near 1")]
         let scale = self.scale as f32;
         let transform = Transform::from_scale(scale, scale);

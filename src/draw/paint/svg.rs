@@ -103,7 +103,7 @@ fn write_shape(xml: &mut Xml, shape: &Shape) {
             xml.open("polygon").attribute("points", Corners(steps));
         }
         Form::Path(steps) => {
-            xml.open("path").attribute("d", Steps(steps));
+            xml.open("path").attribute("d", PathSteps(steps));
         }
     }
     xml.attribute("fill", shape.fill);
@@ -132,9 +132,9 @@ impl Display for Corners<'_> {
 }
 
 /// The steps of a path: `M0 1C0 1 2 3 2 3Z`.
-struct Steps<'a>(&'a [Step]);
+struct PathSteps<'a>(&'a [Step]);
 
-impl Display for Steps<'_> {
+impl Display for PathSteps<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for step in self.0 {
             let (letter, points) = match step {

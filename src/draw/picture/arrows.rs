@@ -3,7 +3,7 @@
 use super::boxes::{class, told};
 use super::measured::arrow_label;
 use super::options::{self, ArrowLook};
-use super::page::Fit;
+use super::page::GraphFit;
 use super::{badge, chips};
 use crate::base::geometry::{Point, Rect, Size, polyline};
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, polygon};
@@ -19,7 +19,7 @@ const PIECES: u32 = 10;
 pub(crate) struct Arrows<'a> {
     pub(crate) style: &'a Style,
     pub(crate) fonts: &'a Fonts,
-    pub(crate) fit: Fit,
+    pub(crate) fit: GraphFit,
 }
 
 /// Where the parts of one arrow stand on the page, the same in every frame.
@@ -45,7 +45,7 @@ impl ArrowPath {
         ends: [String; 2],
         route: &Route,
         room: Option<Size>,
-        fit: Fit,
+        fit: GraphFit,
     ) -> Self {
         let curves: Vec<[Point; 3]> = route
             .curves

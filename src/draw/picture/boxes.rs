@@ -2,7 +2,7 @@
 
 use super::measured::{CHIP_TEXT, LINE, Label, Space, Tells, pendant, roll, second_line};
 use super::options::{self, BoxLook};
-use super::page::Fit;
+use super::page::GraphFit;
 use super::{badge, chips};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::{Anchor, Fade, Form, Group, Piece, Shape, Stroke, Text};
@@ -18,7 +18,7 @@ const EMPTY: f64 = 0.35;
 pub(crate) struct Boxes<'a> {
     pub(crate) style: &'a Style,
     pub(crate) fonts: &'a Fonts,
-    pub(crate) fit: Fit,
+    pub(crate) fit: GraphFit,
 }
 
 /// What is the same of an item in every window.

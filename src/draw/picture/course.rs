@@ -4,12 +4,12 @@
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
 use crate::draw::figure::course::Course;
-use crate::draw::figure::tracks::Bar;
+use crate::draw::figure::tracks::SendingBar;
 use crate::draw::scene::{Form, Group, Shape, Step, Stroke, line};
 use crate::draw::style::{Color, Style};
 
 /// Where the course is drawn, and what a moment's place is.
-pub(crate) struct Strip<'a> {
+pub(crate) struct CourseStrip<'a> {
     pub(crate) style: &'a Style,
     pub(crate) plot: Rect,
     pub(crate) span: Span,
@@ -21,7 +21,7 @@ const BAR: (f64, f64) = (0.5, 0.4);
 /// The width of a start and of an end.
 const TICK: f64 = 1.6;
 
-impl Strip<'_> {
+impl CourseStrip<'_> {
     pub(crate) fn x(&self, at: Stamp) -> f64 {
         let part = at.since(self.span.start) as f64 / self.span.nanos().max(1) as f64;
         self.plot.x + self.plot.w * part.clamp(0.0, 1.0)
@@ -46,7 +46,7 @@ impl Strip<'_> {
         let mut steps = Vec::new();
         for (k, row) in course.rows.iter().enumerate() {
             let y = self.plot.y + (k as f64 + 0.5) * pitch;
-            let inside = |b: &&Bar| b.span.start < time.end && time.start < b.span.end;
+            let inside = |b: &&SendingBar| b.span.start < time.end && time.start < b.span.end;
             for bar in row.bars.iter().filter(inside) {
                 let left = self.x(bar.span.start.max(time.start));
                 let right = self.x(bar.span.end.min(time.end));

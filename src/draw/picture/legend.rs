@@ -3,7 +3,7 @@
 use super::arrows::arrow_head;
 use super::badge::badge;
 use super::options;
-use super::page::Page;
+use super::page::PageFrame;
 use crate::base::geometry::{Point, Rect};
 use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
@@ -15,7 +15,7 @@ use crate::view::{ArrowKind, ItemKind, Mark, Shown, View};
 
 /// A sign with its meaning.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Sign {
+pub(crate) enum LegendSign {
     Node,
     Topic,
     Group,
@@ -27,7 +27,7 @@ pub(crate) enum Sign {
 }
 
 /// The signs that occur in the view, with their words.
-pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
+pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> {
     let kind = |kind| view.items.iter().any(|i| i.kind == kind);
     let any = |is: &dyn Fn(&Shown) -> bool| {
         view.frames
@@ -43,62 +43,82 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(Sign, String)> {
     };
     let percent = words::percent(rate_change);
     let all = [
-        (kind(ItemKind::Node), Sign::Node, "node"),
-        (kind(ItemKind::Topic), Sign::Topic, "topic"),
-        (kind(ItemKind::Group), Sign::Group, "group"),
-        (kind(ItemKind::Namespace), Sign::Namespace, "namespace"),
-        (mark(&[Mark::Added]), Sign::Change(Mark::Added), "added"),
+        (kind(ItemKind::Node), LegendSign::Node, "node"),
+        (kind(ItemKind::Topic), LegendSign::Topic, "topic"),
+        (kind(ItemKind::Group), LegendSign::Group, "group"),
+        (
+            kind(ItemKind::Namespace),
+            LegendSign::Namespace,
+            "namespace",
+        ),
+        (
+            mark(&[Mark::Added]),
+            LegendSign::Change(Mark::Added),
+            "added",
+        ),
         (
             mark(&[Mark::Removed]),
-            Sign::Change(Mark::Removed),
+            LegendSign::Change(Mark::Removed),
             "removed",
         ),
         (
             mark(&[Mark::Faster, Mark::Slower]),
-            Sign::Change(Mark::Slower),
+            LegendSign::Change(Mark::Slower),
             &*format!("rate ± {percent} %"),
         ),
         (
             mark(&[Mark::HandedOver]),
-            Sign::Change(Mark::HandedOver),
+            LegendSign::Change(Mark::HandedOver),
             "handed over",
         ),
         (
             mark(&[Mark::Restarted]),
-            Sign::Change(Mark::Restarted),
+            LegendSign::Change(Mark::Restarted),
             "restarted",
         ),
         (
             mark(&[Mark::Paused]),
-            Sign::Change(Mark::Paused),
+            LegendSign::Change(Mark::Paused),
             "fell silent",
         ),
         (
             mark(&[Mark::Changed]),
-            Sign::Change(Mark::Changed),
+            LegendSign::Change(Mark::Changed),
             "changed",
         ),
         (
             mark(&[Mark::Inside]),
-            Sign::Change(Mark::Inside),
+            LegendSign::Change(Mark::Inside),
             "changed inside",
         ),
-        (state(State::Silent), Sign::Box(State::Silent), "silent"),
-        (state(State::Latched), Sign::Box(State::Latched), "latched"),
+        (
+            state(State::Silent),
+            LegendSign::Box(State::Silent),
+            "silent",
+        ),
+        (
+            state(State::Latched),
+            LegendSign::Box(State::Latched),
+            "latched",
+        ),
         (
             state(State::Declared),
-            Sign::Box(State::Declared),
+            LegendSign::Box(State::Declared),
             "declared only",
         ),
-        (degree(Degree::Stated), Sign::Line(Degree::Stated), "stated"),
+        (
+            degree(Degree::Stated),
+            LegendSign::Line(Degree::Stated),
+            "stated",
+        ),
         (
             degree(Degree::Inferred),
-            Sign::Line(Degree::Inferred),
+            LegendSign::Line(Degree::Inferred),
             "inferred",
         ),
         (
             any(&|s| s.hz.is_some()),
-            Sign::Width,
+            LegendSign::Width,
             "thicker = higher rate",
         ),
     ];
@@ -115,12 +135,12 @@ const AFTER: f64 = 14.0;
 
 /// The signs in rows that fit the page's width.
 pub(crate) fn rows(
-    signs: &[(Sign, String)],
+    signs: &[(LegendSign, String)],
     style: &Style,
     fonts: &Fonts,
     unit: f64,
     width: f64,
-) -> Vec<Vec<(Sign, String, f64)>> {
+) -> Vec<Vec<(LegendSign, String, f64)>> {
     let mut rows = vec![Vec::new()];
     let start = style.page.margin * unit;
     let mut x = start;
@@ -140,7 +160,11 @@ pub(crate) fn rows(
 }
 
 /// The legend, the same in every frame.
-pub(crate) fn legend(rows: &[Vec<(Sign, String, f64)>], style: &Style, page: &Page) -> Group {
+pub(crate) fn legend(
+    rows: &[Vec<(LegendSign, String, f64)>],
+    style: &Style,
+    page: &PageFrame,
+) -> Group {
     let mut group = Group::named("legend");
     let place = page.legend;
     let unit = page.unit;
@@ -176,16 +200,16 @@ pub(crate) fn legend(rows: &[Vec<(Sign, String, f64)>], style: &Style, page: &Pa
     group
 }
 
-fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
+fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: f64) {
     let arrow_of = |kind, degree, mark| {
         options::of_arrow(style, &kind, &shown(State::Active, degree, mark))
             .stroke
             .scaled(unit)
     };
     match sign {
-        Sign::Node => card(group, style, place, true, State::Active, unit),
-        Sign::Topic => card(group, style, place, false, State::Active, unit),
-        Sign::Group => {
+        LegendSign::Node => card(group, style, place, true, State::Active, unit),
+        LegendSign::Topic => card(group, style, place, false, State::Active, unit),
+        LegendSign::Group => {
             card(group, style, place, false, State::Active, unit);
             card(
                 group,
@@ -196,7 +220,7 @@ fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
                 unit,
             );
         }
-        Sign::Namespace => {
+        LegendSign::Namespace => {
             let stroke = Stroke::solid(style.node.stroke, style.node.width * unit);
             for place in [place, front(place, style, unit)] {
                 let form = Form::Rect(place, 4.0 * unit);
@@ -207,12 +231,12 @@ fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
                 });
             }
         }
-        Sign::Change(mark) => {
+        LegendSign::Change(mark) => {
             let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, Some(*mark));
             group.shape(Shape::line(across(place), stroke));
             badge(group, style, *mark, place.centre(), unit * 0.9);
         }
-        Sign::Box(state) => {
+        LegendSign::Box(state) => {
             card(group, style, place, false, *state, unit);
             if *state == State::Latched {
                 let inset = style.topic.width * unit / 2.0;
@@ -226,11 +250,11 @@ fn draw(group: &mut Group, sign: &Sign, style: &Style, place: Rect, unit: f64) {
                 group.shape(Shape::filled(Form::Rect(bar, 0.0), style.latched.stroke));
             }
         }
-        Sign::Line(degree) => {
+        LegendSign::Line(degree) => {
             let stroke = arrow_of(ArrowKind::Subscribe, *degree, None);
             arrow(group, place, stroke, style.edge.arrow * unit);
         }
-        Sign::Width => widths(group, style, place, unit),
+        LegendSign::Width => widths(group, style, place, unit),
     }
 }
 

@@ -11,7 +11,7 @@ const LARGEST: f64 = 1.35;
 
 /// Where everything on the page stands, at the same place in every frame.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Page {
+pub(crate) struct PageFrame {
     pub(crate) size: Size,
     /// The scale of furniture: 1 on a page of 1280 × 720.
     pub(crate) unit: f64,
@@ -25,14 +25,14 @@ pub(crate) struct Page {
 
 /// How the graph is brought into its part of the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Fit {
+pub(crate) struct GraphFit {
     pub(crate) scale: f64,
     /// The scale of strokes and badges: they shrink less than what they surround, to stay visible.
     pub(crate) pen: f64,
     pub(crate) origin: Point,
 }
 
-impl Page {
+impl PageFrame {
     /// The page that is wished for, with `rows` rows of legend.
     pub(crate) fn new(style: &Style, options: &PageOptions, rows: usize) -> Self {
         let size = options.size;
@@ -73,13 +73,13 @@ impl Page {
     }
 
     /// The largest scale at which a layout of this size fits, and where its corner goes so that it stands in the middle.
-    pub(crate) fn fit(&self, layout: Size) -> Fit {
+    pub(crate) fn fit(&self, layout: Size) -> GraphFit {
         let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));
         let scale = (self.graph.w / w)
             .min(self.graph.h / h)
             .min(LARGEST * self.unit.max(0.8));
         let middle = self.graph.centre();
-        Fit {
+        GraphFit {
             scale,
             pen: libm::sqrt(scale),
             origin: Point::new(middle.x - w * scale / 2.0, middle.y - h * scale / 2.0),
@@ -103,7 +103,7 @@ pub(crate) fn unit(options: &PageOptions) -> f64 {
     }
 }
 
-impl Fit {
+impl GraphFit {
     pub(crate) fn point(&self, p: Point) -> Point {
         Point::new(
             self.origin.x + p.x * self.scale,

@@ -1,7 +1,7 @@
 //! The strip at the bottom: who lived when (else how busy each window is), where changes are, and where we are.
 
-use super::course::Strip;
-use super::page::Page;
+use super::course::CourseStrip;
+use super::page::PageFrame;
 use super::title::whole;
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
@@ -14,7 +14,7 @@ use crate::mission::ledger::Kind;
 use crate::view::{Frame, View};
 
 /// A bar stands for one window, or for several where there are more windows than room.
-struct Bar {
+struct TimelineBar {
     /// From the start of its first window to the start of the next bar's, or to the end.
     span: Span,
     /// Messages per second.
@@ -24,9 +24,9 @@ struct Bar {
 /// The strip's fixed places.
 pub(crate) struct Timeline<'a> {
     style: &'a Style,
-    page: Page,
+    page: PageFrame,
     fonts: &'a Fonts,
-    bars: Vec<Bar>,
+    bars: Vec<TimelineBar>,
     /// Windows per bar, 1...
     per_bar: usize,
     /// Where bars stand.
@@ -42,7 +42,7 @@ pub(crate) struct Timeline<'a> {
 const NARROWEST: f64 = 2.5;
 
 impl<'a> Timeline<'a> {
-    pub(crate) fn new(style: &'a Style, fonts: &'a Fonts, page: &Page, view: &View) -> Self {
+    pub(crate) fn new(style: &'a Style, fonts: &'a Fonts, page: &PageFrame, view: &View) -> Self {
         let unit = page.unit;
         let strip = page.timeline;
         let margin = style.page.margin * unit;
@@ -63,8 +63,8 @@ impl<'a> Timeline<'a> {
         let starts = view.frames.iter().step_by(per_bar).map(|f| f.span.start);
         let ends = starts.skip(1).chain([span.end]);
         let bars = view.frames.chunks(per_bar).zip(ends);
-        let bars: Vec<Bar> = bars
-            .filter_map(|(frames, end)| Bar::of(frames, end))
+        let bars: Vec<TimelineBar> = bars
+            .filter_map(|(frames, end)| TimelineBar::of(frames, end))
             .collect();
         let busiest = bars.iter().map(|b| b.rate).fold(0.0, f64::max);
         Self {
@@ -86,8 +86,8 @@ impl<'a> Timeline<'a> {
         self
     }
 
-    fn strip(&self) -> Strip<'_> {
-        Strip {
+    fn strip(&self) -> CourseStrip<'_> {
+        CourseStrip {
             style: self.style,
             plot: self.plot,
             span: self.span,
@@ -271,7 +271,7 @@ impl<'a> Timeline<'a> {
 /// The height of a lane of marks.
 const LANE: f64 = 8.5;
 
-impl Bar {
+impl TimelineBar {
     /// The bar of some windows, up to where the next begins. Messages per second of the windows' own time, so that
     /// neither a short nor an overlapping window lies.
     fn of(frames: &[Frame], end: Stamp) -> Option<Self> {

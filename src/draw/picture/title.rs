@@ -1,6 +1,6 @@
 //! The bar on top and the line below it: which bag, which window, what time, how many changes, and which in words.
 
-use super::page::Page;
+use super::page::PageFrame;
 use super::{PageOptions, chips};
 use crate::base::geometry::{Point, Rect};
 use crate::base::words;
@@ -13,7 +13,7 @@ use crate::view::{Frame, View};
 pub(crate) struct Title<'a> {
     style: &'a Style,
     fonts: &'a Fonts,
-    page: Page,
+    page: PageFrame,
     name: String,
     /// The left edges and widths of the chips for what came, went and changed.
     chips: [(f64, f64); 3],
@@ -27,7 +27,7 @@ impl<'a> Title<'a> {
     pub(crate) fn new(
         style: &'a Style,
         fonts: &'a Fonts,
-        page: &Page,
+        page: &PageFrame,
         view: &View,
         options: &PageOptions,
     ) -> Self {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::arrows::{Arrows, is_badged};
 use super::boxes::{Boxes, corner};
 use super::measured::{self, Tells};
-use super::page::Fit;
+use super::page::GraphFit;
 use super::{Picture, badge, cards, chips, encoded, tracks};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Group;
@@ -24,14 +24,14 @@ pub struct Union {
     /// The arrows in the order in which they are painted: places in the view.
     pub order: Vec<usize>,
     /// A part per arrow of the view. Its last text, if there is one, is its rate.
-    pub arrows: Vec<Part>,
+    pub arrows: Vec<UnionElement>,
     /// A part per item of the view.
-    pub items: Vec<Part>,
+    pub items: Vec<UnionElement>,
 }
 
 /// One element of the union.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct UnionElement {
     /// Its shapes and texts.
     pub group: Group,
     /// Whether its last text is another in other windows: a rate or a lifecycle state.
@@ -72,7 +72,7 @@ impl Picture<'_> {
     /// Everything that is ever in the picture.
     pub fn union(&self) -> Union {
         let (measured, layout) = (&self.measured, &self.layout);
-        let fit = Fit {
+        let fit = GraphFit {
             scale: 1.0,
             pen: 1.0,
             origin: Point::default(),
@@ -94,7 +94,7 @@ impl Picture<'_> {
         }
     }
 
-    fn union_items(&self, boxes: &Boxes<'_>, fit: Fit) -> Vec<Part> {
+    fn union_items(&self, boxes: &Boxes<'_>, fit: GraphFit) -> Vec<UnionElement> {
         let view = self.measured.view;
         let mut marks = vec![BTreeSet::new(); view.items.len()];
         for shown in view.frames.iter().flat_map(|f| &f.items) {
@@ -117,7 +117,7 @@ impl Picture<'_> {
                 if tells_changes {
                     group.text(boxes.pendant_text(card.place, "-"));
                 }
-                Part {
+                UnionElement {
                     group,
                     is_live: is_live || tells_changes,
                     tells_changes,
@@ -129,7 +129,7 @@ impl Picture<'_> {
             .collect()
     }
 
-    fn union_arrows(&self, fit: Fit) -> Vec<Part> {
+    fn union_arrows(&self, fit: GraphFit) -> Vec<UnionElement> {
         let (view, plan) = (self.measured.view, &self.measured.graph.plan);
         let arrows = Arrows {
             style: self.measured.style,
@@ -155,7 +155,7 @@ impl Picture<'_> {
         parts
             .map(|(((arrow, track), link), marks)| {
                 let shown = plain(link.label.map(|_| 1.0));
-                Part {
+                UnionElement {
                     group: arrows.arrow(arrow, &track, &shown, [None; 2]),
                     is_live: link.label.is_some(),
                     tells_changes: false,

@@ -12,9 +12,9 @@ use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use super::declaration::{Class, FileCode};
-use super::texts::Texts;
+use super::texts::TextValues;
 use crate::evidence::syntax::{Language, Node, Parsed, line, walk};
-use names::Names;
+use names::Aliases;
 
 /// Words of which a file that declares anything has at least one; others are not parsed. Classes count, for a node may
 /// derive from them.
@@ -37,11 +37,11 @@ pub(super) fn read(text: &str) -> FileCode {
     let Some(parsed) = Parsed::new(Language::Cpp, text.to_owned()) else {
         return FileCode::default();
     };
-    let mut reader = Reader {
+    let mut reader = CppReader {
         parsed: &parsed,
         work: Cell::new(0),
-        names: Names::default(),
-        texts: Texts::default(),
+        names: Aliases::default(),
+        texts: TextValues::default(),
         handles: BTreeMap::new(),
         members: BTreeMap::new(),
         callbacks: BTreeMap::new(),
@@ -49,20 +49,20 @@ pub(super) fn read(text: &str) -> FileCode {
         places: BTreeMap::new(),
         open: Vec::new(),
     };
-    reader.visit_all(Reader::look);
-    reader.visit_all(Reader::take);
+    reader.visit_all(CppReader::look);
+    reader.visit_all(CppReader::take);
     FileCode {
         classes: reader.classes,
         imports: BTreeMap::new(),
     }
 }
 
-struct Reader<'a> {
+struct CppReader<'a> {
     parsed: &'a Parsed,
     /// How many expressions were looked at for their texts.
     work: Cell<usize>,
-    names: Names,
-    texts: Texts<'a>,
+    names: Aliases,
+    texts: TextValues<'a>,
     /// Node handles with the namespace that they stand for.
     handles: BTreeMap<String, String>,
     /// Variables with their types.
@@ -76,7 +76,7 @@ struct Reader<'a> {
     open: Vec<(usize, usize)>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> CppReader<'a> {
     /// Visits every element, with `open` telling the classes around it.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
         self.open.clear();

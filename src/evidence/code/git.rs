@@ -15,7 +15,7 @@ use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 
 /// What git knows of a folder.
-pub(super) enum Found {
+pub(super) enum Checkout {
     /// The files of a commit, and which one it is, in words.
     Commit { files: Files, words: String },
     /// The files as they lie are to be read, with what is to be said about that.
@@ -29,11 +29,11 @@ const DAY: i64 = 86_400;
 ///
 /// # Errors
 /// If a commit that was asked for is not there.
-pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Found> {
+pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Checkout> {
     if *version == Version::Worktree {
-        return Ok(Found::Lying { note: None });
+        return Ok(Checkout::Lying { note: None });
     }
-    let lying = |note: Option<String>| Ok(Found::Lying { note });
+    let lying = |note: Option<String>| Ok(Checkout::Lying { note });
     let prefix = match ask(folder, &["rev-parse", "--show-prefix"]) {
         Ok(prefix) => prefix,
         Err(reason) => {
@@ -65,7 +65,7 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Foun
         ));
     }
     match of_commit(folder, &commit, &prefix) {
-        Some(files) if !files.list.is_empty() => Ok(Found::Commit {
+        Some(files) if !files.list.is_empty() => Ok(Checkout::Commit {
             files,
             words: words(folder, &commit, version),
         }),

@@ -9,13 +9,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Code;
 use super::declaration::{Role, type_key};
 use super::only;
-use super::workspace::{Instance, Placed};
+use super::workspace::{FileDeclaration, Instance};
 use crate::base::name::{is_player, is_recorder, last_part, namespace};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words::{count, some_of};
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 /// An edge that the code declares for a node of the bag.
 #[derive(Clone, Debug)]
@@ -23,17 +23,17 @@ pub(super) struct Match<'a> {
     pub(super) role: Role,
     pub(super) topic: Name,
     pub(super) instance: &'a Instance,
-    pub(super) placed: &'a Placed,
+    pub(super) placed: &'a FileDeclaration,
 }
 
 /// The topics of the bag.
-pub(super) struct Recorded {
+pub(super) struct RecordedTopics {
     /// By name: the topic and its types.
     topics: BTreeMap<String, (Name, BTreeSet<String>)>,
     /// Topics whose messages name their publishers.
     pub(super) told: BTreeSet<Name>,
     /// What is known already, by more than a declaration.
-    proved: BTreeSet<Key>,
+    proved: BTreeSet<ElementKey>,
 }
 
 /// What came of reading the code.
@@ -47,7 +47,7 @@ pub(crate) struct Outcome {
 
 /// Adds what the code says of the nodes that the bag names, and the only places that can be meant if asked for.
 pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>) -> Outcome {
-    let recorded = Recorded::of(known);
+    let recorded = RecordedTopics::of(known);
     let named = named(known);
     let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
     for instance in &code.instances {
@@ -81,7 +81,7 @@ pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>) -> Outcome {
     }
     let known_nodes = named.keys().cloned().collect();
     let logged = named.values().any(|(_, words)| words.contains("rosout"));
-    let bag = only::Bag {
+    let bag = only::BagTopics {
         recorded: &recorded,
         explained: &explained,
         named: &known_nodes,
@@ -132,7 +132,7 @@ fn summary(
         text.extend(["; ", &count(inferred, "inferred edge")]);
     }
     if !undrawn.is_empty() {
-        let mut reasons: BTreeMap<only::Reason, usize> = BTreeMap::new();
+        let mut reasons: BTreeMap<only::NotDrawn, usize> = BTreeMap::new();
         for (reason, _) in undrawn {
             *reasons.entry(*reason).or_default() += 1;
         }
@@ -154,8 +154,8 @@ fn summary(
 
 /// What is worth knowing about the code of a node that ran: topics that it names and the bag lacks, or has with another
 /// type.
-fn remarks_on(instance: &Instance, node: &str, recorded: &Recorded) -> Vec<String> {
-    let remark = |placed: &Placed| {
+fn remarks_on(instance: &Instance, node: &str, recorded: &RecordedTopics) -> Vec<String> {
+    let remark = |placed: &FileDeclaration| {
         let declaration = &placed.declaration;
         let name = remapped(
             &resolved(node, declaration.topic.as_ref()?),
@@ -190,7 +190,7 @@ fn remarks_on(instance: &Instance, node: &str, recorded: &Recorded) -> Vec<Strin
     instance.declared.iter().filter_map(remark).collect()
 }
 
-impl Recorded {
+impl RecordedTopics {
     fn of(known: &Conclusions<'_>) -> Self {
         let mut all = Self {
             topics: BTreeMap::new(),
@@ -228,8 +228,10 @@ fn named(known: &Conclusions<'_>) -> BTreeMap<String, (Name, BTreeSet<&'static s
     let mut named: BTreeMap<String, (Name, BTreeSet<&str>)> = BTreeMap::new();
     for proof in known.proofs.iter().filter(|p| p.degree != Degree::Declared) {
         let node = match proof.what {
-            Key::Node(node) | Key::Publish(node, _) | Key::Subscribe(_, node) => node,
-            Key::Topic(_) => continue,
+            ElementKey::Node(node)
+            | ElementKey::Publish(node, _)
+            | ElementKey::Subscribe(_, node) => node,
+            ElementKey::Topic(_) => continue,
         };
         let text = known.text(node);
         if !is_recorder(&text) && !is_player(&text) {
@@ -254,7 +256,7 @@ fn without_numbers(name: &str) -> &str {
 
 /// What the most fitting of several programs that may be this node declares: the one with most of its topics recorded.
 /// Where several fit as well, what all of them declare.
-fn best<'a>(candidates: &[&'a Instance], node: &str, recorded: &Recorded) -> Vec<Match<'a>> {
+fn best<'a>(candidates: &[&'a Instance], node: &str, recorded: &RecordedTopics) -> Vec<Match<'a>> {
     let is_real = |i: &&&Instance| !i.is_test;
     let real: Vec<&Instance> = candidates.iter().filter(is_real).copied().collect();
     let candidates = if real.is_empty() { candidates } else { &real };
@@ -278,7 +280,7 @@ fn best<'a>(candidates: &[&'a Instance], node: &str, recorded: &Recorded) -> Vec
 pub(super) fn matches<'a>(
     instance: &'a Instance,
     node: &str,
-    recorded: &Recorded,
+    recorded: &RecordedTopics,
 ) -> Vec<Match<'a>> {
     let mut found: Vec<Match<'a>> = Vec::new();
     for placed in instance.declared.iter() {
@@ -324,13 +326,13 @@ fn remapped(topic: &str, node: &str, remaps: &[(String, String)]) -> String {
 fn draw(
     code: &Code,
     known: &mut Conclusions<'_>,
-    recorded: &Recorded,
+    recorded: &RecordedTopics,
     (node, words): (Name, &BTreeSet<&str>),
     found: &Match<'_>,
 ) -> bool {
     let what = match found.role {
-        Role::Publishes => Key::Publish(node, found.topic),
-        Role::Subscribes => Key::Subscribe(found.topic, node),
+        Role::Publishes => ElementKey::Publish(node, found.topic),
+        Role::Subscribes => ElementKey::Subscribe(found.topic, node),
     };
     let has_room = found.role == Role::Subscribes || has_room(known, recorded, found.topic);
     if recorded.proved.contains(&what) || !has_room || known.denies(what) {
@@ -340,7 +342,7 @@ fn draw(
         what,
         source: row("source"),
         degree: Degree::Declared,
-        when: Validity::Like(Key::Node(node)),
+        when: Validity::Like(ElementKey::Node(node)),
     };
     known.because(proof, None, |_| sentence(code, found, words));
     true
@@ -348,7 +350,7 @@ fn draw(
 
 /// Whether a topic may have a publisher that is not known yet: its messages do not name theirs, and more publishers were
 /// offered than are known.
-fn has_room(known: &Conclusions<'_>, recorded: &Recorded, topic: Name) -> bool {
+fn has_room(known: &Conclusions<'_>, recorded: &RecordedTopics, topic: Name) -> bool {
     let publishers = known.publishers(topic).count();
     let offered = known.offers(topic).map_or(1, |n| n.max(1) as usize);
     !recorded.told.contains(&topic) && publishers < offered

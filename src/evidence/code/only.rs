@@ -9,16 +9,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Code;
 use super::declaration::Role;
-use super::matching::{Match, Recorded, matches, resolved, row};
-use super::workspace::{Instance, Placed};
+use super::matching::{Match, RecordedTopics, matches, resolved, row};
+use super::workspace::{FileDeclaration, Instance};
 use crate::base::words::count;
 use crate::evidence::claim::{Degree, Name};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 use crate::evidence::topology::launch::join;
 
 /// Why a place is not drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Reason {
+pub(super) enum NotDrawn {
     SeveralPlaces,
     KnownPublisher,
     OtherLaunchFile,
@@ -28,7 +28,7 @@ pub(super) enum Reason {
     NotNamed,
 }
 
-impl Reason {
+impl NotDrawn {
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::SeveralPlaces => "several places can be meant",
@@ -50,11 +50,11 @@ struct Candidate<'a> {
 }
 
 /// What is known of places that are not drawn: each in words, with its reason.
-pub(super) type Undrawn = Vec<(Reason, String)>;
+pub(super) type Undrawn = Vec<(NotDrawn, String)>;
 
 /// What the bag tells.
-pub(super) struct Bag<'a> {
-    pub(super) recorded: &'a Recorded,
+pub(super) struct BagTopics<'a> {
+    pub(super) recorded: &'a RecordedTopics,
     /// Programs whose nodes the bag names.
     pub(super) explained: &'a BTreeSet<(String, String)>,
     /// The nodes that the bag names.
@@ -67,7 +67,7 @@ pub(super) struct Bag<'a> {
 pub(super) fn conclude(
     code: &Code,
     known: &mut Conclusions<'_>,
-    bag: &Bag<'_>,
+    bag: &BagTopics<'_>,
 ) -> (usize, Undrawn) {
     let candidates = candidates(code, bag);
     let places = places(code, bag.recorded, &candidates);
@@ -91,7 +91,7 @@ pub(super) fn conclude(
                 draw(code, known, best);
                 edges += 1;
             }
-            reason => undrawn.push((reason.unwrap_or(Reason::NotNamed), words(known, best))),
+            reason => undrawn.push((reason.unwrap_or(NotDrawn::NotNamed), words(known, best))),
         }
     }
     undrawn.sort();
@@ -100,7 +100,7 @@ pub(super) fn conclude(
 
 /// Every recorded topic of every node that the workspace may start and the bag does not name; of tests only if they are
 /// all there is.
-fn candidates<'a>(code: &'a Code, bag: &Bag<'_>) -> Vec<Candidate<'a>> {
+fn candidates<'a>(code: &'a Code, bag: &BagTopics<'_>) -> Vec<Candidate<'a>> {
     let mut all = Vec::new();
     for instance in code
         .instances
@@ -140,7 +140,7 @@ fn full_name(instance: &Instance) -> String {
 /// The places in the code of each edge, whether a node was found for them or not.
 fn places<'a>(
     code: &'a Code,
-    recorded: &Recorded,
+    recorded: &RecordedTopics,
     candidates: &[Candidate<'a>],
 ) -> BTreeMap<(Role, Name), BTreeSet<(&'a str, usize)>> {
     let mut all: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
@@ -150,7 +150,7 @@ fn places<'a>(
             .or_default()
             .insert(place);
     }
-    for Placed { path, declaration } in &code.places {
+    for FileDeclaration { path, declaration } in &code.places {
         let topic = declaration.topic.as_ref();
         let name = topic.map(|topic| resolved("/node", topic));
         if let Some(topic) = name.and_then(|name| recorded.topic(&name, &declaration.types)) {
@@ -193,15 +193,15 @@ fn is_launched_by(instance: &Instance, launches: &BTreeSet<&str>) -> bool {
 fn reason(
     candidates: &[&Candidate<'_>],
     known: &Conclusions<'_>,
-    bag: &Bag<'_>,
+    bag: &BagTopics<'_>,
     (places, launches): (&BTreeSet<(&str, usize)>, &BTreeSet<&str>),
-) -> Option<Reason> {
+) -> Option<NotDrawn> {
     let found = &candidates[0].found;
     if found.role == Role::Publishes
         && (bag.recorded.told.contains(&found.topic)
             || known.publishers(found.topic).next().is_some())
     {
-        return Some(Reason::KnownPublisher);
+        return Some(NotDrawn::KnownPublisher);
     }
     let is_launched = candidates
         .iter()
@@ -212,15 +212,15 @@ fn reason(
         .collect();
     let nodes: BTreeSet<&str> = fitting.iter().map(|c| c.node.as_str()).collect();
     if places.len() > 1 || nodes.len() > 1 {
-        return Some(Reason::SeveralPlaces);
+        return Some(NotDrawn::SeveralPlaces);
     }
     let Some(only) = fitting.first() else {
-        return Some(Reason::OtherLaunchFile);
+        return Some(NotDrawn::OtherLaunchFile);
     };
     if only.share.0 * 2 < only.share.1 {
-        return Some(Reason::FewTopics);
+        return Some(NotDrawn::FewTopics);
     }
-    (bag.logged && only.found.instance.logs).then_some(Reason::WouldHaveLogged)
+    (bag.logged && only.found.instance.logs).then_some(NotDrawn::WouldHaveLogged)
 }
 
 /// Adds the node, with a question mark, and its edge.
@@ -228,16 +228,16 @@ fn draw(code: &Code, known: &mut Conclusions<'_>, candidate: &Candidate<'_>) {
     let node = known.facts.name(&format!("{} ?", candidate.node));
     let topic = candidate.found.topic;
     let edge = match candidate.found.role {
-        Role::Publishes => Key::Publish(node, topic),
-        Role::Subscribes => Key::Subscribe(topic, node),
+        Role::Publishes => ElementKey::Publish(node, topic),
+        Role::Subscribes => ElementKey::Subscribe(topic, node),
     };
     let text = format!(
         "the only place in {} that may do so: {}; the bag does not say that it ran",
         count(code.packages, "package"),
         words(known, candidate)
     );
-    let basis = Validity::Like(Key::Node(node));
-    for (what, when) in [(Key::Node(node), Validity::Whole), (edge, basis)] {
+    let basis = Validity::Like(ElementKey::Node(node));
+    for (what, when) in [(ElementKey::Node(node), Validity::Whole), (edge, basis)] {
         let proof = Proof {
             what,
             source: row("source_only"),

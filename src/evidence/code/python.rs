@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use super::declaration::{Call, Class, FileCode, Made, short, type_of};
-use super::texts::{DEEPEST, LONGEST, Texts, most_work};
+use super::texts::{DEEPEST, LONGEST, TextValues, most_work};
 use crate::evidence::syntax::{Language, Node, Parsed, children, line, walk};
 
 /// Reads a file; nothing for one that is too tangled.
@@ -12,24 +12,24 @@ pub(super) fn read(text: &str) -> FileCode {
     let Some(parsed) = Parsed::new(Language::Python, text.to_owned()) else {
         return FileCode::default();
     };
-    let mut reader = Reader {
+    let mut reader = PythonReader {
         parsed: &parsed,
         work: Cell::new(0),
         imports: BTreeMap::new(),
         wildcards: Vec::new(),
-        texts: Texts::default(),
+        texts: TextValues::default(),
         classes: vec![Class::default()],
         open: Vec::new(),
     };
-    reader.visit_all(Reader::look);
-    reader.visit_all(Reader::take);
+    reader.visit_all(PythonReader::look);
+    reader.visit_all(PythonReader::take);
     FileCode {
         classes: reader.classes,
         imports: reader.imports,
     }
 }
 
-struct Reader<'a> {
+struct PythonReader<'a> {
     parsed: &'a Parsed,
     /// How many expressions were looked at for their texts.
     work: Cell<usize>,
@@ -37,13 +37,13 @@ struct Reader<'a> {
     imports: BTreeMap<String, String>,
     /// Modules of which everything is imported.
     wildcards: Vec<String>,
-    texts: Texts<'a>,
+    texts: TextValues<'a>,
     classes: Vec<Class>,
     /// Where the classes around the element end, with their places.
     open: Vec<(usize, usize)>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> PythonReader<'a> {
     /// Visits every element, with `open` telling the classes around it.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
         self.open.clear();
@@ -206,7 +206,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Names of nodes, logging, and bags that are written.
-    fn remark(&mut self, name: &str, object: &str, full: &str, given: &Given<'a>) {
+    fn remark(&mut self, name: &str, object: &str, full: &str, given: &CallArguments<'a>) {
         let is_init = name == "__init__"
             && (object.starts_with("super(") || object == "Node" || object.ends_with(".Node"));
         let is_node = ["rclpy.create_node", "rclpy.node.Node", "rospy.init_node"].contains(&full);
@@ -241,8 +241,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn arguments(&self, call: Node<'a>) -> Given<'a> {
-        let mut given = Given::default();
+    fn arguments(&self, call: Node<'a>) -> CallArguments<'a> {
+        let mut given = CallArguments::default();
         let list = call.child_by_field_name("arguments");
         for argument in list.map(children).unwrap_or_default() {
             let field = |name| argument.child_by_field_name(name);
@@ -267,7 +267,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The topic among the arguments: the one of that name, else the first text.
-    fn topic(&self, given: &Given<'a>) -> Option<String> {
+    fn topic(&self, given: &CallArguments<'a>) -> Option<String> {
         let named = ["topic", "name", "topic_name", "action_name", "ns"]
             .iter()
             .find_map(|name| given.named(name));
@@ -279,7 +279,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The type among the arguments.
-    fn types(&self, given: &Given<'a>) -> Vec<String> {
+    fn types(&self, given: &CallArguments<'a>) -> Vec<String> {
         let named = [
             "msg_type",
             "data_class",
@@ -375,12 +375,12 @@ impl<'a> Reader<'a> {
 
 /// The arguments of a call.
 #[derive(Default)]
-struct Given<'a> {
+struct CallArguments<'a> {
     positional: Vec<Node<'a>>,
     named: Vec<(&'a str, Node<'a>)>,
 }
 
-impl<'a> Given<'a> {
+impl<'a> CallArguments<'a> {
     fn named(&self, name: &str) -> Option<Node<'a>> {
         self.named
             .iter()

@@ -18,12 +18,12 @@ pub(super) fn most_work(bytes: usize) -> usize {
 
 /// Names with the expressions that they are given; a name that is given several is not known.
 #[derive(Debug, Default)]
-pub(super) struct Texts<'a> {
+pub(super) struct TextValues<'a> {
     names: BTreeMap<String, Option<Node<'a>>>,
     parameters: BTreeMap<String, Option<Node<'a>>>,
 }
 
-impl<'a> Texts<'a> {
+impl<'a> TextValues<'a> {
     /// Takes down that a name is given a value.
     pub(super) fn set(&mut self, name: &str, value: Node<'a>) {
         put(&mut self.names, name, value);

@@ -16,7 +16,7 @@ pub(super) struct Workspace {
     /// Launch files by their paths, with the nodes that each may start.
     pub(super) launches: Vec<(String, Vec<LaunchedNode>)>,
     /// The parts of each class, by its name.
-    by_name: BTreeMap<String, Vec<Part>>,
+    by_name: BTreeMap<String, Vec<ClassPlace>>,
 }
 
 /// A source file.
@@ -28,11 +28,11 @@ pub(super) struct CodeFile {
 }
 
 /// A class of a file, or the code outside its classes: file, place.
-type Part = (usize, usize);
+type ClassPlace = (usize, usize);
 
 /// A declaration with its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Placed {
+pub(crate) struct FileDeclaration {
     /// Below the workspace.
     pub(crate) path: String,
     pub(crate) declaration: Declaration,
@@ -51,7 +51,7 @@ pub(crate) struct Instance {
     /// What tells it from other programs of the same node name: the file and the class.
     pub(crate) program: (String, String),
     /// What its program declares.
-    pub(crate) declared: Arc<[Placed]>,
+    pub(crate) declared: Arc<[FileDeclaration]>,
     /// Whether it only belongs to tests.
     pub(crate) is_test: bool,
     /// Whether its program logs.
@@ -63,7 +63,7 @@ pub(crate) struct Instance {
 struct CodeNode {
     names: Vec<String>,
     program: (String, String),
-    declared: Arc<[Placed]>,
+    declared: Arc<[FileDeclaration]>,
     logs: bool,
 }
 
@@ -123,11 +123,11 @@ impl Workspace {
     }
 
     /// Every declaration of files that are no tests, whoever it belongs to.
-    pub(super) fn places(&self) -> Vec<Placed> {
+    pub(super) fn places(&self) -> Vec<FileDeclaration> {
         let files = self.files.iter().filter(|file| !is_test(&file.path));
         let declared = files.flat_map(|file| {
             let all = file.code.classes.iter().flat_map(|c| &c.declarations);
-            all.map(|declaration| Placed {
+            all.map(|declaration| FileDeclaration {
                 path: file.path.clone(),
                 declaration: declaration.clone(),
             })
@@ -236,7 +236,7 @@ impl Workspace {
 
     /// The node of the code outside classes.
     fn free_node(&self, files: &[usize]) -> Option<CodeNode> {
-        let free: Vec<Part> = files.iter().map(|file| (*file, 0)).collect();
+        let free: Vec<ClassPlace> = files.iter().map(|file| (*file, 0)).collect();
         // rospy knows one node per process, wherever it is named.
         let all = files
             .iter()
@@ -251,7 +251,7 @@ impl Workspace {
         (!node.names.is_empty() || !node.declared.is_empty()).then_some(node)
     }
 
-    fn class_node(&self, part: Part) -> CodeNode {
+    fn class_node(&self, part: ClassPlace) -> CodeNode {
         let (parts, _) = self.belonging(self.parts(part));
         // The class's own name for its node beats those of its bases.
         let own = self
@@ -274,13 +274,18 @@ impl Workspace {
         )
     }
 
-    fn node(&self, parts: &[Part], names: BTreeSet<String>, program: (String, String)) -> CodeNode {
+    fn node(
+        &self,
+        parts: &[ClassPlace],
+        names: BTreeSet<String>,
+        program: (String, String),
+    ) -> CodeNode {
         let is_recorder = parts.iter().any(|part| self.class(*part).is_recorder);
-        let placed = |part: &Part| {
+        let placed = |part: &ClassPlace| {
             let path = &self.file(*part).path;
             let declared = self.class(*part).declarations.iter().cloned();
             declared
-                .map(|declaration| Placed {
+                .map(|declaration| FileDeclaration {
                     path: path.clone(),
                     declaration,
                 })
@@ -305,7 +310,7 @@ impl Workspace {
 
     /// The parts that belong to the node of these parts, sorted: its bases, and the classes that it makes and that are no
     /// nodes themselves. Those that are come second.
-    fn belonging(&self, parts: Vec<Part>) -> (Vec<Part>, Vec<Part>) {
+    fn belonging(&self, parts: Vec<ClassPlace>) -> (Vec<ClassPlace>, Vec<ClassPlace>) {
         let mut open = parts;
         let (mut own, mut others) = (BTreeSet::new(), BTreeSet::new());
         while let Some(part) = open.pop() {
@@ -334,7 +339,7 @@ impl Workspace {
 
     /// The parts of the class that a name means in a file: of this file, of the module that it is imported from, of this
     /// package, or the only one in the workspace.
-    fn meant(&self, name: &str, file: usize) -> Vec<Part> {
+    fn meant(&self, name: &str, file: usize) -> Vec<ClassPlace> {
         let Some(all) = self.by_name.get(name) else {
             return Vec::new();
         };
@@ -356,12 +361,13 @@ impl Workspace {
             .map(|full| full.rsplit_once('.').map_or("", |(module, _)| module));
         let module =
             import.map(|module| format!("{}.py", module.trim_start_matches('.').replace('.', "/")));
-        let is_imported = |p: &Part| {
+        let is_imported = |p: &ClassPlace| {
             module
                 .as_ref()
                 .is_some_and(|m| is_path_end(&self.file(*p).path, m))
         };
-        let in_package = |p: &Part| here.package.is_some() && self.file(*p).package == here.package;
+        let in_package =
+            |p: &ClassPlace| here.package.is_some() && self.file(*p).package == here.package;
         let in_file = defined().find(|p| p.0 == file);
         let chosen =
             in_file.or_else(|| only(defined().filter(|p| is_imported(p) && in_package(p))));
@@ -372,7 +378,7 @@ impl Workspace {
     }
 
     /// A class with the functions of it that stand in other files of its package.
-    fn parts(&self, part: Part) -> Vec<Part> {
+    fn parts(&self, part: ClassPlace) -> Vec<ClassPlace> {
         let package = self.file(part).package;
         let others = self
             .by_name
@@ -385,7 +391,7 @@ impl Workspace {
     }
 
     /// Whether a class is a node, by what it derives from.
-    fn is_node(&self, part: Part, depth: usize) -> bool {
+    fn is_node(&self, part: ClassPlace, depth: usize) -> bool {
         depth < 8
             && self.class(part).bases.iter().any(|base| {
                 let meant = self.meant(base, part.0);
@@ -396,11 +402,11 @@ impl Workspace {
             })
     }
 
-    fn file(&self, part: Part) -> &CodeFile {
+    fn file(&self, part: ClassPlace) -> &CodeFile {
         &self.files[part.0]
     }
 
-    fn class(&self, part: Part) -> &Class {
+    fn class(&self, part: ClassPlace) -> &Class {
         &self.files[part.0].code.classes[part.1]
     }
 }

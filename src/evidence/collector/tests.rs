@@ -89,7 +89,7 @@ pub(super) fn hear(
     publisher: Option<&str>,
     payload: &Payload,
 ) -> (Collector, Want) {
-    let mut collector = Collector::new(Options::default());
+    let mut collector = Collector::new(CollectOptions::default());
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
     let want = bag.connection(&Connection {
@@ -275,11 +275,11 @@ fn every_layout_survives_any_cut() {
 
 /// A collector with a camera, a detector that passes its stamps on, and a lidar that does not.
 fn flow() -> Collector {
-    let mut collector = Collector::new(Options {
+    let mut collector = Collector::new(CollectOptions {
         infer_stamps: true,
         payload_bytes: 0,
         why: vec!["/detector".into(), "/image".into()],
-        ..Options::default()
+        ..CollectOptions::default()
     });
     let mut progress = |_, _| ();
     let mut bag = collector.bag(&mut progress);
@@ -323,7 +323,7 @@ fn flow() -> Collector {
 fn a_node_that_passes_stamps_on_subscribes_their_source() {
     let recorded = flow().finish().unwrap();
     let span = recorded.span.unwrap();
-    let options = crate::evidence::conclude::Options::default();
+    let options = crate::evidence::conclude::ConcludeOptions::default();
     let built = crate::graph::build(&recorded, &[span], &options, 0).unwrap();
     let all = &built.elements;
     let inferred = all

@@ -24,11 +24,11 @@ impl fmt::Display for Malformed {
 }
 
 /// What every reading function returns.
-pub(crate) type Result<T> = std::result::Result<T, Malformed>;
+pub(crate) type PayloadResult<T> = std::result::Result<T, Malformed>;
 
 /// A place in a payload.
 #[derive(Clone, Debug)]
-pub(crate) struct Cursor<'a> {
+pub(crate) struct PayloadCursor<'a> {
     data: &'a [u8],
     at: usize,
     /// Where alignment counts from; `None` where nothing is aligned (ROS 1).
@@ -36,12 +36,12 @@ pub(crate) struct Cursor<'a> {
     big_endian: bool,
 }
 
-impl<'a> Cursor<'a> {
+impl<'a> PayloadCursor<'a> {
     /// A cursor at the start of a payload.
     ///
     /// # Errors
     /// For an encoding that is neither ROS 1 nor plain CDR (XCDR1).
-    pub(crate) fn new(encoding: &Encoding, data: &'a [u8]) -> Result<Self> {
+    pub(crate) fn new(encoding: &Encoding, data: &'a [u8]) -> PayloadResult<Self> {
         match encoding {
             Encoding::Ros1 => Ok(Self::ros1(data)),
             Encoding::Cdr => Self::cdr(data),
@@ -66,7 +66,7 @@ impl<'a> Cursor<'a> {
     ///
     /// # Errors
     /// Unless the header says plain CDR of either byte order.
-    pub(crate) fn cdr(data: &'a [u8]) -> Result<Self> {
+    pub(crate) fn cdr(data: &'a [u8]) -> PayloadResult<Self> {
         match data {
             [0, kind @ (0 | 1), _, _, ..] => Ok(Self {
                 data,
@@ -95,7 +95,7 @@ impl<'a> Cursor<'a> {
     ///
     /// # Errors
     /// If more is left.
-    pub(crate) fn finish(&self) -> Result<()> {
+    pub(crate) fn finish(&self) -> PayloadResult<()> {
         let allowed = if self.is_cdr() { 3 } else { 0 };
         if self.remaining() > allowed {
             return Err(self.wrong("the end"));
@@ -112,7 +112,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next `len` bytes.
-    pub(crate) fn bytes(&mut self, len: usize) -> Result<&'a [u8]> {
+    pub(crate) fn bytes(&mut self, len: usize) -> PayloadResult<&'a [u8]> {
         let end = self.at.checked_add(len);
         let part = end.and_then(|end| self.data.get(self.at..end));
         let part = part.ok_or(self.wrong("more bytes"))?;
@@ -121,7 +121,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next `N` bytes, aligned to `N` in CDR, least significant first.
-    fn number<const N: usize>(&mut self) -> Result<[u8; N]> {
+    fn number<const N: usize>(&mut self) -> PayloadResult<[u8; N]> {
         if let Some(origin) = self.origin {
             let over = (self.at - origin) % N;
             if over != 0 {
@@ -137,47 +137,47 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next byte.
-    pub(crate) fn u8(&mut self) -> Result<u8> {
+    pub(crate) fn u8(&mut self) -> PayloadResult<u8> {
         self.number().map(u8::from_le_bytes)
     }
 
     /// The next 16 bits.
-    pub(crate) fn u16(&mut self) -> Result<u16> {
+    pub(crate) fn u16(&mut self) -> PayloadResult<u16> {
         self.number().map(u16::from_le_bytes)
     }
 
     /// The next 32 bits.
-    pub(crate) fn u32(&mut self) -> Result<u32> {
+    pub(crate) fn u32(&mut self) -> PayloadResult<u32> {
         self.number().map(u32::from_le_bytes)
     }
 
     /// The next 32 bits, signed.
-    pub(crate) fn i32(&mut self) -> Result<i32> {
+    pub(crate) fn i32(&mut self) -> PayloadResult<i32> {
         self.number().map(i32::from_le_bytes)
     }
 
     /// The next 64 bits.
-    pub(crate) fn u64(&mut self) -> Result<u64> {
+    pub(crate) fn u64(&mut self) -> PayloadResult<u64> {
         self.number().map(u64::from_le_bytes)
     }
 
     /// The next 64 bits, signed.
-    pub(crate) fn i64(&mut self) -> Result<i64> {
+    pub(crate) fn i64(&mut self) -> PayloadResult<i64> {
         self.number().map(i64::from_le_bytes)
     }
 
     /// The next 64 bits as a floating point number.
-    pub(crate) fn f64(&mut self) -> Result<f64> {
+    pub(crate) fn f64(&mut self) -> PayloadResult<f64> {
         self.number().map(f64::from_le_bytes)
     }
 
     /// The next time: seconds and nanoseconds of 32 bits each.
-    pub(crate) fn time(&mut self) -> Result<Stamp> {
+    pub(crate) fn time(&mut self) -> PayloadResult<Stamp> {
         Ok(Stamp::from_ros(self.u32()?, self.u32()?))
     }
 
     /// The next `count` numbers of `size` bytes each as they are written, aligned in CDR.
-    pub(crate) fn numbers(&mut self, count: usize, size: usize) -> Result<&'a [u8]> {
+    pub(crate) fn numbers(&mut self, count: usize, size: usize) -> PayloadResult<&'a [u8]> {
         if let Some(origin) = self.origin.filter(|_| count > 0) {
             let over = (self.at - origin) % size.max(1);
             if over != 0 {
@@ -193,13 +193,13 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next string; bytes that are no UTF-8 are an error.
-    pub(crate) fn string(&mut self) -> Result<&'a str> {
+    pub(crate) fn string(&mut self) -> PayloadResult<&'a str> {
         let text = self.text()?;
         std::str::from_utf8(text).map_err(|_| self.wrong("text in UTF-8"))
     }
 
     /// The bytes of the next string, whatever they are.
-    pub(crate) fn text(&mut self) -> Result<&'a [u8]> {
+    pub(crate) fn text(&mut self) -> PayloadResult<&'a [u8]> {
         let len = self.u32()? as usize;
         let text = self.bytes(len)?;
         match text {
@@ -211,14 +211,14 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Like [`Cursor::string`], stepping over it without a look at its bytes.
-    pub(crate) fn skip_string(&mut self) -> Result<()> {
+    /// Like [`PayloadCursor::string`], stepping over it without a look at its bytes.
+    pub(crate) fn skip_string(&mut self) -> PayloadResult<()> {
         let len = self.u32()? as usize;
         self.bytes(len).map(drop)
     }
 
     /// The length of the next sequence, whose elements take `least` bytes or more each.
-    pub(crate) fn length(&mut self, least: usize) -> Result<usize> {
+    pub(crate) fn length(&mut self, least: usize) -> PayloadResult<usize> {
         let count = self.u32()? as usize;
         if count.saturating_mul(least.max(1)) > self.remaining() {
             return Err(self.wrong("as many elements as the sequence announces"));
@@ -227,7 +227,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Steps over a `std_msgs/Header`; the sequence number in ROS 1, 0 in ROS 2.
-    pub(crate) fn header(&mut self) -> Result<u32> {
+    pub(crate) fn header(&mut self) -> PayloadResult<u32> {
         let seq = if self.is_cdr() { 0 } else { self.u32()? };
         self.time()?;
         self.skip_string()?;
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn ros1_is_packed() {
         let data = [7, 1, 0, 0, 0, 2, 0, 0, 0, b'h', b'i'];
-        let mut cursor = Cursor::ros1(&data);
+        let mut cursor = PayloadCursor::ros1(&data);
         assert_eq!((cursor.u8(), cursor.u32()), (Ok(7), Ok(1)));
         assert_eq!(cursor.string(), Ok("hi"));
         assert_eq!(cursor.finish(), Ok(()));
@@ -262,24 +262,24 @@ mod tests {
         let little = [0, 1, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0];
         let big = [0, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 1];
         for data in [little, big] {
-            let mut cursor = Cursor::cdr(&data).unwrap();
+            let mut cursor = PayloadCursor::cdr(&data).unwrap();
             assert_eq!((cursor.u8(), cursor.u32()), (Ok(7), Ok(1)));
         }
     }
 
     #[test]
     fn nothing_is_read_past_the_end() {
-        let mut cursor = Cursor::ros1(&[255, 255, 255, 255, 1]);
+        let mut cursor = PayloadCursor::ros1(&[255, 255, 255, 255, 1]);
         assert!(cursor.clone().string().is_err());
         assert!(cursor.clone().length(1).is_err());
         assert!(cursor.u64().is_err());
-        assert!(Cursor::cdr(&[0, 7, 0, 0]).is_err());
+        assert!(PayloadCursor::cdr(&[0, 7, 0, 0]).is_err());
     }
 
     #[test]
     fn a_cdr_string_ends_with_a_zero() {
         let with = |last| [0, 1, 0, 0, 2, 0, 0, 0, b'a', last];
-        assert_eq!(Cursor::cdr(&with(0)).unwrap().string(), Ok("a"));
-        assert!(Cursor::cdr(&with(b'b')).unwrap().string().is_err());
+        assert_eq!(PayloadCursor::cdr(&with(0)).unwrap().string(), Ok("a"));
+        assert!(PayloadCursor::cdr(&with(b'b')).unwrap().string().is_err());
     }
 }

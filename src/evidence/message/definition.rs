@@ -3,7 +3,7 @@
 use crate::bag::{Connection, Encoding};
 
 /// A message layout.
-pub(crate) struct Shape {
+pub(crate) struct MessageLayout {
     /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`. A star at its start stands for anything.
     pub(crate) type_name: &'static str,
     /// Its md5 sum in ROS 1, looked at where the definition is missing; empty in ROS 2.
@@ -17,7 +17,7 @@ pub(crate) struct Shape {
 
 /// How well a connection fits a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fit {
+pub(crate) enum LayoutFit {
     /// It has another type or encoding.
     OtherType,
     /// It has the type, but not its fields.
@@ -34,7 +34,7 @@ pub(crate) const HEADER2: (&str, &str) = ("Header", "Time stamp;string frame_id"
 pub(crate) const TIME2: (&str, &str) = ("Time", "int32 sec;uint32 nanosec");
 
 /// `rosgraph_msgs/Log`.
-pub(crate) const LOG: Shape = Shape {
+pub(crate) const LOG: MessageLayout = MessageLayout {
     type_name: "rosgraph_msgs/Log",
     md5: "acffd30cd6b6de30f120938c17c593fb",
     encoding: Encoding::Ros1,
@@ -48,13 +48,13 @@ pub(crate) const LOG: Shape = Shape {
 };
 
 /// The same before 2011.
-pub(crate) const OLD_LOG: Shape = Shape {
+pub(crate) const OLD_LOG: MessageLayout = MessageLayout {
     type_name: "roslib/Log",
     ..LOG
 };
 
 /// `rcl_interfaces/msg/Log`.
-pub(crate) const LOG2: Shape = Shape {
+pub(crate) const LOG2: MessageLayout = MessageLayout {
     type_name: "rcl_interfaces/Log",
     md5: "",
     encoding: Encoding::Cdr,
@@ -67,19 +67,19 @@ pub(crate) const LOG2: Shape = Shape {
     ],
 };
 
-impl Shape {
+impl MessageLayout {
     /// Whether the messages of a connection can be read.
-    pub(crate) fn fit(&self, connection: &Connection) -> Fit {
+    pub(crate) fn fit(&self, connection: &Connection) -> LayoutFit {
         let type_name = connection.type_name.replacen("/msg/", "/", 1);
         let named = match self.type_name.strip_prefix('*') {
             Some(end) => type_name.ends_with(end),
             None => type_name == self.type_name,
         };
         if !named || connection.encoding != self.encoding {
-            return Fit::OtherType;
+            return LayoutFit::OtherType;
         }
         if self.fields.is_empty() {
-            return Fit::Same;
+            return LayoutFit::Same;
         }
         let definition = connection.definition.as_deref().unwrap_or_default();
         let hash = connection.type_hash.as_deref().unwrap_or_default();
@@ -89,7 +89,11 @@ impl Shape {
         } else {
             self.matches(definition)
         };
-        if same { Fit::Same } else { Fit::OtherFields }
+        if same {
+            LayoutFit::Same
+        } else {
+            LayoutFit::OtherFields
+        }
     }
 
     /// The message itself must have the fields; messages inside it are compared where the definition holds them.

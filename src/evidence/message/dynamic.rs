@@ -1,11 +1,11 @@
 //! A message as data, taken apart by its own definition: for messages whose layout has changed over the years.
 
-use crate::evidence::message::cursor::{Cursor, Result};
+use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 use crate::evidence::message::definition::outline;
 
 /// A part of a message.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Value {
+pub(crate) enum MessageValue {
     Text(String),
     /// An unsigned number of one byte.
     Byte(u8),
@@ -16,7 +16,7 @@ pub(crate) enum Value {
     Fields(Vec<(String, Self)>),
 }
 
-impl Value {
+impl MessageValue {
     /// A field by its name.
     pub(crate) fn field(&self, name: &str) -> Option<&Self> {
         match self {
@@ -53,9 +53,9 @@ const BUILT_IN: [(&str, &str); 2] = [
 
 /// A definition, ready to take messages apart.
 #[derive(Clone, Debug)]
-pub(crate) struct Schema(Vec<(String, String)>);
+pub(crate) struct MessageSchema(Vec<(String, String)>);
 
-impl Schema {
+impl MessageSchema {
     /// The schema of a definition's text.
     pub(crate) fn of_text(definition: &str) -> Self {
         Self(outline(definition))
@@ -85,23 +85,33 @@ impl Schema {
     ///
     /// # Errors
     /// If it has another layout, or nothing is known about a type in it.
-    pub(crate) fn read(&self, payload: &mut Cursor<'_>) -> Result<Value> {
+    pub(crate) fn read(&self, payload: &mut PayloadCursor<'_>) -> PayloadResult<MessageValue> {
         let fields = self.0.first().map_or("", |(_, fields)| fields);
         let value = self.fields(payload, fields, 0)?;
         payload.finish()?;
         Ok(value)
     }
 
-    fn fields(&self, payload: &mut Cursor<'_>, fields: &str, depth: usize) -> Result<Value> {
+    fn fields(
+        &self,
+        payload: &mut PayloadCursor<'_>,
+        fields: &str,
+        depth: usize,
+    ) -> PayloadResult<MessageValue> {
         let mut values = Vec::new();
         for field in fields.split(';').filter(|f| !f.is_empty()) {
             let (kind, name) = field.split_once(' ').ok_or(payload.wrong("a field"))?;
             values.push((name.to_owned(), self.field(payload, kind, depth)?));
         }
-        Ok(Value::Fields(values))
+        Ok(MessageValue::Fields(values))
     }
 
-    fn field(&self, payload: &mut Cursor<'_>, kind: &str, depth: usize) -> Result<Value> {
+    fn field(
+        &self,
+        payload: &mut PayloadCursor<'_>,
+        kind: &str,
+        depth: usize,
+    ) -> PayloadResult<MessageValue> {
         let Some((kind, array)) = kind.split_once('[') else {
             return self.one(payload, kind, depth);
         };
@@ -118,21 +128,28 @@ impl Schema {
             }
         };
         let list = (0..count).map(|_| self.one(payload, kind, depth));
-        Ok(Value::List(list.collect::<Result<_>>()?))
+        Ok(MessageValue::List(list.collect::<PayloadResult<_>>()?))
     }
 
-    fn one(&self, payload: &mut Cursor<'_>, kind: &str, depth: usize) -> Result<Value> {
+    fn one(
+        &self,
+        payload: &mut PayloadCursor<'_>,
+        kind: &str,
+        depth: usize,
+    ) -> PayloadResult<MessageValue> {
         match kind {
-            "string" => payload.string().map(|text| Value::Text(text.to_owned())),
-            "byte" => payload.u8().map(Value::Byte),
+            "string" => payload
+                .string()
+                .map(|text| MessageValue::Text(text.to_owned())),
+            "byte" => payload.u8().map(MessageValue::Byte),
             "int16" => whole(payload.u16()?.cast_signed()),
             "uint16" => whole(payload.u16()?),
             "int32" => whole(payload.u32()?.cast_signed()),
             "uint32" => whole(payload.u32()?),
             "int64" => whole(payload.i64()?),
             "uint64" => whole(payload.u64()?),
-            "float32" => payload.u32().map(|_| Value::Number(None)),
-            "float64" => payload.u64().map(|_| Value::Number(None)),
+            "float32" => payload.u32().map(|_| MessageValue::Number(None)),
+            "float64" => payload.u64().map(|_| MessageValue::Number(None)),
             _ => {
                 let known = self.0.iter().map(|(n, f)| (n.as_str(), f.as_str())).skip(1);
                 let fields = known.chain(BUILT_IN).find(|(name, _)| *name == kind);
@@ -149,8 +166,8 @@ impl Schema {
     clippy::unnecessary_wraps,
     reason = "an arm among others that may fail"
 )]
-fn whole(number: impl Into<i128>) -> Result<Value> {
-    Ok(Value::Number(Some(number.into())))
+fn whole(number: impl Into<i128>) -> PayloadResult<MessageValue> {
+    Ok(MessageValue::Number(Some(number.into())))
 }
 
 #[cfg(test)]
@@ -159,17 +176,20 @@ mod tests {
 
     #[test]
     fn a_message_is_taken_apart_by_its_definition() {
-        let schema =
-            Schema::of_text("Part[] parts\nuint8 last\n===\nMSG: a/Part\nuint16 n\nstring name\n");
+        let schema = MessageSchema::of_text(
+            "Part[] parts\nuint8 last\n===\nMSG: a/Part\nuint16 n\nstring name\n",
+        );
         let data = [0, 1, 0, 0, 1, 0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'x', 0, 9];
-        let value = schema.read(&mut Cursor::cdr(&data).unwrap()).unwrap();
+        let value = schema
+            .read(&mut PayloadCursor::cdr(&data).unwrap())
+            .unwrap();
         assert_eq!(value.list("parts")[0].text("name"), "x");
-        assert_eq!(value.field("last"), Some(&Value::Byte(9)));
+        assert_eq!(value.field("last"), Some(&MessageValue::Byte(9)));
     }
 
     #[test]
     fn a_definition_that_holds_itself_is_refused() {
-        let schema = Schema::of_text("A a\n===\nMSG: x/A\nA a\n");
-        assert!(schema.read(&mut Cursor::ros1(&[0; 64])).is_err());
+        let schema = MessageSchema::of_text("A a\n===\nMSG: x/A\nA a\n");
+        assert!(schema.read(&mut PayloadCursor::ros1(&[0; 64])).is_err());
     }
 }

@@ -9,9 +9,9 @@ mod definition;
 
 use std::ops::Range;
 
-use super::cursor::{Cursor, Malformed};
+use super::cursor::{Malformed, PayloadCursor};
 use crate::bag::{Connection, Encoding};
-use crate::base::table::{Batch, Column, Kind, Values};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn};
 use definition::{Array, Definition, Field};
 
 /// Messages inside messages deeper than this are hostile.
@@ -23,13 +23,13 @@ const MOST_COLUMNS: usize = 2000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Primitive {
     /// A number or a truth value, and its size in bytes.
-    Number(Kind, usize),
+    Number(ColumnKind, usize),
     Text,
 }
 
 /// The next thing to do with a payload.
 #[derive(Clone, Debug, PartialEq)]
-enum Step {
+enum DecodeStep {
     One(usize, Primitive),
     /// A list of bytes is one value.
     Bytes(usize, Array),
@@ -50,8 +50,8 @@ enum Step {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Decoder {
     encoding: Encoding,
-    steps: Vec<Step>,
-    columns: Vec<(String, Kind, usize)>,
+    steps: Vec<DecodeStep>,
+    columns: Vec<(String, ColumnKind, usize)>,
     /// Whether the message has no fields at all.
     is_empty: bool,
 }
@@ -67,7 +67,7 @@ impl Decoder {
         }
         let text = connection.definition.as_deref().unwrap_or_default();
         let definition = Definition::parse(text, &connection.type_name)?;
-        let mut plan = Plan {
+        let mut plan = DecodePlan {
             definition: &definition,
             is_cdr: connection.encoding == Encoding::Cdr,
             columns: Vec::new(),
@@ -84,7 +84,7 @@ impl Decoder {
     }
 
     /// A column for each field, in the order of the definition, whose names are none of `taken`.
-    pub(crate) fn columns(&self, taken: &[&str]) -> impl Iterator<Item = Column> {
+    pub(crate) fn columns(&self, taken: &[&str]) -> impl Iterator<Item = TableColumn> {
         let mut names: Vec<String> = Vec::new();
         self.columns.iter().map(move |(name, kind, levels)| {
             let mut name = name.clone();
@@ -92,7 +92,7 @@ impl Decoder {
                 name.push('_');
             }
             names.push(name.clone());
-            Column::full(name, *kind, *levels)
+            TableColumn::full(name, *kind, *levels)
         })
     }
 
@@ -106,7 +106,7 @@ impl Decoder {
         batch: &mut Batch,
         first: usize,
     ) -> Result<(), Malformed> {
-        let mut payload = Cursor::new(&self.encoding, data)?;
+        let mut payload = PayloadCursor::new(&self.encoding, data)?;
         if !self.is_empty {
             run(&self.steps, &mut payload, &mut batch.columns[first..])?;
         }
@@ -115,15 +115,15 @@ impl Decoder {
 }
 
 /// A plan being made.
-struct Plan<'a> {
+struct DecodePlan<'a> {
     definition: &'a Definition,
     is_cdr: bool,
-    columns: Vec<(String, Kind, usize)>,
+    columns: Vec<(String, ColumnKind, usize)>,
     /// How many fields were visited.
     fields: usize,
 }
 
-impl Plan<'_> {
+impl DecodePlan<'_> {
     /// The steps of a message inside `levels` lists, and the fewest bytes that it takes.
     fn message(
         &mut self,
@@ -131,14 +131,14 @@ impl Plan<'_> {
         prefix: &str,
         levels: usize,
         depth: usize,
-    ) -> Result<(Vec<Step>, usize), String> {
+    ) -> Result<(Vec<DecodeStep>, usize), String> {
         let definition = self.definition;
         let fields = &definition.messages[message].fields;
         if depth > DEEPEST {
             return Err("its definition holds itself".to_owned());
         }
         if fields.is_empty() && self.is_cdr {
-            return Ok((vec![Step::Nothing], 1));
+            return Ok((vec![DecodeStep::Nothing], 1));
         }
         let (mut steps, mut least) = (Vec::new(), 0_usize);
         for field in fields {
@@ -157,7 +157,7 @@ impl Plan<'_> {
         name: &str,
         levels: usize,
         depth: usize,
-    ) -> Result<(Vec<Step>, usize), String> {
+    ) -> Result<(Vec<DecodeStep>, usize), String> {
         self.fields += 1;
         if self.fields > MOST_COLUMNS {
             return Err(format!(
@@ -173,13 +173,14 @@ impl Plan<'_> {
             return self.one(message, &field.kind, name, levels, depth);
         }
         if ["uint8", "byte", "char", "octet"].contains(&field.kind.as_str()) {
-            let step = Step::Bytes(self.columns.len(), count);
-            self.columns.push((name.to_owned(), Kind::Bytes, levels));
+            let step = DecodeStep::Bytes(self.columns.len(), count);
+            self.columns
+                .push((name.to_owned(), ColumnKind::Bytes, levels));
             return Ok((vec![step], bytes(1)));
         }
         let start = self.columns.len();
         let (element, least) = self.one(message, &field.kind, name, levels + 1, depth)?;
-        let list = Step::List {
+        let list = DecodeStep::List {
             count,
             columns: start..self.columns.len(),
             level: levels,
@@ -197,21 +198,21 @@ impl Plan<'_> {
         name: &str,
         levels: usize,
         depth: usize,
-    ) -> Result<(Vec<Step>, usize), String> {
+    ) -> Result<(Vec<DecodeStep>, usize), String> {
         let number = |kind, size| Ok((Primitive::Number(kind, size), size));
         let primitive = match kind {
-            "bool" => number(Kind::Flag, 1),
-            "int8" => number(Kind::I8, 1),
+            "bool" => number(ColumnKind::Flag, 1),
+            "int8" => number(ColumnKind::I8, 1),
             // ROS 1 says that `byte` is signed; ROS 2 has it unsigned, and so has everybody in practice.
-            "uint8" | "char" | "byte" | "octet" => number(Kind::U8, 1),
-            "int16" => number(Kind::I16, 2),
-            "uint16" => number(Kind::U16, 2),
-            "int32" => number(Kind::I32, 4),
-            "uint32" => number(Kind::U32, 4),
-            "int64" => number(Kind::I64, 8),
-            "uint64" => number(Kind::U64, 8),
-            "float32" => number(Kind::F32, 4),
-            "float64" => number(Kind::F64, 8),
+            "uint8" | "char" | "byte" | "octet" => number(ColumnKind::U8, 1),
+            "int16" => number(ColumnKind::I16, 2),
+            "uint16" => number(ColumnKind::U16, 2),
+            "int32" => number(ColumnKind::I32, 4),
+            "uint32" => number(ColumnKind::U32, 4),
+            "int64" => number(ColumnKind::I64, 8),
+            "uint64" => number(ColumnKind::U64, 8),
+            "float32" => number(ColumnKind::F32, 4),
+            "float64" => number(ColumnKind::F64, 8),
             "string" => Ok((Primitive::Text, 4)),
             "wstring" => Err("wide strings are not decoded".to_owned()),
             "time" | "duration" if !self.is_cdr => {
@@ -233,28 +234,34 @@ impl Plan<'_> {
         let column = self.columns.len();
         let kind = match primitive {
             Primitive::Number(kind, _) => kind,
-            Primitive::Text => Kind::Text,
+            Primitive::Text => ColumnKind::Text,
         };
         self.columns.push((name.to_owned(), kind, levels));
-        Ok((vec![Step::One(column, primitive)], least))
+        Ok((vec![DecodeStep::One(column, primitive)], least))
     }
 }
 
-fn run(steps: &[Step], payload: &mut Cursor<'_>, columns: &mut [Column]) -> Result<(), Malformed> {
+fn run(
+    steps: &[DecodeStep],
+    payload: &mut PayloadCursor<'_>,
+    columns: &mut [TableColumn],
+) -> Result<(), Malformed> {
     for step in steps {
         match step {
-            Step::One(column, Primitive::Number(_, size)) => {
+            DecodeStep::One(column, Primitive::Number(_, size)) => {
                 numbers(payload, 1, *size, &mut columns[*column].values)?;
             }
-            Step::One(column, Primitive::Text) => text(payload, &mut columns[*column].values)?,
-            Step::Bytes(column, count) => {
+            DecodeStep::One(column, Primitive::Text) => {
+                text(payload, &mut columns[*column].values)?;
+            }
+            DecodeStep::Bytes(column, count) => {
                 let count = many(payload, *count, 1)?;
                 let bytes = payload.bytes(count)?;
-                if let Values::Texts(to) = &mut columns[*column].values {
+                if let ColumnValues::Texts(to) = &mut columns[*column].values {
                     to.push(bytes);
                 }
             }
-            Step::List {
+            DecodeStep::List {
                 count,
                 columns: own,
                 level,
@@ -267,14 +274,14 @@ fn run(steps: &[Step], payload: &mut Cursor<'_>, columns: &mut [Column]) -> Resu
                     column.end_list(*level, count);
                 }
             }
-            Step::Nothing => payload.u8().map(drop)?,
+            DecodeStep::Nothing => payload.u8().map(drop)?,
         }
     }
     Ok(())
 }
 
 /// How many elements an array has; never more than the payload has room for.
-fn many(payload: &mut Cursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
+fn many(payload: &mut PayloadCursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
     match count {
         Array::Told => payload.length(least),
         Array::Fixed(count) if count.saturating_mul(least.max(1)) > payload.remaining() => {
@@ -286,14 +293,14 @@ fn many(payload: &mut Cursor<'_>, count: Array, least: usize) -> Result<usize, M
 }
 
 fn list(
-    element: &[Step],
+    element: &[DecodeStep],
     count: usize,
     least: usize,
-    payload: &mut Cursor<'_>,
-    columns: &mut [Column],
+    payload: &mut PayloadCursor<'_>,
+    columns: &mut [TableColumn],
 ) -> Result<(), Malformed> {
     match element {
-        [Step::One(column, Primitive::Number(_, size))] => {
+        [DecodeStep::One(column, Primitive::Number(_, size))] => {
             numbers(payload, count, *size, &mut columns[*column].values)
         }
         // Elements without a byte hold nothing, however many a hostile payload has of them.
@@ -302,9 +309,9 @@ fn list(
     }
 }
 
-fn text(payload: &mut Cursor<'_>, to: &mut Values) -> Result<(), Malformed> {
+fn text(payload: &mut PayloadCursor<'_>, to: &mut ColumnValues) -> Result<(), Malformed> {
     let text = payload.text()?;
-    if let Values::Texts(to) = to {
+    if let ColumnValues::Texts(to) = to {
         match std::str::from_utf8(text) {
             Ok(_) => to.push(text),
             Err(_) => to.push(String::from_utf8_lossy(text).as_bytes()),
@@ -315,10 +322,10 @@ fn text(payload: &mut Cursor<'_>, to: &mut Values) -> Result<(), Malformed> {
 
 /// Adds `count` numbers of `size` bytes each.
 fn numbers(
-    payload: &mut Cursor<'_>,
+    payload: &mut PayloadCursor<'_>,
     count: usize,
     size: usize,
-    to: &mut Values,
+    to: &mut ColumnValues,
 ) -> Result<(), Malformed> {
     let is_big = payload.is_big_endian();
     let data = payload.numbers(count, size)?;
@@ -333,18 +340,18 @@ fn numbers(
         }};
     }
     match to {
-        Values::Flag(to) => to.extend(data.iter().map(|b| *b != 0)),
-        Values::U8(to) => to.extend_from_slice(data),
-        Values::I8(to) => add!(to, i8),
-        Values::I16(to) => add!(to, i16),
-        Values::U16(to) => add!(to, u16),
-        Values::I32(to) => add!(to, i32),
-        Values::U32(to) => add!(to, u32),
-        Values::I64(to) => add!(to, i64),
-        Values::U64(to) => add!(to, u64),
-        Values::F32(to) => add!(to, f32),
-        Values::F64(to) => add!(to, f64),
-        Values::Texts(_) => {}
+        ColumnValues::Flag(to) => to.extend(data.iter().map(|b| *b != 0)),
+        ColumnValues::U8(to) => to.extend_from_slice(data),
+        ColumnValues::I8(to) => add!(to, i8),
+        ColumnValues::I16(to) => add!(to, i16),
+        ColumnValues::U16(to) => add!(to, u16),
+        ColumnValues::I32(to) => add!(to, i32),
+        ColumnValues::U32(to) => add!(to, u32),
+        ColumnValues::I64(to) => add!(to, i64),
+        ColumnValues::U64(to) => add!(to, u64),
+        ColumnValues::F32(to) => add!(to, f32),
+        ColumnValues::F64(to) => add!(to, f64),
+        ColumnValues::Texts(_) => {}
     }
     Ok(())
 }

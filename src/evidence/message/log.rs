@@ -1,6 +1,6 @@
 //! A log record of ROS 1 (`rosgraph_msgs/Log`) or ROS 2 (`rcl_interfaces/msg/Log`): who logs what, from which file.
 
-use crate::evidence::message::cursor::{Cursor, Result};
+use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 
 /// A log record.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ impl<'a> LogRecord<'a> {
     ///
     /// # Errors
     /// If it has another layout.
-    pub(crate) fn read(payload: &mut Cursor<'a>) -> Result<Self> {
+    pub(crate) fn read(payload: &mut PayloadCursor<'a>) -> PayloadResult<Self> {
         let is_ros2 = payload.is_cdr();
         if is_ros2 {
             payload.time()?;

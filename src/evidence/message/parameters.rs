@@ -1,11 +1,11 @@
 //! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): whose parameters were declared or set.
 
 use crate::bag::Encoding;
-use crate::evidence::message::cursor::{Cursor, Result};
-use crate::evidence::message::definition::{Shape, TIME2};
+use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
+use crate::evidence::message::definition::{MessageLayout, TIME2};
 
 /// `rcl_interfaces/msg/ParameterEvent`.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "rcl_interfaces/ParameterEvent",
     md5: "",
     encoding: Encoding::Cdr,
@@ -34,19 +34,19 @@ pub(crate) struct Parameter<'a> {
 
 /// What happened to a node's parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Event<'a> {
+pub(crate) struct ParameterEvent<'a> {
     /// The node's full name; empty if the writer named none.
     pub(crate) node: &'a str,
     /// The new and the changed ones.
     pub(crate) set: Vec<Parameter<'a>>,
 }
 
-impl<'a> Event<'a> {
+impl<'a> ParameterEvent<'a> {
     /// Reads a whole event.
     ///
     /// # Errors
     /// If the payload has another layout.
-    pub(crate) fn read(payload: &mut Cursor<'a>) -> Result<Self> {
+    pub(crate) fn read(payload: &mut PayloadCursor<'a>) -> PayloadResult<Self> {
         payload.time()?;
         let node = payload.string()?;
         let mut set = Vec::new();
@@ -65,7 +65,7 @@ impl<'a> Event<'a> {
 /// `rcl_interfaces/msg/ParameterType`: the number of truth values.
 const BOOL: u8 = 1;
 
-fn parameter<'a>(payload: &mut Cursor<'a>) -> Result<Parameter<'a>> {
+fn parameter<'a>(payload: &mut PayloadCursor<'a>) -> PayloadResult<Parameter<'a>> {
     let name = payload.string()?;
     let (kind, truth) = (payload.u8()?, payload.u8()?);
     payload.i64()?;

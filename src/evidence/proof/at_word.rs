@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Conclusions, Key, Proof, Validity};
+use super::{Conclusions, ElementKey, Proof, Validity};
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, ClaimRecord, SourceId};
 
@@ -28,12 +28,12 @@ impl Conclusions<'_> {
         let refusals = self.refusals();
         for fact in self.facts.list.clone() {
             let what = match fact.claim {
-                Claim::Node(node) => Key::Node(node),
-                Claim::Topic(topic) => Key::Topic(topic),
-                Claim::Publish(node, topic) => Key::Publish(node, topic),
+                Claim::Node(node) => ElementKey::Node(node),
+                Claim::Topic(topic) => ElementKey::Topic(topic),
+                Claim::Publish(node, topic) => ElementKey::Publish(node, topic),
                 Claim::Subscribe(node, topic)
                 | Claim::Joins(node, topic)
-                | Claim::Refused(node, topic) => Key::Subscribe(topic, node),
+                | Claim::Refused(node, topic) => ElementKey::Subscribe(topic, node),
                 _ => continue,
             };
             let (mut signs, ends) = self.signs_and_ends(&fact, &endings);
@@ -57,12 +57,12 @@ impl Conclusions<'_> {
     }
 
     /// When somebody was refused who wanted to subscribe.
-    fn refusals(&mut self) -> BTreeMap<Key, Vec<Stamp>> {
-        let mut refusals: BTreeMap<Key, Vec<Stamp>> = BTreeMap::new();
+    fn refusals(&mut self) -> BTreeMap<ElementKey, Vec<Stamp>> {
+        let mut refusals: BTreeMap<ElementKey, Vec<Stamp>> = BTreeMap::new();
         for fact in self.facts.list.clone() {
             if let Claim::Refused(node, topic) = fact.claim {
                 let times = self.times(&fact);
-                let key = Key::Subscribe(topic, node);
+                let key = ElementKey::Subscribe(topic, node);
                 refusals.entry(key).or_default().extend(times);
             }
         }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Conclusions, Key, Reliability};
+use super::{Conclusions, ElementKey, Reliability};
 use crate::base::time::Span;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Name};
@@ -70,30 +70,30 @@ impl Closed {
     }
 
     /// Whether every message of a topic names its publisher, and none this one.
-    pub(crate) fn headers_deny(&self, what: Key) -> bool {
+    pub(crate) fn headers_deny(&self, what: ElementKey) -> bool {
         match what {
-            Key::Publish(node, topic) => lacks(&self.told, topic, node),
+            ElementKey::Publish(node, topic) => lacks(&self.told, topic, node),
             _ => false,
         }
     }
 
     /// Whether a complete list that was heard long after its node's start leaves this edge out.
-    pub(crate) fn settled_lists_deny(&self, what: Key) -> bool {
+    pub(crate) fn settled_lists_deny(&self, what: ElementKey) -> bool {
         let node = match what {
-            Key::Publish(node, _) | Key::Subscribe(_, node) => node,
-            Key::Node(_) | Key::Topic(_) => return false,
+            ElementKey::Publish(node, _) | ElementKey::Subscribe(_, node) => node,
+            ElementKey::Node(_) | ElementKey::Topic(_) => return false,
         };
         self.settled.contains(&node) && self.lists_deny(what)
     }
 
     /// Whether some complete list leaves this edge out; nothing is known against nodes and topics.
-    pub(crate) fn lists_deny(&self, what: Key) -> bool {
+    pub(crate) fn lists_deny(&self, what: ElementKey) -> bool {
         match what {
-            Key::Publish(node, topic) => {
+            ElementKey::Publish(node, topic) => {
                 lacks(&self.all, node, topic) || lacks(&self.published, node, topic)
             }
-            Key::Subscribe(topic, node) => lacks(&self.all, node, topic),
-            Key::Node(_) | Key::Topic(_) => false,
+            ElementKey::Subscribe(topic, node) => lacks(&self.all, node, topic),
+            ElementKey::Node(_) | ElementKey::Topic(_) => false,
         }
     }
 }

@@ -4,13 +4,13 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::{HEADER, Shape};
-use crate::evidence::proof::{Conclusions, Key};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::{HEADER, MessageLayout};
+use crate::evidence::proof::{Conclusions, ElementKey};
 use std::collections::BTreeMap;
 
 /// `actionlib_msgs/GoalStatusArray`.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "actionlib_msgs/GoalStatusArray",
     md5: "8b2b82f13216d0a8ea88bd3af735e619",
     encoding: Encoding::Ros1,
@@ -22,7 +22,10 @@ pub(crate) const SHAPE: Shape = Shape {
     ],
 };
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let seq = payload.header()?;
     let mut ids = Vec::new();
     for _ in 0..payload.length(17)? {
@@ -84,20 +87,22 @@ fn tie(
     all: &BTreeMap<&'static str, Name>,
 ) {
     for (own, other) in [(&SENDS[..], &TAKES[..]), (&TAKES[..], &SENDS[..])] {
-        let mut basis: BTreeMap<Name, Key> = BTreeMap::new();
+        let mut basis: BTreeMap<Name, ElementKey> = BTreeMap::new();
         for topic in own.iter().filter_map(|part| parts.get(part)) {
             for node in known.publishers(*topic).collect::<Vec<_>>() {
-                basis.entry(node).or_insert(Key::Publish(node, *topic));
+                basis
+                    .entry(node)
+                    .or_insert(ElementKey::Publish(node, *topic));
             }
         }
         for (node, basis) in basis {
             for topic in own.iter().filter_map(|part| all.get(part)) {
-                if Key::Publish(node, *topic) != basis {
-                    known.like(source, Key::Publish(node, *topic), basis);
+                if ElementKey::Publish(node, *topic) != basis {
+                    known.like(source, ElementKey::Publish(node, *topic), basis);
                 }
             }
             for topic in other.iter().filter_map(|part| all.get(part)) {
-                known.like(source, Key::Subscribe(*topic, node), basis);
+                known.like(source, ElementKey::Subscribe(*topic, node), basis);
             }
         }
     }

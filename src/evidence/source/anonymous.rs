@@ -2,7 +2,7 @@
 
 use crate::base::role::start;
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 /// A node that started longer before the recording than this was named by a clock that was not set.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
@@ -17,7 +17,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         }
         let proof = Proof {
-            what: Key::Node(node),
+            what: ElementKey::Node(node),
             source,
             degree: Degree::Stated,
             when: Validity::Signs {

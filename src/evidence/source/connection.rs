@@ -1,7 +1,7 @@
 //! ROS 1 connection headers and MCAP channel metadata: who publishes each message (`callerid`).
 
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Conclusions, Key, Proof, Reliability, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
 
 /// Every stream proves its topic, and its publisher as far as that is believed.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
@@ -13,11 +13,14 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             degree: Degree::Measured,
             when,
         };
-        known.prove(proof(Key::Topic(stream.topic), Validity::Messages(at)));
+        known.prove(proof(
+            ElementKey::Topic(stream.topic),
+            Validity::Messages(at),
+        ));
         let Some(node) = stream.publisher else {
             continue;
         };
-        let edge = Key::Publish(node, stream.topic);
+        let edge = ElementKey::Publish(node, stream.topic);
         match stream.trust {
             Reliability::Player if known.named_by_others(stream.topic, node) => {}
             Reliability::Whole | Reliability::Player => {

@@ -13,14 +13,17 @@ use crate::bag::Encoding;
 use crate::base::csv;
 use crate::base::name::{last_part, namespace};
 use crate::evidence::claim::{Claim, Degree, Name, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, Key};
+use crate::evidence::proof::{Conclusions, ElementKey};
 
 const TABLE: &str = include_str!("contracts.csv");
 
 /// Keeps the file that a node logs from.
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     let file = record.file_name();
     if !record.logger.is_empty() && !file.is_empty() {
@@ -95,9 +98,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
                     .entry(topic)
                     .or_default()
                     .push((node, contract.clone()));
-            } else if !known.knows(Key::Publish(node, topic)) {
-                let what = Key::Subscribe(topic, node);
-                known.infer(source, what, Key::Node(node), |known| {
+            } else if !known.knows(ElementKey::Publish(node, topic)) {
+                let what = ElementKey::Subscribe(topic, node);
+                known.infer(source, what, ElementKey::Node(node), |known| {
                     words(known, node, &contract)
                 });
             }

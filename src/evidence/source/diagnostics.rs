@@ -4,13 +4,13 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::{HEADER, HEADER2, Shape};
-use crate::evidence::proof::{Conclusions, Key, Proof, Reliability, Validity};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::{HEADER, HEADER2, MessageLayout};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
 use std::collections::BTreeSet;
 
 /// `diagnostic_msgs/DiagnosticArray`, since `diagnostic_msgs` 1.2.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "diagnostic_msgs/DiagnosticArray",
     md5: "60810da900de1dd6ddd437c3503511da",
     encoding: Encoding::Ros1,
@@ -23,7 +23,7 @@ pub(crate) const SHAPE: Shape = Shape {
 };
 
 /// The same in ROS 2.
-pub(crate) const SHAPE2: Shape = Shape {
+pub(crate) const SHAPE2: MessageLayout = MessageLayout {
     md5: "",
     encoding: Encoding::Cdr,
     fields: &[
@@ -41,7 +41,10 @@ const STATUS: (&str, &str) = (
 );
 const VALUE: (&str, &str) = ("KeyValue", "string key;string value");
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let seq = payload.header()?;
     let mut names = Vec::new();
     for _ in 0..payload.length(4)? {
@@ -98,7 +101,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if untold.contains(&fact.claim) {
             let node = known.meant(node);
             known.prove(Proof {
-                what: Key::Publish(node, topic),
+                what: ElementKey::Publish(node, topic),
                 source,
                 degree: Degree::Inferred,
                 when: Validity::Signs { signs, ends },

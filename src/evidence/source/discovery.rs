@@ -3,11 +3,11 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, Statement};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::Shape;
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::MessageLayout;
 
 /// `rmw_dds_common/msg/ParticipantEntitiesInfo`; its identifiers have 24 bytes up to Humble, 16 since.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "rmw_dds_common/ParticipantEntitiesInfo",
     md5: "",
     encoding: Encoding::Cdr,
@@ -15,9 +15,12 @@ pub(crate) const SHAPE: Shape = Shape {
 };
 
 /// A node as its participant tells: namespace and name.
-type Nodes<'a> = Vec<(&'a str, &'a str)>;
+type ParticipantNodes<'a> = Vec<(&'a str, &'a str)>;
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let mut long = payload.clone();
     let (id, nodes) = nodes(payload, 16).or_else(|_| nodes(&mut long, 24))?;
     let id = cursor::hex(id);
@@ -37,7 +40,10 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 }
 
 /// The participant and its nodes, if identifiers of `gid` bytes use the payload up exactly.
-fn nodes<'a>(payload: &mut Cursor<'a>, gid: usize) -> cursor::Result<(&'a [u8], Nodes<'a>)> {
+fn nodes<'a>(
+    payload: &mut PayloadCursor<'a>,
+    gid: usize,
+) -> cursor::PayloadResult<(&'a [u8], ParticipantNodes<'a>)> {
     let id = payload.bytes(gid)?;
     let mut nodes = Vec::new();
     for _ in 0..payload.length(16)? {

@@ -2,7 +2,7 @@
 //! caller of another name, unless the topic lies below it, runs that node as a nodelet.
 
 use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 const TOPICS: [&str; 2] = ["/parameter_descriptions", "/parameter_updates"];
 
@@ -22,12 +22,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let callers: Vec<_> = known.publishers(topic).collect();
         for caller in &callers {
             for other in pair.iter().filter(|t| **t != topic) {
-                let basis = Key::Publish(*caller, topic);
-                known.like(source, Key::Publish(*caller, *other), basis);
+                let basis = ElementKey::Publish(*caller, topic);
+                known.like(source, ElementKey::Publish(*caller, *other), basis);
             }
             if is_nodelet(&known.text(*caller), node) {
                 let node = known.facts.name(node);
-                known.like(source, Key::Node(node), Key::Node(*caller));
+                known.like(source, ElementKey::Node(node), ElementKey::Node(*caller));
             }
         }
         if callers.is_empty() {
@@ -47,7 +47,7 @@ fn own(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.topic == topic {
             known.prove(Proof {
-                what: Key::Publish(node, topic),
+                what: ElementKey::Publish(node, topic),
                 source,
                 degree: Degree::Inferred,
                 when: Validity::Messages(at),

@@ -7,11 +7,11 @@ use std::ops::Range;
 use super::SourceContext;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Degree, Name, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::dynamic::{Schema, Value};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
-use crate::evidence::texts::{Said, Shown};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
+use crate::evidence::texts::{LoggedText, ShownValue};
 
 /// Fewer different values than this are chance; numbers are more often equal than words.
 const FEWEST: usize = 3;
@@ -35,7 +35,10 @@ const MOST_KEPT: usize = 1 << 14;
 const MOST_NEAR: usize = 64;
 
 /// Keeps the text of a log record.
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     if let Some(time) = heard.time
         && record.text.len() <= LONGEST
@@ -47,11 +50,11 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 }
 
 /// Keeps the words and numbers in a message.
-pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &Schema, payload: &[u8]) {
+pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &MessageSchema, payload: &[u8]) {
     if payload.len() > LONGEST {
         return;
     }
-    let value = Cursor::new(&heard.stream.connection.encoding, payload)
+    let value = PayloadCursor::new(&heard.stream.connection.encoding, payload)
         .and_then(|mut payload| schema.read(&mut payload));
     if let (Ok(value), Some(time)) = (value, heard.time) {
         let mut values = Vec::new();
@@ -63,7 +66,7 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &Schema, payload: &[u8
 }
 
 /// How to take the messages of a connection apart; `None` for those that hold no words or numbers of their own.
-pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<Schema> {
+pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<MessageSchema> {
     let plain = type_name.replacen("/msg/", "/", 1);
     if [
         "rosgraph_msgs/",
@@ -83,18 +86,20 @@ pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<Schema
         "std_msgs/Int32" => "int32 data",
         "std_msgs/Int64" | "example_interfaces/Int64" => "int64 data",
         "std_msgs/UInt32" => "uint32 data",
-        _ => return Schema::of_words(definition?),
+        _ => return MessageSchema::of_words(definition?),
     };
-    Some(Schema::of_fields(&[("", known)]))
+    Some(MessageSchema::of_fields(&[("", known)]))
 }
 
 /// The words and whole numbers directly in a message.
-fn collect(value: &Value, into: &mut Vec<String>) {
-    let Value::Fields(fields) = value else { return };
+fn collect(value: &MessageValue, into: &mut Vec<String>) {
+    let MessageValue::Fields(fields) = value else {
+        return;
+    };
     for (_, field) in fields.iter().take(16) {
         let text = match field {
-            Value::Text(text) if text.trim().len() >= SHORTEST => text.trim().to_owned(),
-            Value::Number(Some(number)) => number.to_string(),
+            MessageValue::Text(text) if text.trim().len() >= SHORTEST => text.trim().to_owned(),
+            MessageValue::Number(Some(number)) => number.to_string(),
             _ => continue,
         };
         if into.len() < MOST_VALUES {
@@ -113,7 +118,7 @@ struct Echo {
 }
 
 /// A node, the text before and after the value, a topic.
-type Form = (Name, String, String, Name);
+type LogForm = (Name, String, String, Name);
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let (said, shown) = known.facts.spoken.sorted();
@@ -135,7 +140,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         })
         .collect();
     for ((node, before, after, topic), echo) in &strong {
-        let same = |other: &&(&Form, &Echo)| {
+        let same = |other: &&(&LogForm, &Echo)| {
             let (n, b, a, _) = other.0;
             (n, b, a) == (node, before, after)
         };
@@ -150,8 +155,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 }
 
 /// Everything that could be an echo.
-fn echoes(known: &Conclusions<'_>, said: &[Said], shown: &[Shown]) -> BTreeMap<Form, Echo> {
-    let mut echoes: BTreeMap<Form, Echo> = BTreeMap::new();
+fn echoes(
+    known: &Conclusions<'_>,
+    said: &[LoggedText],
+    shown: &[ShownValue],
+) -> BTreeMap<LogForm, Echo> {
+    let mut echoes: BTreeMap<LogForm, Echo> = BTreeMap::new();
     for text in said {
         let Some(node) = known.owner(&text.logger) else {
             continue;
@@ -240,9 +249,12 @@ fn end(
     before: &str,
     after: &str,
     echo: &Echo,
-) -> Option<Key> {
+) -> Option<ElementKey> {
     let (all, first) = (echo.texts.len(), echo.first);
-    let (publish, subscribe) = (Key::Publish(node, topic), Key::Subscribe(topic, node));
+    let (publish, subscribe) = (
+        ElementKey::Publish(node, topic),
+        ElementKey::Subscribe(topic, node),
+    );
     if known.publishers(topic).any(|p| p == node) {
         return None;
     }
@@ -261,7 +273,7 @@ fn end(
 fn tell(
     source: SourceId,
     known: &mut Conclusions<'_>,
-    what: Key,
+    what: ElementKey,
     (before, after): (&str, &str),
     echo: &Echo,
 ) {

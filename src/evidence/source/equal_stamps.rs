@@ -10,9 +10,9 @@ use super::SourceContext;
 use crate::bag::{Connection, Encoding};
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::message::cursor::Cursor;
+use crate::evidence::message::cursor::PayloadCursor;
 use crate::evidence::message::definition::outline;
-use crate::evidence::proof::{Conclusions, Key};
+use crate::evidence::proof::{Conclusions, ElementKey};
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
 
@@ -69,7 +69,7 @@ fn is_list(connection: &Connection) -> bool {
 pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
     let connection = &heard.stream.connection;
     let encoding = &connection.encoding;
-    let stamp = Cursor::new(encoding, first_bytes).and_then(|mut payload| {
+    let stamp = PayloadCursor::new(encoding, first_bytes).and_then(|mut payload| {
         if is_list(connection) && payload.u32()? == 0 {
             return Ok(Stamp(0));
         }
@@ -93,7 +93,7 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
 
 /// What equal stamps say about two flows.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pair {
+struct StampPair {
     equal: u64,
     /// How often the input came first, and not long before.
     before: u64,
@@ -103,7 +103,7 @@ struct Pair {
 
 /// Messages of one topic by one publisher, or by all publishers of one role.
 #[derive(Clone, Debug)]
-struct Flow {
+struct StampFlow {
     topic: Name,
     /// Who sends it, if that is known: the nodes, and the role they share.
     nodes: Vec<Name>,
@@ -114,9 +114,9 @@ struct Flow {
 
 /// All flows with what their stamps have in common.
 struct Flows {
-    all: Vec<Flow>,
+    all: Vec<StampFlow>,
     /// By output, then input.
-    pairs: BTreeMap<(usize, usize), Pair>,
+    pairs: BTreeMap<(usize, usize), StampPair>,
 }
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
@@ -134,8 +134,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         };
         let (topic, matches) = (flows.all[input].topic, flows.pairs[&(output, input)].before);
         for node in &flow.nodes {
-            let basis = Key::Publish(*node, flow.topic);
-            known.infer(source, Key::Subscribe(topic, *node), basis, |known| {
+            let basis = ElementKey::Publish(*node, flow.topic);
+            known.infer(source, ElementKey::Subscribe(topic, *node), basis, |known| {
                 let [from, to] = [topic, flow.topic].map(|n| known.text(n));
                 let total = flow.messages;
                 format!(
@@ -158,9 +158,9 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize>
             && !flow
                 .nodes
                 .iter()
-                .any(|n| known.knows(Key::Publish(*n, flows.all[*input].topic)))
+                .any(|n| known.knows(ElementKey::Publish(*n, flows.all[*input].topic)))
     });
-    let good: Vec<(usize, Pair)> = good.map(|((_, input), pair)| (*input, *pair)).collect();
+    let good: Vec<(usize, StampPair)> = good.map(|((_, input), pair)| (*input, *pair)).collect();
     let most = good.iter().map(|(_, pair)| pair.before).max()?;
     let best: Vec<_> = good
         .into_iter()
@@ -170,7 +170,7 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize>
     if let [(only, _)] = best[..] {
         return Some(only);
     }
-    let clear = |(at, pair): &&(usize, Pair)| {
+    let clear = |(at, pair): &&(usize, StampPair)| {
         let mut others = best.iter().filter(|(other, _)| other != at);
         others.all(|(_, other)| pair.lag.is_clearly_less(&other.lag))
     };
@@ -181,10 +181,10 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize>
 /// is no `CameraInfo`; `None` if that cannot be told.
 fn without_siblings(
     flows: &Flows,
-    output: &Flow,
-    inputs: Vec<(usize, Pair)>,
-) -> Option<Vec<(usize, Pair)>> {
-    let mut families: BTreeMap<&[Name], Vec<(usize, Pair)>> = BTreeMap::new();
+    output: &StampFlow,
+    inputs: Vec<(usize, StampPair)>,
+) -> Option<Vec<(usize, StampPair)>> {
+    let mut families: BTreeMap<&[Name], Vec<(usize, StampPair)>> = BTreeMap::new();
     let mut left = Vec::new();
     for (at, pair) in inputs {
         match &flows.all[at].nodes[..] {
@@ -193,7 +193,7 @@ fn without_siblings(
         }
     }
     for family in families.into_values() {
-        let kind = |(at, _): &&(usize, Pair)| flows.all[*at].kind.as_str();
+        let kind = |(at, _): &&(usize, StampPair)| flows.all[*at].kind.as_str();
         let same = family.iter().filter(|f| kind(f) == output.kind);
         let data = family
             .iter()
@@ -211,14 +211,14 @@ fn without_siblings(
 fn flows(known: &mut Conclusions<'_>) -> Flows {
     let streams: Vec<usize> = known.facts.headers.keys().copied().collect();
     let series: Vec<_> = known.facts.headers.values().copied().collect();
-    let mut pooled: BTreeMap<(String, String), Flow> = BTreeMap::new();
+    let mut pooled: BTreeMap<(String, String), StampFlow> = BTreeMap::new();
     let mut keys = Vec::new();
     for (at, id) in streams.iter().zip(&series) {
         let topic = known.streams[*at].topic;
         let node = publisher(known, *at);
         let role = node.map_or_else(String::new, |n| role(&known.text(n)));
         let key = (known.text(topic).to_string(), role.clone());
-        let flow = pooled.entry(key.clone()).or_insert_with(|| Flow {
+        let flow = pooled.entry(key.clone()).or_insert_with(|| StampFlow {
             topic,
             nodes: Vec::new(),
             role,
@@ -234,8 +234,8 @@ fn flows(known: &mut Conclusions<'_>) -> Flows {
         .iter()
         .map(|key| order.binary_search(key).unwrap_or(0))
         .collect();
-    let all: Vec<Flow> = pooled.into_values().collect();
-    let mut pairs: BTreeMap<(usize, usize), Pair> = BTreeMap::new();
+    let all: Vec<StampFlow> = pooled.into_values().collect();
+    let mut pairs: BTreeMap<(usize, usize), StampPair> = BTreeMap::new();
     let mut group: Vec<(Timed, usize)> = Vec::new();
     let merged = known.facts.times.merge(&series, |timed| {
         if group
@@ -272,7 +272,11 @@ fn role(node: &str) -> String {
 }
 
 /// Counts the pairs among messages with one stamp.
-fn compare(group: &[(Timed, usize)], all: &[Flow], pairs: &mut BTreeMap<(usize, usize), Pair>) {
+fn compare(
+    group: &[(Timed, usize)],
+    all: &[StampFlow],
+    pairs: &mut BTreeMap<(usize, usize), StampPair>,
+) {
     if group.len() < 2 || group.len() > MOST_AT_ONCE {
         return;
     }
@@ -297,6 +301,6 @@ fn compare(group: &[(Timed, usize)], all: &[Flow], pairs: &mut BTreeMap<(usize, 
 }
 
 /// Whether two flows come from different senders, as far as is known.
-fn is_other(one: &Flow, other: &Flow) -> bool {
+fn is_other(one: &StampFlow, other: &StampFlow) -> bool {
     one.topic != other.topic && (one.role.is_empty() || one.role != other.role)
 }

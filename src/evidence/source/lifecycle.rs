@@ -3,11 +3,11 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::Shape;
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::MessageLayout;
 
 /// `lifecycle_msgs/msg/TransitionEvent`.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "lifecycle_msgs/TransitionEvent",
     md5: "",
     encoding: Encoding::Cdr,
@@ -21,7 +21,10 @@ pub(crate) const SHAPE: Shape = Shape {
     ],
 };
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     payload.u64()?;
     payload.u8()?;
     let transition = payload.string()?;

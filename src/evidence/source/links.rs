@@ -3,9 +3,12 @@
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::cursor::{self, PayloadCursor};
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     payload.header()?;
     payload.u8()?;
     let name = payload.string()?;
@@ -41,7 +44,7 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 
 /// A subscription that a text tells of.
 #[derive(Debug, PartialEq, Eq)]
-struct Link<'a> {
+struct ToldSubscription<'a> {
     /// Whose; `None`: the one who logs.
     node: Option<&'a str>,
     topic: &'a str,
@@ -58,15 +61,15 @@ enum How {
 }
 
 /// The subscription that a text of roscpp tells of.
-fn link(text: &str) -> Option<Link<'_>> {
+fn link(text: &str) -> Option<ToldSubscription<'_>> {
     let between = |from: &str, to: &str| Some(text.split_once(from)?.1.split_once(to)?.0);
     let caller = || between("callerid=[", "]");
-    let own = |topic| Link {
+    let own = |topic| ToldSubscription {
         node: None,
         topic,
         how: How::Lasts,
     };
-    let clients = |node, topic, how| Link {
+    let clients = |node, topic, how| ToldSubscription {
         node: Some(node),
         topic,
         how,
@@ -101,7 +104,7 @@ mod tests {
         let text = "Connection: Creating TransportSubscriberLink for topic [/scan] connected to \
                     [callerid=[/slam] address=[TCPROS connection on port 1 to [127.0.0.1:2 on socket 3]]]";
         let slam = |how| {
-            Some(Link {
+            Some(ToldSubscription {
                 node: Some("/slam"),
                 topic: "/scan",
                 how,
@@ -118,7 +121,7 @@ mod tests {
         let text = "Client [/bad] wants topic /scan to have datatype/md5sum [a/b], but our version has [c/d].";
         assert_eq!(
             link(text),
-            Some(Link {
+            Some(ToldSubscription {
                 node: Some("/bad"),
                 topic: "/scan",
                 how: How::Refused
@@ -131,7 +134,7 @@ mod tests {
         let text = "Retrying connection to [127.0.0.1:4] for topic [/scan]";
         assert_eq!(
             link(text),
-            Some(Link {
+            Some(ToldSubscription {
                 node: None,
                 topic: "/scan",
                 how: How::Lasts

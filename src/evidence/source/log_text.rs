@@ -3,11 +3,14 @@
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     // What a recorder or a player says of topics is about others.
     if record.logger.is_empty() || ["recorder.cpp", "player.cpp"].contains(&record.file_name()) {
@@ -94,9 +97,9 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             continue;
         };
         let what = if publishes {
-            Key::Publish(node, topic)
+            ElementKey::Publish(node, topic)
         } else {
-            Key::Subscribe(topic, node)
+            ElementKey::Subscribe(topic, node)
         };
         if known.denies(what) {
             continue;

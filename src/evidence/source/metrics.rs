@@ -3,12 +3,12 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::{Shape, TIME2};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::{MessageLayout, TIME2};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 /// `statistics_msgs/msg/MetricsMessage`.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "statistics_msgs/MetricsMessage",
     md5: "",
     encoding: Encoding::Cdr,
@@ -23,7 +23,10 @@ pub(crate) const SHAPE: Shape = Shape {
     ],
 };
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let node = payload.string()?;
     let metric = payload.string()?;
     payload.skip_string()?;
@@ -50,7 +53,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if let Claim::Reports(node, topic) = fact.claim {
             let node = known.meant(node);
             known.prove(Proof {
-                what: Key::Publish(node, topic),
+                what: ElementKey::Publish(node, topic),
                 source,
                 degree: fact.degree,
                 when: Validity::Signs { signs, ends },

@@ -1,7 +1,7 @@
 //! A topic whose messages name no publisher, and which only one node is known to publish: its messages are that node's.
 
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 /// Topics that any node may publish, so that one known publisher says nothing about the others.
 const SHARED: [&str; 8] = [
@@ -24,7 +24,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         if let (Some(only), None) = (publishers.next(), publishers.next()) {
             drop(publishers);
             known.prove(Proof {
-                what: Key::Publish(only, stream.topic),
+                what: ElementKey::Publish(only, stream.topic),
                 source,
                 degree: Degree::Inferred,
                 when: Validity::Messages(at),

@@ -2,11 +2,14 @@
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::parameters::Event;
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::parameters::ParameterEvent;
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
-    let name = Event::read(payload)?.node;
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    let name = ParameterEvent::read(payload)?.node;
     if !name.is_empty() {
         let node = heard.name(name);
         heard.claim(Claim::Node(node), Degree::Stated, || {

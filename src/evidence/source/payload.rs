@@ -11,7 +11,7 @@ use std::hash::Hasher as _;
 use super::SourceContext;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, Key};
+use crate::evidence::proof::{Conclusions, ElementKey};
 use crate::evidence::spread::Spread;
 
 /// Fewer equal messages than this are chance.
@@ -43,11 +43,11 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
 }
 
 /// One topic by one publisher, over all bags.
-type Flow = (Name, Option<Name>);
+type PayloadFlow = (Name, Option<Name>);
 
 /// What the messages of two flows have in common.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pair {
+struct PayloadPair {
     /// How often the one had it before the other.
     before: u64,
     lag: Spread,
@@ -56,7 +56,7 @@ struct Pair {
 /// What was found by going through all messages once.
 #[derive(Debug, Default)]
 struct Matches {
-    pairs: BTreeMap<(usize, usize), Pair>,
+    pairs: BTreeMap<(usize, usize), PayloadPair>,
     /// By flow: how many of its different messages were seen before in exactly these other flows.
     origins: BTreeMap<usize, BTreeMap<Vec<usize>, u64>>,
     distinct: BTreeMap<usize, u64>,
@@ -77,8 +77,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         known.copies.insert((node, basis));
         for input in nearest(&matches, *output, &inputs) {
             let topic = flows[input].0;
-            let what = Key::Subscribe(topic, node);
-            known.infer(source, what, Key::Publish(node, basis), |known| {
+            let what = ElementKey::Subscribe(topic, node);
+            known.infer(source, what, ElementKey::Publish(node, basis), |known| {
                 let count = matches.pairs[&(input, *output)].before;
                 let [from, to] = [topic, basis].map(|n| known.text(n));
                 format!(
@@ -90,7 +90,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
 }
 
 /// The node that publishes a flow, as far as it is known to be one.
-fn publisher(known: &Conclusions<'_>, (topic, publisher): Flow) -> Option<Name> {
+fn publisher(known: &Conclusions<'_>, (topic, publisher): PayloadFlow) -> Option<Name> {
     publisher.or_else(|| {
         let mut all = known.publishers(topic);
         all.next().filter(|_| all.next().is_none())
@@ -98,7 +98,7 @@ fn publisher(known: &Conclusions<'_>, (topic, publisher): Flow) -> Option<Name> 
 }
 
 /// Goes through all messages in order of time.
-fn matches(known: &mut Conclusions<'_>) -> (Vec<Flow>, Matches) {
+fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     let kept = known.facts.payloads.clone();
     let kept = kept.into_iter().filter(|(at, _)| {
         let topic = &known.streams[*at].connection.topic;
@@ -106,7 +106,7 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<Flow>, Matches) {
     });
     let (places, series): (Vec<usize>, Vec<_>) = kept.unzip();
     let flow_of = |at: &usize| (known.streams[*at].topic, known.streams[*at].publisher);
-    let named: BTreeMap<_, Flow> = places
+    let named: BTreeMap<_, PayloadFlow> = places
         .iter()
         .map(|at| {
             (
@@ -118,10 +118,10 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<Flow>, Matches) {
             )
         })
         .collect();
-    let flows: Vec<Flow> = named.into_values().collect();
-    let rank: BTreeMap<Flow, usize> = flows.iter().copied().zip(0..).collect();
+    let flows: Vec<PayloadFlow> = named.into_values().collect();
+    let rank: BTreeMap<PayloadFlow, usize> = flows.iter().copied().zip(0..).collect();
     let flow_at: Vec<usize> = places.iter().map(|at| rank[&flow_of(at)]).collect();
-    let mut walk = Walk::default();
+    let mut walk = PayloadWalk::default();
     let merged = known.facts.times.merge(&series, |timed| {
         walk.take(timed.time, flow_at[timed.series], timed.size);
     });
@@ -133,7 +133,7 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<Flow>, Matches) {
 
 /// The way through all messages.
 #[derive(Debug, Default)]
-struct Walk {
+struct PayloadWalk {
     found: Matches,
     /// Contents each flow had so far.
     seen: HashSet<(usize, u32)>,
@@ -142,7 +142,7 @@ struct Walk {
     queue: VecDeque<(Stamp, u32)>,
 }
 
-impl Walk {
+impl PayloadWalk {
     fn take(&mut self, time: Stamp, flow: usize, hash: u32) {
         while let Some((old, hash)) = self.queue.front().copied()
             && time.since(old) > RECENT_NS
@@ -188,7 +188,7 @@ impl Walk {
 /// The flows of the same type by others that had enough of an output's messages first.
 fn inputs(
     known: &Conclusions<'_>,
-    flows: &[Flow],
+    flows: &[PayloadFlow],
     matches: &Matches,
     output: usize,
     node: Name,
@@ -202,7 +202,7 @@ fn inputs(
             && kind(topic) == kind(flows[output].0)
             && often >= FEWEST
             && often >= FIRST * before(output, *input)
-            && !known.knows(Key::Publish(node, topic))
+            && !known.knows(ElementKey::Publish(node, topic))
     };
     let own = matches.origins.get(&output).into_iter().flatten();
     let from: BTreeSet<usize> = own.flat_map(|(from, _)| from).copied().collect();
@@ -243,7 +243,7 @@ mod tests {
 
     /// Flow, milliseconds, content.
     fn walked(messages: &[(usize, i64, u32)]) -> Matches {
-        let mut walk = Walk::default();
+        let mut walk = PayloadWalk::default();
         let mut sorted = messages.to_vec();
         sorted.sort_by_key(|m| m.1);
         for (flow, at, hash) in sorted {

@@ -27,7 +27,7 @@ const TAKEN: [&str; 16] = [
 ];
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
-    let nodes: Nodes = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
+    let nodes: NodesByName = known.nodes().iter().map(|n| (known.text(*n), *n)).collect();
     let spaces = spaces(&nodes);
     for topic in known.topics_of(|_| true) {
         let name = known.text(topic);
@@ -54,10 +54,10 @@ fn is_hidden(topic: &str) -> bool {
 }
 
 /// Nodes by name.
-type Nodes = BTreeMap<Arc<str>, Name>;
+type NodesByName = BTreeMap<Arc<str>, Name>;
 
 /// The names that other nodes lie below.
-fn spaces(nodes: &Nodes) -> BTreeSet<&str> {
+fn spaces(nodes: &NodesByName) -> BTreeSet<&str> {
     nodes.keys().flat_map(|node| above(node)).collect()
 }
 
@@ -70,7 +70,7 @@ fn above(name: &str) -> impl Iterator<Item = &str> {
 }
 
 /// The node with the longest name that a topic lies below, unless that name is a namespace of other nodes too.
-fn owner(topic: &str, nodes: &Nodes, spaces: &BTreeSet<&str>) -> Option<Name> {
+fn owner(topic: &str, nodes: &NodesByName, spaces: &BTreeSet<&str>) -> Option<Name> {
     let name = above(topic).find(|name| nodes.contains_key(*name))?;
     nodes.get(name).copied().filter(|_| !spaces.contains(name))
 }
@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn a_topic_belongs_to_the_node_it_lies_below() {
         let names = ["/amcl", "/r1", "/r1/nav"].into_iter().map(Arc::from);
-        let nodes: Nodes = names.zip((0..).map(Name)).collect();
+        let nodes: NodesByName = names.zip((0..).map(Name)).collect();
         let owner = |topic| owner(topic, &nodes, &spaces(&nodes));
         assert_eq!(owner("/amcl/pose"), Some(Name(0)));
         assert_eq!(owner("/r1/nav/plan"), Some(Name(2)));

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::SourceContext;
 use crate::base::yaml;
 use crate::evidence::claim::{Claim, Degree, SourceId};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 /// What one publisher offers.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -61,7 +61,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             && fact.source == source
         {
             known.prove(Proof {
-                what: Key::Topic(topic),
+                what: ElementKey::Topic(topic),
                 source,
                 degree: Degree::Declared,
                 when: Validity::Whole,

@@ -5,11 +5,14 @@ use std::collections::BTreeSet;
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::parameters::Event;
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::parameters::ParameterEvent;
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
-    let event = Event::read(payload)?;
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    let event = ParameterEvent::read(payload)?;
     let ends: BTreeSet<_> = event.set.iter().filter_map(|p| end(p.name)).collect();
     for (topic, publishes) in ends {
         let (node, of) = (heard.name(event.node), heard.name(topic));

@@ -5,15 +5,18 @@ use std::collections::BTreeSet;
 use super::SourceContext;
 use crate::base::name::is_recorder;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
+use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 /// Where the recorder's source lies, whatever the folder above: of `rosbag` and of `rosbag2_transport`.
 const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
 
 /// A recorder is known by the file its log records come from, whatever it is called.
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let record = LogRecord::read(payload)?;
     let file = record.file.replace('\\', "/");
     if FILES.iter().any(|end| file.ends_with(end)) {
@@ -37,7 +40,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let recorders: BTreeSet<Name> = told.chain(named).collect();
     for recorder in &recorders {
         known.prove(Proof {
-            what: Key::Node(*recorder),
+            what: ElementKey::Node(*recorder),
             source,
             degree: Degree::Stated,
             when: Validity::Unending,
@@ -50,10 +53,10 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for recorder in recorders {
         for topic in &topics {
             known.prove(Proof {
-                what: Key::Subscribe(*topic, recorder),
+                what: ElementKey::Subscribe(*topic, recorder),
                 source,
                 degree: Degree::Stated,
-                when: Validity::Like(Key::Topic(*topic)),
+                when: Validity::Like(ElementKey::Topic(*topic)),
             });
         }
     }

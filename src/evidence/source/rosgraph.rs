@@ -6,12 +6,12 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree, Statement};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::Shape;
-use crate::evidence::message::dynamic::{Schema, Value};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::MessageLayout;
+use crate::evidence::message::dynamic::{MessageSchema, MessageValue};
 
 /// `rosgraph_msgs/msg/Graph`.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "rosgraph_msgs/Graph",
     md5: "",
     encoding: Encoding::Cdr,
@@ -19,7 +19,7 @@ pub(crate) const SHAPE: Shape = Shape {
 };
 
 /// `rosgraph_monitor_msgs/msg/Graph`.
-pub(crate) const OLD_SHAPE: Shape = Shape {
+pub(crate) const OLD_SHAPE: MessageLayout = MessageLayout {
     type_name: "rosgraph_monitor_msgs/Graph",
     ..SHAPE
 };
@@ -100,11 +100,14 @@ const KNOWN: [&[(&str, &str)]; 3] = [
     ],
 ];
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let definition = heard.stream.connection.definition.clone();
     let graph = match definition.as_deref() {
         Some(text) if text.contains("nodes") && !text.contains("struct ") => {
-            Schema::of_text(text).read(payload)?
+            MessageSchema::of_text(text).read(payload)?
         }
         _ => guess(payload)?,
     };
@@ -144,10 +147,10 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
 /// The topic of an endpoint, and its type.
 fn endpoint(
     heard: &mut SourceContext<'_>,
-    end: &Value,
+    end: &MessageValue,
 ) -> (crate::evidence::claim::Name, crate::evidence::claim::Name) {
     let kind = match end.field("type") {
-        Some(Value::Text(kind)) => kind,
+        Some(MessageValue::Text(kind)) => kind,
         Some(interface) => interface.text("name"),
         None => "",
     };
@@ -156,7 +159,11 @@ fn endpoint(
 }
 
 /// The graph by the first definition that uses the payload up exactly.
-fn guess(payload: &mut Cursor<'_>) -> cursor::Result<Value> {
-    let fits = |fields: &&[(&str, &str)]| Schema::of_fields(fields).read(&mut payload.clone()).ok();
+fn guess(payload: &mut PayloadCursor<'_>) -> cursor::PayloadResult<MessageValue> {
+    let fits = |fields: &&[(&str, &str)]| {
+        MessageSchema::of_fields(fields)
+            .read(&mut payload.clone())
+            .ok()
+    };
     KNOWN.iter().find_map(fits).ok_or(payload.wrong("a graph"))
 }

@@ -9,10 +9,13 @@ use super::SourceContext;
 use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claim, Degree, Name, SourceId, Statement};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::proof::{Conclusions, Key, Proof, Reliability, Validity};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let seq = payload.header()?;
     payload.u8()?;
     let name = payload.string()?;
@@ -23,7 +26,7 @@ pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> c
     let count = payload.length(4)?;
     let topics = (0..count)
         .map(|_| payload.string())
-        .collect::<cursor::Result<Vec<_>>>()?;
+        .collect::<cursor::PayloadResult<Vec<_>>>()?;
     payload.finish()?;
     heard.sequence(seq);
     if name.is_empty() {
@@ -82,8 +85,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         let told = is_told(known, topic);
         let silent = advertised.as_ref().is_some_and(|all| !all.contains(&topic));
         let what = match (own, others || silent) {
-            (true, _) => Key::Publish(node, topic),
-            (false, true) => Key::Subscribe(topic, node),
+            (true, _) => ElementKey::Publish(node, topic),
+            (false, true) => ElementKey::Subscribe(topic, node),
             (false, false) => continue,
         };
         known.prove(Proof {

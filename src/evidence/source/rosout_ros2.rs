@@ -5,10 +5,13 @@ use std::sync::Arc;
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree, SourceId};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     payload.time()?;
     payload.u8()?;
     let name = payload.string()?;
@@ -53,7 +56,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (logger, topic, signs) in loggers {
         let node = owner(&logger, &nodes);
         nodes.insert(node.into());
-        let what = Key::Publish(known.facts.name(node), topic);
+        let what = ElementKey::Publish(known.facts.name(node), topic);
         known.prove(Proof {
             what,
             source,

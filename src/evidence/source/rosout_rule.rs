@@ -3,7 +3,7 @@
 
 use crate::bag::Encoding;
 use crate::evidence::claim::{Degree, SourceId};
-use crate::evidence::proof::{Conclusions, Key, Proof, Validity};
+use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let ros1 = known
@@ -23,12 +23,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for node in known.nodes().clone() {
         if node != log {
             known.prove(rule(
-                Key::Publish(node, log),
-                Validity::Like(Key::Node(node)),
+                ElementKey::Publish(node, log),
+                Validity::Like(ElementKey::Node(node)),
             ));
         }
     }
-    known.prove(rule(Key::Node(log), Validity::Always));
-    known.prove(rule(Key::Publish(log, all), Validity::Always));
-    known.prove(rule(Key::Subscribe(log, log), Validity::Always));
+    known.prove(rule(ElementKey::Node(log), Validity::Always));
+    known.prove(rule(ElementKey::Publish(log, all), Validity::Always));
+    known.prove(rule(ElementKey::Subscribe(log, log), Validity::Always));
 }

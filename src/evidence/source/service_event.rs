@@ -3,18 +3,21 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::Shape;
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::MessageLayout;
 
 /// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, whatever follows.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "*_Event",
     md5: "",
     encoding: Encoding::Cdr,
     fields: &[],
 };
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let kind = payload.u8()?;
     payload.time()?;
     let client = payload.bytes(16)?;

@@ -2,11 +2,14 @@
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::parameters::Event;
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::parameters::ParameterEvent;
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
-    let event = Event::read(payload)?;
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
+    let event = ParameterEvent::read(payload)?;
     let set = event.set.iter().rev().find(|p| p.name == "use_sim_time");
     let Some(simulated) = set.and_then(|p| p.truth).filter(|_| !event.node.is_empty()) else {
         return Ok(());

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, Key};
+use crate::evidence::proof::{Conclusions, ElementKey};
 
 /// Twins publish at least so many topics of their namespace: one alone may be chance.
 const FEWEST: usize = 2;
@@ -80,10 +80,10 @@ fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
             Some(rest) => known.facts.known(&format!("{}{rest}", to.space)),
             None => Some(topic),
         };
-        let own = |twin| known.knows(Key::Publish(to.node, twin));
+        let own = |twin| known.knows(ElementKey::Publish(to.node, twin));
         if let Some(twin) = twin.filter(|t| known.is_recorded(*t) && !own(*t)) {
-            let what = Key::Subscribe(twin, to.node);
-            known.infer(source, what, Key::Node(to.node), |known| {
+            let what = ElementKey::Subscribe(twin, to.node);
+            known.infer(source, what, ElementKey::Node(to.node), |known| {
                 format!(
                     "{} publishes the same topics in its namespace and subscribes {}",
                     known.text(from.node),

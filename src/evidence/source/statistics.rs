@@ -3,11 +3,11 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::Shape;
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::MessageLayout;
 
 /// `rosgraph_msgs/TopicStatistics`.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "rosgraph_msgs/TopicStatistics",
     md5: "10152ed868c5097a5e2e4a89d7daa710",
     encoding: Encoding::Ros1,
@@ -19,7 +19,10 @@ pub(crate) const SHAPE: Shape = Shape {
     )],
 };
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     let topic = payload.string()?;
     let publisher = payload.string()?;
     let subscriber = payload.string()?;

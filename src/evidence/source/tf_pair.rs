@@ -1,7 +1,7 @@
 //! A listener of `/tf` is a listener of `/tf_static`, and the other way round: tf2 always subscribes both.
 
 use crate::evidence::claim::{Name, SourceId};
-use crate::evidence::proof::{Conclusions, Key};
+use crate::evidence::proof::{Conclusions, ElementKey};
 
 const PAIR: [&str; 2] = ["tf", "tf_static"];
 
@@ -17,8 +17,8 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
         };
         let twin = known.facts.known(&format!("{space}/{}", PAIR[1 - at]));
         if let Some(twin) = twin.filter(|t| known.kind(*t) == "tf2_msgs/TFMessage") {
-            let basis = Key::Subscribe(topic, node);
-            known.infer(source, Key::Subscribe(twin, node), basis, |known| {
+            let basis = ElementKey::Subscribe(topic, node);
+            known.infer(source, ElementKey::Subscribe(twin, node), basis, |known| {
                 format!(
                     "{} subscribes {text}, and tf2 always subscribes both",
                     known.text(node)

@@ -3,11 +3,11 @@
 use super::SourceContext;
 use crate::bag::Encoding;
 use crate::evidence::claim::{Claim, Degree};
-use crate::evidence::message::cursor::{self, Cursor};
-use crate::evidence::message::definition::{Shape, TIME2};
+use crate::evidence::message::cursor::{self, PayloadCursor};
+use crate::evidence::message::definition::{MessageLayout, TIME2};
 
 /// `rosgraph_monitor_msgs/msg/TopicStatistics`.
-pub(crate) const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "rosgraph_monitor_msgs/TopicStatistics",
     md5: "",
     encoding: Encoding::Cdr,
@@ -26,7 +26,10 @@ pub(crate) const SHAPE: Shape = Shape {
 /// The kind of statistic that a publisher takes; all others are a subscriber's.
 const PUBLISHED_PERIOD: u8 = 0;
 
-pub(crate) fn read(heard: &mut SourceContext<'_>, payload: &mut Cursor<'_>) -> cursor::Result<()> {
+pub(crate) fn read(
+    heard: &mut SourceContext<'_>,
+    payload: &mut PayloadCursor<'_>,
+) -> cursor::PayloadResult<()> {
     payload.time()?;
     let mut all = Vec::new();
     for _ in 0..payload.length(37)? {

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::io;
 
-use super::{Block, SeriesId, Stamps};
+use super::{SeriesId, StampBlock, Stamps};
 use crate::base::time::Stamp;
 
 /// One time out of several sequences.
@@ -20,7 +20,7 @@ pub(crate) struct Timed {
 
 /// A block being read: ordered by its next stamp, then by the place of its sequence.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct Open {
+struct OpenBlock {
     next: (Stamp, usize, u32),
     at: usize,
     run: Vec<(Stamp, u32)>,
@@ -33,7 +33,7 @@ impl Stamps {
     /// If the unnamed file cannot be read.
     pub(crate) fn merge(&self, ids: &[SeriesId], mut each: impl FnMut(Timed)) -> io::Result<()> {
         let mut waiting = self.blocks(ids);
-        let mut open: BinaryHeap<Reverse<Open>> = BinaryHeap::new();
+        let mut open: BinaryHeap<Reverse<OpenBlock>> = BinaryHeap::new();
         loop {
             let top = open.peek().map(|o| o.0.next.0);
             let next = waiting.last().map(|(_, block)| block.first);
@@ -51,7 +51,7 @@ impl Stamps {
     }
 
     /// The blocks of these sequences with the places of those, the earliest last.
-    fn blocks(&self, ids: &[SeriesId]) -> Vec<(usize, Block)> {
+    fn blocks(&self, ids: &[SeriesId]) -> Vec<(usize, StampBlock)> {
         let of = |id: &SeriesId| self.get(*id).map_or(&[][..], |s| &s.blocks);
         let mut all: Vec<_> = ids
             .iter()
@@ -63,9 +63,9 @@ impl Stamps {
     }
 }
 
-fn enter(series: usize, run: Vec<(Stamp, u32)>) -> Option<Open> {
+fn enter(series: usize, run: Vec<(Stamp, u32)>) -> Option<OpenBlock> {
     let (time, size) = *run.first()?;
-    Some(Open {
+    Some(OpenBlock {
         next: (time, series, size),
         at: 0,
         run,
@@ -74,7 +74,7 @@ fn enter(series: usize, run: Vec<(Stamp, u32)>) -> Option<Open> {
 
 /// Gives away the earliest block's stamps as long as no other block, open or waiting, comes before them.
 fn drain(
-    open: &mut BinaryHeap<Reverse<Open>>,
+    open: &mut BinaryHeap<Reverse<OpenBlock>>,
     waiting: Option<Stamp>,
     each: &mut impl FnMut(Timed),
 ) {

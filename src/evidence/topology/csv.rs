@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::{Element, Entry, Topology, bad, place, resolved};
+use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
 use crate::base::csv;
 use crate::base::error::Result;
 
@@ -46,7 +46,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
             ));
         }
         let mut add = |element| {
-            topology.entries.push(Entry {
+            topology.entries.push(TopologyEntry {
                 element,
                 from_ns,
                 to_ns,
@@ -55,12 +55,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
             });
         };
         let node = resolved(name);
-        add(Element::Node(node.clone()));
+        add(NamedElement::Node(node.clone()));
         for topic in list(publish)? {
-            add(Element::Publish(node.clone(), resolved(&topic)));
+            add(NamedElement::Publish(node.clone(), resolved(&topic)));
         }
         for topic in list(subscribe)? {
-            add(Element::Subscribe(node.clone(), resolved(&topic)));
+            add(NamedElement::Subscribe(node.clone(), resolved(&topic)));
         }
     }
     Ok(topology)
@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(entries.len(), 4);
         assert_eq!(
             entries[2].element,
-            Element::Publish("/planner".into(), "/path".into())
+            NamedElement::Publish("/planner".into(), "/path".into())
         );
         assert_eq!(
             (entries[0].from_ns, entries[0].to_ns),

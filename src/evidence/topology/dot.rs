@@ -4,14 +4,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{Element, Entry, Topology, bad, place, resolved};
+use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
 use crate::base::error::Result;
 
 const HINT: &str = "save it from rqt_graph with `Save as DOT`";
 
 /// A word of DOT with its line.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Token {
+struct DotToken {
     line: usize,
     text: String,
     /// Whether it is a name or string, not a sign.
@@ -38,7 +38,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     let (things, edges) = statements(&tokens);
     let mut topology = Topology::default();
     let mut add = |element, line| {
-        topology.entries.push(Entry {
+        topology.entries.push(TopologyEntry {
             element,
             from_ns: None,
             to_ns: None,
@@ -48,8 +48,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     };
     for (line, thing) in things.values() {
         match thing {
-            Thing::Node(name) => add(Element::Node(name.clone()), *line),
-            Thing::Topic(name) => add(Element::Topic(name.clone()), *line),
+            Thing::Node(name) => add(NamedElement::Node(name.clone()), *line),
+            Thing::Topic(name) => add(NamedElement::Topic(name.clone()), *line),
             Thing::Group => {}
         }
     }
@@ -57,10 +57,10 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         let thing = |id: &String| things.get(id).map(|(_, thing)| thing);
         match (thing(&from), thing(&to)) {
             (Some(Thing::Node(node)), Some(Thing::Topic(topic))) => {
-                add(Element::Publish(node.clone(), topic.clone()), line);
+                add(NamedElement::Publish(node.clone(), topic.clone()), line);
             }
             (Some(Thing::Topic(topic)), Some(Thing::Node(node))) => {
-                add(Element::Subscribe(node.clone(), topic.clone()), line);
+                add(NamedElement::Subscribe(node.clone(), topic.clone()), line);
             }
             (Some(Thing::Node(a)), Some(Thing::Node(b))) => {
                 // Nodes only: the topic is the first line of the label.
@@ -68,8 +68,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
                     .get("label")
                     .map_or("", |l| l.split("\\n").next().unwrap_or(""));
                 if label.starts_with('/') {
-                    add(Element::Publish(a.clone(), label.to_owned()), line);
-                    add(Element::Subscribe(b.clone(), label.to_owned()), line);
+                    add(NamedElement::Publish(a.clone(), label.to_owned()), line);
+                    add(NamedElement::Subscribe(b.clone(), label.to_owned()), line);
                 }
             }
             _ => {}
@@ -85,7 +85,7 @@ type Statements = (
 );
 
 /// The statements of all graphs and subgraphs.
-fn statements(tokens: &[Token]) -> Statements {
+fn statements(tokens: &[DotToken]) -> Statements {
     let mut things = BTreeMap::new();
     let mut edges = Vec::new();
     let mut at = 0;
@@ -134,7 +134,7 @@ fn statements(tokens: &[Token]) -> Statements {
 }
 
 /// The attributes in brackets at `at`, if there are any.
-fn attributes(tokens: &[Token], at: &mut usize) -> Attributes {
+fn attributes(tokens: &[DotToken], at: &mut usize) -> Attributes {
     let mut all = Attributes::new();
     while tokens.get(*at).is_some_and(|t| t.text == "[" && !t.word) {
         *at += 1;
@@ -178,7 +178,7 @@ fn decoded(id: &str) -> String {
 }
 
 /// The words and signs of a text; the line of a string that never ends as an error.
-fn tokens(text: &str) -> Result<Vec<Token>, usize> {
+fn tokens(text: &str) -> Result<Vec<DotToken>, usize> {
     let mut tokens = Vec::new();
     let mut line = 1;
     let mut rest = text;
@@ -206,7 +206,7 @@ fn tokens(text: &str) -> Result<Vec<Token>, usize> {
                 (len, Some((rest[..len].to_owned(), true)))
             }
         };
-        tokens.extend(token.map(|(text, word)| Token { line, text, word }));
+        tokens.extend(token.map(|(text, word)| DotToken { line, text, word }));
         line += rest[..length].matches('\n').count();
         rest = &rest[length..];
     }
@@ -238,7 +238,7 @@ fn quoted(text: &str) -> Option<(usize, String)> {
 mod tests {
     use super::*;
 
-    fn elements(text: &str) -> Vec<Element> {
+    fn elements(text: &str) -> Vec<NamedElement> {
         let mut topology = read(Path::new("g.dot"), text).unwrap();
         topology.entries.sort();
         topology.entries.into_iter().map(|e| e.element).collect()
@@ -253,11 +253,11 @@ mod tests {
         assert_eq!(
             elements(text),
             [
-                Element::Node("/c".into()),
-                Element::Node("/x/a".into()),
-                Element::Topic("/b".into()),
-                Element::Publish("/x/a".into(), "/b".into()),
-                Element::Subscribe("/c".into(), "/b".into()),
+                NamedElement::Node("/c".into()),
+                NamedElement::Node("/x/a".into()),
+                NamedElement::Topic("/b".into()),
+                NamedElement::Publish("/x/a".into(), "/b".into()),
+                NamedElement::Subscribe("/c".into(), "/b".into()),
             ]
         );
     }
@@ -265,13 +265,13 @@ mod tests {
     #[test]
     fn an_edge_between_nodes_names_its_topic() {
         let text = r#"digraph { a [label="/a"]; b [label="/b"]; a -> b [label="/t\n5 Hz"]; }"#;
-        assert!(elements(text).contains(&Element::Publish("/a".into(), "/t".into())));
+        assert!(elements(text).contains(&NamedElement::Publish("/a".into(), "/t".into())));
     }
 
     #[test]
     fn escaped_names_are_decoded() {
         assert_eq!(decoded("n___robot1__nav"), "/robot1/nav");
-        assert!(elements("digraph { t___scan }").contains(&Element::Topic("/scan".into())));
+        assert!(elements("digraph { t___scan }").contains(&NamedElement::Topic("/scan".into())));
     }
 
     #[test]

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::substitution::{Place, is_true};
+use super::substitution::{SubstitutionContext, is_true};
 use super::tree::{self, Tree};
-use super::{Element, Entry, Topology, place, python, resolved, unused};
+use super::{NamedElement, Topology, TopologyEntry, place, python, resolved, unused};
 use crate::base::budget::LaunchWork;
 use crate::base::error::Result;
 
@@ -170,7 +170,7 @@ impl Launch {
     /// An attribute with its substitutions put in; `None` if it is missing or only known when the file runs.
     fn value(&mut self, path: &Path, tree: &Tree, scope: &Scope, name: &str) -> Option<String> {
         let arguments = &scope.arguments;
-        Place { path, arguments }.substitute(tree.get(name)?, &mut self.budget)
+        SubstitutionContext { path, arguments }.substitute(tree.get(name)?, &mut self.budget)
     }
 
     /// Whether the conditions on an element are met.
@@ -254,14 +254,14 @@ impl Launch {
             return;
         };
         let full = join(&node.namespace, name);
-        self.add(path, tree, Element::Node(full.clone()));
+        self.add(path, tree, NamedElement::Node(full.clone()));
         for (_, to) in &node.remaps {
             // `~x` lies below the node, a plain name in its namespace.
             let topic = match to.strip_prefix('~') {
                 Some(private) => join(&full, private.trim_start_matches('/')),
                 None => join(&node.namespace, to),
             };
-            self.add(path, tree, Element::Topic(topic));
+            self.add(path, tree, NamedElement::Topic(topic));
         }
     }
 
@@ -280,8 +280,8 @@ impl Launch {
         all
     }
 
-    fn add(&mut self, path: &Path, tree: &Tree, element: Element) {
-        self.topology.entries.push(Entry {
+    fn add(&mut self, path: &Path, tree: &Tree, element: NamedElement) {
+        self.topology.entries.push(TopologyEntry {
             element,
             from_ns: None,
             to_ns: None,
@@ -383,7 +383,7 @@ pub(crate) fn join(space: &str, name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn elements(text: &str) -> Vec<Element> {
+    fn elements(text: &str) -> Vec<NamedElement> {
         let path = Path::new("robot.launch");
         let tree = if text.starts_with('<') {
             tree::of_xml(path, text).unwrap()
@@ -406,9 +406,9 @@ mod tests {
         assert_eq!(
             elements(text),
             [
-                Element::Node("/r1/lidar".into()),
-                Element::Topic("/r1/front/scan".into()),
-                Element::Node("/maps/map".into()),
+                NamedElement::Node("/r1/lidar".into()),
+                NamedElement::Topic("/r1/front/scan".into()),
+                NamedElement::Node("/maps/map".into()),
             ]
         );
     }
@@ -421,9 +421,9 @@ mod tests {
         let yaml = "launch:\n- let: {name: ns, value: r2}\n- group:\n  - push_ros_namespace: {namespace: $(var ns)}\n  \
                     - node: {pkg: a, exec: b, name: nav, remap: [{from: plan, to: /plan}]}\n- node: {pkg: a, exec: b, name: top}\n";
         let expected = [
-            Element::Node("/r2/nav".into()),
-            Element::Topic("/plan".into()),
-            Element::Node("/top".into()),
+            NamedElement::Node("/r2/nav".into()),
+            NamedElement::Topic("/plan".into()),
+            NamedElement::Node("/top".into()),
         ];
         assert_eq!(elements(xml), expected);
         assert_eq!(elements(yaml), expected);
@@ -441,7 +441,10 @@ mod tests {
         let path = launch.join("outer.launch");
         std::fs::write(&path, outer).unwrap();
         let topology = crate::evidence::topology::read(&path).unwrap();
-        assert_eq!(topology.entries[0].element, Element::Node("/r1/y".into()));
+        assert_eq!(
+            topology.entries[0].element,
+            NamedElement::Node("/r1/y".into())
+        );
         assert_eq!(topology.notices.len(), 1);
     }
 

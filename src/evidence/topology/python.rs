@@ -15,7 +15,7 @@ use super::tree::Tree;
 use crate::base::error::Result;
 use crate::evidence::syntax::{Language, Parsed};
 use evaluator::Evaluator;
-use value::Value;
+use value::PythonValue;
 
 /// The tag of something that only running the file would tell.
 pub(super) const UNREAD: &str = "unread";
@@ -53,16 +53,16 @@ pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
 pub(super) fn evaluate(expression: &str, names: &BTreeMap<String, String>) -> Option<String> {
     match value(expression, names)? {
         // XML puts quotes around the whole expression.
-        Value::Text(text) => match value(&text, names) {
-            Some(Value::Bool(is_true)) => Some(word(is_true)),
+        PythonValue::Text(text) => match value(&text, names) {
+            Some(PythonValue::Bool(is_true)) => Some(word(is_true)),
             _ => Some(text).filter(|text| !text.contains("$(")),
         },
-        Value::Bool(is_true) => Some(word(is_true)),
+        PythonValue::Bool(is_true) => Some(word(is_true)),
         other => other.text(),
     }
 }
 
-fn value(expression: &str, names: &BTreeMap<String, String>) -> Option<Value> {
+fn value(expression: &str, names: &BTreeMap<String, String>) -> Option<PythonValue> {
     let parsed = Parsed::new(Language::Python, format!("({expression})"))?;
     let texts = names
         .iter()

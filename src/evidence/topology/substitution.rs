@@ -13,12 +13,12 @@ pub(super) const LONGEST: usize = 64 << 10;
 const DEEPEST: usize = 16;
 
 /// Where a text stands: what its substitutions may refer to.
-pub(super) struct Place<'a> {
+pub(super) struct SubstitutionContext<'a> {
     pub(super) path: &'a Path,
     pub(super) arguments: &'a BTreeMap<String, String>,
 }
 
-impl Place<'_> {
+impl SubstitutionContext<'_> {
     /// The text with everything put in; `None` if a part of it is only known when the file runs, or it grows too long.
     pub(super) fn substitute(&self, text: &str, budget: &mut LaunchWork) -> Option<String> {
         self.at_depth(text, budget, 0)
@@ -142,7 +142,7 @@ mod tests {
     fn substituted(text: &str) -> Option<String> {
         let arguments = [("robot", "r1"), ("sim", "true"), ("which", "robot")];
         let arguments = arguments.map(|(a, b)| (a.to_owned(), b.to_owned())).into();
-        let place = Place {
+        let place = SubstitutionContext {
             path: Path::new("x.launch"),
             arguments: &arguments,
         };

@@ -43,7 +43,7 @@ pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
         let line = usize::try_from(error.pos().row).unwrap_or(0);
         bad(path, line, error.to_string(), XML_HINT)
     })?;
-    let file = Xml {
+    let file = XmlLaunch {
         path,
         lines: text.match_indices('\n').map(|(at, _)| at).collect(),
     };
@@ -55,13 +55,13 @@ pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
     file.element(root, 0)
 }
 
-struct Xml<'a> {
+struct XmlLaunch<'a> {
     path: &'a Path,
     /// Where lines end, in bytes.
     lines: Vec<usize>,
 }
 
-impl Xml<'_> {
+impl XmlLaunch<'_> {
     fn line(&self, node: Node<'_, '_>) -> usize {
         self.lines.partition_point(|end| *end < node.range().start) + 1
     }

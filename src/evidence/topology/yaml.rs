@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{Element, Entry, Topology, bad, place, resolved};
+use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
 use crate::base::error::{Error, Result};
 use crate::base::yaml;
 
@@ -14,7 +14,7 @@ const HINT: &str =
     "write `nodes:`, then below it `/name: {publishes: [/a], subscribes: [/b], start: 0, end: 60}`";
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
-    let file = File::new(path, text);
+    let file = TopologyYaml::new(path, text);
     let data = yaml::parse(text).map_err(|e| bad(path, e.line, e.reason, HINT))?;
     let Some(Value::Object(nodes)) = data.get("nodes") else {
         return Err(file.wrong("nodes", "there is no mapping `nodes`"));
@@ -29,13 +29,13 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
 /// How many lines that begin alike are looked at for the first of them.
 const MOST_ALIKE: usize = 100;
 
-struct File<'a> {
+struct TopologyYaml<'a> {
     path: &'a Path,
     /// The start of every line, behind blanks, dashes and quotes, with the first line that has it, 1...
     lines: BTreeMap<&'a str, usize>,
 }
 
-impl<'a> File<'a> {
+impl<'a> TopologyYaml<'a> {
     fn new(path: &'a Path, text: &'a str) -> Self {
         let mut lines = BTreeMap::new();
         for (number, line) in (1..).zip(text.lines()) {
@@ -60,7 +60,7 @@ impl<'a> File<'a> {
         own.map(|(_, number)| *number).min().unwrap_or(0)
     }
 
-    fn node(&self, name: &str, value: &Value) -> Result<Vec<Entry>> {
+    fn node(&self, name: &str, value: &Value) -> Result<Vec<TopologyEntry>> {
         let empty = serde_json::Map::new();
         let fields = match value {
             Value::Null => &empty,
@@ -82,19 +82,19 @@ impl<'a> File<'a> {
             return Err(self.wrong(name, &reason));
         }
         let node = resolved(name);
-        let entry = |element| Entry {
+        let entry = |element| TopologyEntry {
             element,
             from_ns,
             to_ns,
             declared: false,
             place: place(self.path, self.line(name)),
         };
-        let mut entries = vec![entry(Element::Node(node.clone()))];
+        let mut entries = vec![entry(NamedElement::Node(node.clone()))];
         for topic in self.names(fields.get("publishes"), name)? {
-            entries.push(entry(Element::Publish(node.clone(), topic)));
+            entries.push(entry(NamedElement::Publish(node.clone(), topic)));
         }
         for topic in self.names(fields.get("subscribes"), name)? {
-            entries.push(entry(Element::Subscribe(node.clone(), topic)));
+            entries.push(entry(NamedElement::Subscribe(node.clone(), topic)));
         }
         Ok(entries)
     }
@@ -140,12 +140,12 @@ mod tests {
         let text = "nodes:\n  /planner:\n    publishes: [plan]\n    subscribes: /map\n    start: 2.5\n  /idle:\n";
         let entries = read(Path::new("t.yaml"), text).unwrap().entries;
         let elements: Vec<_> = entries.iter().map(|e| e.element.clone()).collect();
-        assert!(elements.contains(&Element::Publish("/planner".into(), "/plan".into())));
-        assert!(elements.contains(&Element::Subscribe("/planner".into(), "/map".into())));
-        assert!(elements.contains(&Element::Node("/idle".into())));
+        assert!(elements.contains(&NamedElement::Publish("/planner".into(), "/plan".into())));
+        assert!(elements.contains(&NamedElement::Subscribe("/planner".into(), "/map".into())));
+        assert!(elements.contains(&NamedElement::Node("/idle".into())));
         let planner = entries
             .iter()
-            .find(|e| e.element == Element::Node("/planner".into()));
+            .find(|e| e.element == NamedElement::Node("/planner".into()));
         assert_eq!(planner.unwrap().from_ns, Some(2_500_000_000));
     }
 

@@ -7,7 +7,7 @@ use std::io::Write as _;
 use flate2::{Compression, write::DeflateEncoder};
 use serde::Serialize;
 
-use super::Page;
+use super::HtmlPage;
 use crate::base::digest;
 use crate::base::geometry::Rect;
 use crate::base::time::Stamp;
@@ -23,7 +23,7 @@ use crate::view::{Arrow, Frame, View};
 const LONG: usize = 1_000_000;
 
 #[derive(Serialize)]
-struct Data<'a> {
+struct PageData<'a> {
     /// Per item.
     names: Vec<String>,
     /// Per item: x, y, width, height.
@@ -48,7 +48,7 @@ struct Data<'a> {
 }
 
 /// The data as JSON that is safe between the tags of a page.
-pub(super) fn json(page: &Page<'_>, runs: &Runs) -> String {
+pub(super) fn json(page: &HtmlPage<'_>, runs: &Runs) -> String {
     let (view, order) = (page.view, &page.union.order);
     let start = view.frames.first().map_or(Stamp(0), |f| f.span.start);
     let secs = |at: Stamp| libm::round(at.since(start) as f64 / 1e6) / 1e3;
@@ -67,7 +67,7 @@ pub(super) fn json(page: &Page<'_>, runs: &Runs) -> String {
         ));
     }
     let ends = |arrow: &Arrow| [arrow.from, arrow.to];
-    let data = Data {
+    let data = PageData {
         names: view
             .items
             .iter()
@@ -154,7 +154,7 @@ impl Words {
 const MOST_MEMBERS: usize = 12;
 
 fn facts_of(
-    page: &Page<'_>,
+    page: &HtmlPage<'_>,
     members: &[Element],
     start: Stamp,
     is_item: bool,

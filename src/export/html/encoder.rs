@@ -3,7 +3,7 @@
 use crate::base::error::Result;
 use crate::draw::picture::Union;
 use crate::draw::style::{BUILTIN, Style};
-use crate::export::html::Page;
+use crate::export::html::HtmlPage;
 use crate::export::sequence::Sequence;
 use crate::export::target::Target;
 use crate::export::{AtOnce, Encoder};
@@ -24,7 +24,7 @@ pub(crate) fn start<'a>(
         // Whoever chose a style gets it always; the default one has a dark side.
         let chosen = whole.as_ref().map_or(&style, |w| w.style);
         let dark = Style::builtin("dark").ok().filter(|_| *chosen == style);
-        let page = Page {
+        let page = HtmlPage {
             mission: sequence.mission,
             view: sequence.view,
             union: whole.as_ref().map_or(&nothing, |w| &w.union),

@@ -6,7 +6,7 @@ use crate::base::error::Result;
 use crate::draw::style::Style;
 use crate::export::mermaid::chart;
 use crate::export::sequence::Sequence;
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::export::{Encoder, Written};
 use crate::view::union::union;
@@ -35,7 +35,7 @@ impl Encoder for Charts<'_> {
         let mut written = Written::to(&self.target);
         let frames = &self.view.frames;
         let mut write = |target: &Target, frame: &view::Frame| -> Result<()> {
-            let mut sink = Sink::create(target, None)?;
+            let mut sink = OutputSink::create(target, None)?;
             let text = chart(self.view, &self.style, frame);
             sink.write_all(text.as_bytes()).map_err(sink.error())?;
             written.add(sink.commit()?);

@@ -46,13 +46,13 @@ pub(super) fn folded(summary: &str, inside: &str) -> String {
 
 /// In how many windows each was, and the sum of its rates there.
 #[derive(Clone, Copy, Default)]
-struct Presence {
+struct WindowsOf {
     windows: usize,
     hz: f64,
     rated: usize,
 }
 
-impl Presence {
+impl WindowsOf {
     fn add(&mut self, hz: Option<f64>) {
         self.windows += 1;
         if let Some(hz) = hz {
@@ -84,7 +84,7 @@ fn words(evidence: Evidence) -> String {
 /// Every node of the mission.
 pub(super) fn nodes(mission: &Mission, most: usize) -> String {
     let elements = &mission.elements;
-    let mut presence = vec![Presence::default(); elements.nodes.len()];
+    let mut presence = vec![WindowsOf::default(); elements.nodes.len()];
     for state in mission.graphs.iter().flat_map(|graph| graph.nodes) {
         if let Some(one) = presence.get_mut(state.id as usize) {
             one.add(state.hz);
@@ -108,7 +108,7 @@ pub(super) fn nodes(mission: &Mission, most: usize) -> String {
 /// Every topic of the mission.
 pub(super) fn topics(mission: &Mission, most: usize) -> String {
     let elements = &mission.elements;
-    let mut presence = vec![(Presence::default(), 0_u64); elements.topics.len()];
+    let mut presence = vec![(WindowsOf::default(), 0_u64); elements.topics.len()];
     for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
         if let Some((one, messages)) = presence.get_mut(state.id as usize) {
             one.add(state.hz);

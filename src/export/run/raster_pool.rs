@@ -7,13 +7,13 @@ use std::thread;
 
 use rayon::prelude::*;
 
-use super::steps::{Step, Steps};
+use super::steps::{RunStep, Steps};
 use crate::base::error::Result;
 use crate::draw::paint::raster::{Canvas, Pixels};
 use crate::draw::scene::Scene;
 use crate::export::palette::{Census, Matcher, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
-use crate::export::{Frame, Needs, Pack, Packet};
+use crate::export::{DrawnFrame, Needs, Pack, Packet};
 
 /// At most this many bytes of packets wait to be written.
 const MOST_BYTES: f64 = 48e6;
@@ -27,7 +27,7 @@ const SAMPLES: usize = 12;
 
 /// What an output wants of every frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Want {
+pub(crate) struct FrameWant {
     pub(crate) needs: Needs,
     /// Whether it wants staged frames too.
     pub(crate) plays: bool,
@@ -48,7 +48,7 @@ pub(crate) struct Packed {
 pub(crate) struct RasterPool<'a> {
     sequence: &'a Sequence<'a>,
     frame_times: &'a [FrameTime],
-    wants: &'a [Want],
+    wants: &'a [FrameWant],
     needs: Needs,
     palette: Palette,
     steps: &'a Steps,
@@ -59,7 +59,7 @@ impl<'a> RasterPool<'a> {
     pub(crate) fn new(
         sequence: &'a Sequence<'a>,
         frame_times: &'a [FrameTime],
-        wants: &'a [Want],
+        wants: &'a [FrameWant],
         steps: &'a Steps,
     ) -> Result<Self> {
         let needs = wants.iter().map(|want| want.needs).max();
@@ -163,15 +163,15 @@ impl<'a> RasterPool<'a> {
             let mut census = Census::default();
             for at in places {
                 let scene = self.scene(self.frame_times[*at]);
-                let pixels = self.steps.time(Step::Paint, || canvas.draw(scene))?;
+                let pixels = self.steps.time(RunStep::Paint, || canvas.draw(scene))?;
                 self.steps
-                    .time(Step::Colours, || census.count(&pixels.rgba));
+                    .time(RunStep::Colours, || census.count(&pixels.rgba));
             }
             Ok(census)
         };
         let counted = sample.par_chunks(each).map(count);
         let census = counted.try_reduce(Census::default, |a, b| Ok(a.and(b)))?;
-        Ok(self.steps.time(Step::Colours, || census.palette(255)))
+        Ok(self.steps.time(RunStep::Colours, || census.palette(255)))
     }
 }
 
@@ -209,14 +209,14 @@ impl<'a> Artist<'a> {
         row.map(|at| self.frame(at, self.pool.wants)).collect()
     }
 
-    fn frame(&mut self, at: usize, wants: &[Want]) -> Result<Packed> {
+    fn frame(&mut self, at: usize, wants: &[FrameWant]) -> Result<Packed> {
         let (steps, needs) = (self.pool.steps, self.pool.needs);
         let frame_time = self.pool.frame_times[at];
-        let scene = steps.time(Step::Compose, || self.pool.scene(frame_time));
+        let scene = steps.time(RunStep::Compose, || self.pool.scene(frame_time));
         let nothing = NOTHING;
         let pixels = if needs >= Needs::Pixels {
             let scene = scene.clone();
-            steps.time(Step::Paint, || self.canvas.draw(scene))?;
+            steps.time(RunStep::Paint, || self.canvas.draw(scene))?;
             self.canvas.pixels().unwrap_or(&nothing)
         } else {
             &nothing
@@ -225,7 +225,7 @@ impl<'a> Artist<'a> {
             std::mem::swap(&mut self.before, &mut self.indices);
             self.indices.clone_from(&self.before);
             self.indices.resize(pixels.rgba.len() / 4, 0);
-            steps.time(Step::Colours, || {
+            steps.time(RunStep::Colours, || {
                 for bytes in self.canvas.changed() {
                     let places = bytes.start / 4..bytes.end / 4;
                     self.matcher
@@ -234,7 +234,7 @@ impl<'a> Artist<'a> {
             });
         }
         self.at = Some(at);
-        let frame = Frame {
+        let frame = DrawnFrame {
             time: frame_time,
             scene: &scene,
             pixels,
@@ -242,7 +242,7 @@ impl<'a> Artist<'a> {
             indices: &self.indices,
             before: if at == 0 { &[] } else { &self.before },
         };
-        let pack = |want: &Want| {
+        let pack = |want: &FrameWant| {
             let is_wanted = frame_time.is_settled() || want.plays;
             match want.needs {
                 Needs::Nothing => Ok(Packet::Nothing),
@@ -254,7 +254,7 @@ impl<'a> Artist<'a> {
         Ok(Packed {
             frame_time,
             size: (pixels.width, pixels.height),
-            packets: steps.time(Step::Compress, packets)?,
+            packets: steps.time(RunStep::Compress, packets)?,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Progress, Steps, pass};
 use crate::base::error::{Error, Result};
-use crate::export::sequence::{Options, Sequence};
+use crate::export::sequence::{Sequence, SequenceOptions};
 use crate::export::{Output, Written};
 
 /// Sizes that are tried while all windows are shown.
@@ -43,12 +43,12 @@ pub(crate) fn fit(
 }
 
 /// What is tried, in order.
-fn steps(asked: &Options) -> Vec<Options> {
-    let plain = Options {
+fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
+    let plain = SequenceOptions {
         tween: 0,
         ..asked.clone()
     };
-    let scaled = |by: f64| Options {
+    let scaled = |by: f64| SequenceOptions {
         scale: asked.scale * by,
         ..plain.clone()
     };
@@ -58,11 +58,11 @@ fn steps(asked: &Options) -> Vec<Options> {
     }
     steps.extend(SCALES.map(scaled));
     let smallest = scaled(SCALES[SCALES.len() - 1]);
-    steps.extend(EVERY.map(|every| Options {
+    steps.extend(EVERY.map(|every| SequenceOptions {
         every,
         ..smallest.clone()
     }));
-    steps.extend(LAST_SCALES.map(|by| Options {
+    steps.extend(LAST_SCALES.map(|by| SequenceOptions {
         changes_only: true,
         ..scaled(by)
     }));
@@ -70,7 +70,7 @@ fn steps(asked: &Options) -> Vec<Options> {
 }
 
 /// What `now` lacks of `asked`, in words.
-fn given_up(asked: &Options, now: &Options) -> String {
+fn given_up(asked: &SequenceOptions, now: &SequenceOptions) -> String {
     let mut words = Vec::new();
     if now.tween < asked.tween {
         words.push("left out the staged frames".to_owned());
@@ -99,10 +99,10 @@ mod tests {
 
     #[test]
     fn motion_goes_first_then_size_then_windows() {
-        let asked = Options {
+        let asked = SequenceOptions {
             tween: 4,
             max_bytes: Some(5000),
-            ..Options::default()
+            ..SequenceOptions::default()
         };
         let steps = steps(&asked);
         assert_eq!(
@@ -117,12 +117,12 @@ mod tests {
 
     #[test]
     fn what_was_given_up_is_said() {
-        let asked = Options {
+        let asked = SequenceOptions {
             tween: 4,
             max_bytes: Some(5000),
-            ..Options::default()
+            ..SequenceOptions::default()
         };
-        let now = Options {
+        let now = SequenceOptions {
             tween: 0,
             scale: 0.7,
             ..asked.clone()

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 /// A step from a window to written bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum RunStep {
     /// The drawing of a window is put together.
     Compose,
     /// It is turned into pixels.
@@ -18,7 +18,7 @@ pub(crate) enum Step {
     Write,
 }
 
-impl Step {
+impl RunStep {
     /// Every step, in order.
     const ALL: [Self; 5] = [
         Self::Compose,
@@ -42,11 +42,11 @@ impl Step {
 
 /// The nanoseconds that each step took.
 #[derive(Debug, Default)]
-pub struct Steps([AtomicU64; Step::ALL.len()]);
+pub struct Steps([AtomicU64; RunStep::ALL.len()]);
 
 impl Steps {
     /// Does the work and counts its time.
-    pub(crate) fn time<T>(&self, step: Step, work: impl FnOnce() -> T) -> T {
+    pub(crate) fn time<T>(&self, step: RunStep, work: impl FnOnce() -> T) -> T {
         let begun = Instant::now();
         let done = work();
         let spent = u64::try_from(begun.elapsed().as_nanos()).unwrap_or(u64::MAX);
@@ -56,10 +56,10 @@ impl Steps {
 
     /// The word of each step and its share of all of them, 0..=1, the largest first; empty if no time was spent.
     pub fn shares(&self) -> Vec<(&'static str, f64)> {
-        let spent = |step: &Step| self.0[*step as usize].load(Ordering::Relaxed);
-        let all: u64 = Step::ALL.iter().map(spent).sum();
-        let share = |step: &Step| (step.word(), spent(step) as f64 / all as f64);
-        let mut shares: Vec<_> = Step::ALL.iter().map(share).collect();
+        let spent = |step: &RunStep| self.0[*step as usize].load(Ordering::Relaxed);
+        let all: u64 = RunStep::ALL.iter().map(spent).sum();
+        let share = |step: &RunStep| (step.word(), spent(step) as f64 / all as f64);
+        let mut shares: Vec<_> = RunStep::ALL.iter().map(share).collect();
         shares.retain(|(_, share)| *share > 0.0);
         shares.sort_by(|a, b| b.1.total_cmp(&a.1));
         shares
@@ -76,8 +76,8 @@ mod tests {
     fn the_largest_step_comes_first_and_all_are_one() {
         let steps = Steps::default();
         assert!(steps.shares().is_empty());
-        steps.time(Step::Paint, || sleep(Duration::from_millis(1)));
-        steps.time(Step::Write, || sleep(Duration::from_millis(30)));
+        steps.time(RunStep::Paint, || sleep(Duration::from_millis(1)));
+        steps.time(RunStep::Write, || sleep(Duration::from_millis(30)));
         let shares = steps.shares();
         assert_eq!(shares[0].0, "writing");
         let sum: f64 = shares.iter().map(|s| s.1).sum();

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::runs;
-use crate::base::table::{Cell, Kind};
+use crate::base::table::{ColumnKind, TableCell};
 use crate::base::time::Stamp;
 use crate::evidence::Evidence;
 use crate::graph::diff::Change;
@@ -12,22 +12,22 @@ use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Mission, Window};
 
 /// Takes a row.
-pub(super) type Row<'a> = &'a mut dyn FnMut(&[Cell<'_>]);
+pub(super) type Row<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
 
 /// A table: its word in the file's name, its columns, and what fills it.
 pub(super) struct Table {
     pub(super) word: &'static str,
-    pub(super) columns: &'static [(&'static str, Kind)],
+    pub(super) columns: &'static [(&'static str, ColumnKind)],
     pub(super) fill: fn(&Mission, Row<'_>),
     /// The same by runs of equal windows, where it is about windows.
     pub(super) fill_runs: Option<fn(&Mission, Row<'_>)>,
 }
 
 /// The first columns of every table about windows.
-const WIN: (&str, Kind) = ("win", Kind::I64);
-const START: (&str, Kind) = ("start_ns", Kind::Time);
-const END: (&str, Kind) = ("end_ns", Kind::Time);
-const LENGTH: (&str, Kind) = ("length_ns", Kind::I64);
+const WIN: (&str, ColumnKind) = ("win", ColumnKind::I64);
+const START: (&str, ColumnKind) = ("start_ns", ColumnKind::Time);
+const END: (&str, ColumnKind) = ("end_ns", ColumnKind::Time);
+const LENGTH: (&str, ColumnKind) = ("length_ns", ColumnKind::I64);
 
 /// All tables of a mission.
 pub(super) const TABLES: &[Table] = &[
@@ -38,16 +38,16 @@ pub(super) const TABLES: &[Table] = &[
             START,
             END,
             LENGTH,
-            ("what", Kind::Text),
-            ("node", Kind::Text),
-            ("topic", Kind::Text),
-            ("state", Kind::Text),
-            ("degree", Kind::Text),
-            ("evidence", Kind::Text),
-            ("n", Kind::I64),
-            ("hz", Kind::F64),
-            ("first_ns", Kind::Time),
-            ("last_ns", Kind::Time),
+            ("what", ColumnKind::Text),
+            ("node", ColumnKind::Text),
+            ("topic", ColumnKind::Text),
+            ("state", ColumnKind::Text),
+            ("degree", ColumnKind::Text),
+            ("evidence", ColumnKind::Text),
+            ("n", ColumnKind::I64),
+            ("hz", ColumnKind::F64),
+            ("first_ns", ColumnKind::Time),
+            ("last_ns", ColumnKind::Time),
         ],
         fill: edges,
         fill_runs: Some(runs::edges),
@@ -59,19 +59,19 @@ pub(super) const TABLES: &[Table] = &[
             START,
             END,
             LENGTH,
-            ("topic", Kind::Text),
-            ("types", Kind::Text),
-            ("state", Kind::Text),
-            ("degree", Kind::Text),
-            ("evidence", Kind::Text),
-            ("n", Kind::I64),
-            ("bytes", Kind::I64),
-            ("hz", Kind::F64),
-            ("median_period_s", Kind::F64),
-            ("max_gap_s", Kind::F64),
-            ("qos", Kind::Text),
-            ("first_ns", Kind::Time),
-            ("last_ns", Kind::Time),
+            ("topic", ColumnKind::Text),
+            ("types", ColumnKind::Text),
+            ("state", ColumnKind::Text),
+            ("degree", ColumnKind::Text),
+            ("evidence", ColumnKind::Text),
+            ("n", ColumnKind::I64),
+            ("bytes", ColumnKind::I64),
+            ("hz", ColumnKind::F64),
+            ("median_period_s", ColumnKind::F64),
+            ("max_gap_s", ColumnKind::F64),
+            ("qos", ColumnKind::Text),
+            ("first_ns", ColumnKind::Time),
+            ("last_ns", ColumnKind::Time),
         ],
         fill: topics,
         fill_runs: Some(runs::topics),
@@ -83,15 +83,15 @@ pub(super) const TABLES: &[Table] = &[
             START,
             END,
             LENGTH,
-            ("node", Kind::Text),
-            ("node_role", Kind::Text),
-            ("state", Kind::Text),
-            ("degree", Kind::Text),
-            ("evidence", Kind::Text),
-            ("hz", Kind::F64),
-            ("lifecycle", Kind::Text),
-            ("first_ns", Kind::Time),
-            ("last_ns", Kind::Time),
+            ("node", ColumnKind::Text),
+            ("node_role", ColumnKind::Text),
+            ("state", ColumnKind::Text),
+            ("degree", ColumnKind::Text),
+            ("evidence", ColumnKind::Text),
+            ("hz", ColumnKind::F64),
+            ("lifecycle", ColumnKind::Text),
+            ("first_ns", ColumnKind::Time),
+            ("last_ns", ColumnKind::Time),
         ],
         fill: nodes,
         fill_runs: Some(runs::nodes),
@@ -103,15 +103,15 @@ pub(super) const TABLES: &[Table] = &[
             START,
             END,
             LENGTH,
-            ("kind", Kind::Text),
-            ("what", Kind::Text),
-            ("node", Kind::Text),
-            ("topic", Kind::Text),
-            ("time_ns", Kind::Time),
-            ("from_hz", Kind::F64),
-            ("to_hz", Kind::F64),
-            ("from_value", Kind::Text),
-            ("to_value", Kind::Text),
+            ("kind", ColumnKind::Text),
+            ("what", ColumnKind::Text),
+            ("node", ColumnKind::Text),
+            ("topic", ColumnKind::Text),
+            ("time_ns", ColumnKind::Time),
+            ("from_hz", ColumnKind::F64),
+            ("to_hz", ColumnKind::F64),
+            ("from_value", ColumnKind::Text),
+            ("to_value", ColumnKind::Text),
         ],
         fill: changes,
         fill_runs: None,
@@ -119,24 +119,24 @@ pub(super) const TABLES: &[Table] = &[
     Table {
         word: "ledger",
         columns: &[
-            ("entry", Kind::I64),
-            ("kind", Kind::Text),
-            ("what", Kind::Text),
-            ("node", Kind::Text),
-            ("topic", Kind::Text),
-            ("time_ns", Kind::Time),
-            ("earliest_ns", Kind::Time),
-            ("latest_ns", Kind::Time),
-            ("until_ns", Kind::Time),
-            ("from_hz", Kind::F64),
-            ("to_hz", Kind::F64),
-            ("from_value", Kind::Text),
-            ("to_value", Kind::Text),
-            ("degree", Kind::Text),
-            ("evidence", Kind::Text),
-            ("part_of", Kind::I64),
-            ("is_quiet", Kind::Flag),
-            ("weight", Kind::I64),
+            ("entry", ColumnKind::I64),
+            ("kind", ColumnKind::Text),
+            ("what", ColumnKind::Text),
+            ("node", ColumnKind::Text),
+            ("topic", ColumnKind::Text),
+            ("time_ns", ColumnKind::Time),
+            ("earliest_ns", ColumnKind::Time),
+            ("latest_ns", ColumnKind::Time),
+            ("until_ns", ColumnKind::Time),
+            ("from_hz", ColumnKind::F64),
+            ("to_hz", ColumnKind::F64),
+            ("from_value", ColumnKind::Text),
+            ("to_value", ColumnKind::Text),
+            ("degree", ColumnKind::Text),
+            ("evidence", ColumnKind::Text),
+            ("part_of", ColumnKind::I64),
+            ("is_quiet", ColumnKind::Flag),
+            ("weight", ColumnKind::I64),
         ],
         fill: ledger,
         fill_runs: None,
@@ -144,14 +144,14 @@ pub(super) const TABLES: &[Table] = &[
     Table {
         word: "phases",
         columns: &[
-            ("phase", Kind::I64),
+            ("phase", ColumnKind::I64),
             START,
             END,
             LENGTH,
-            ("phase_name", Kind::Text),
-            ("nodes_added", Kind::I64),
-            ("nodes_removed", Kind::I64),
-            ("same_as", Kind::I64),
+            ("phase_name", ColumnKind::Text),
+            ("nodes_added", ColumnKind::I64),
+            ("nodes_removed", ColumnKind::I64),
+            ("same_as", ColumnKind::I64),
         ],
         fill: phases,
         fill_runs: None,
@@ -159,13 +159,13 @@ pub(super) const TABLES: &[Table] = &[
     Table {
         word: "bags",
         columns: &[
-            ("bag", Kind::Text),
-            ("bag_format", Kind::Text),
-            ("compression", Kind::Text),
-            ("tier", Kind::Text),
-            ("tier_reason", Kind::Text),
-            ("is_complete", Kind::Flag),
-            ("file_bytes", Kind::I64),
+            ("bag", ColumnKind::Text),
+            ("bag_format", ColumnKind::Text),
+            ("compression", ColumnKind::Text),
+            ("tier", ColumnKind::Text),
+            ("tier_reason", ColumnKind::Text),
+            ("is_complete", ColumnKind::Flag),
+            ("file_bytes", ColumnKind::I64),
         ],
         fill: bags,
         fill_runs: None,
@@ -175,13 +175,13 @@ pub(super) const TABLES: &[Table] = &[
 fn bags(mission: &Mission, row: Row<'_>) {
     for bag in &mission.bags {
         row(&[
-            Cell::text(&bag.name),
-            Cell::text(&bag.format),
-            Cell::text(bag.compression.join(" ")),
-            Cell::text(bag.tier.word()),
+            TableCell::text(&bag.name),
+            TableCell::text(&bag.format),
+            TableCell::text(bag.compression.join(" ")),
+            TableCell::text(bag.tier.word()),
             text(bag.tier_reason.as_deref()),
-            Cell::Flag(bag.complete),
-            Cell::count(bag.file_bytes),
+            TableCell::Flag(bag.complete),
+            TableCell::count(bag.file_bytes),
         ]);
     }
 }
@@ -196,12 +196,12 @@ fn nodes(mission: &Mission, row: Row<'_>) {
                 start.clone(),
                 end.clone(),
                 length.clone(),
-                Cell::text(node.name.as_str()),
-                Cell::text(&*node.role),
-                Cell::text(state.state.word()),
-                Cell::text(state.degree.word()),
+                TableCell::text(node.name.as_str()),
+                TableCell::text(&*node.role),
+                TableCell::text(state.state.word()),
+                TableCell::text(state.degree.word()),
                 words(node.evidence),
-                Cell::known(state.hz, Cell::Float),
+                TableCell::known(state.hz, TableCell::Float),
                 text(state.lifecycle.as_deref()),
                 time(node.first),
                 time(node.last),
@@ -220,16 +220,16 @@ fn topics(mission: &Mission, row: Row<'_>) {
                 start.clone(),
                 end.clone(),
                 length.clone(),
-                Cell::text(topic.name.as_str()),
-                Cell::text(topic.types.join(" ")),
-                Cell::text(state.state.word()),
-                Cell::text(state.degree.word()),
+                TableCell::text(topic.name.as_str()),
+                TableCell::text(topic.types.join(" ")),
+                TableCell::text(state.state.word()),
+                TableCell::text(state.degree.word()),
                 words(topic.evidence),
-                Cell::count(state.count),
-                Cell::known(state.bytes, Cell::count),
-                Cell::known(state.hz, Cell::Float),
-                Cell::known(state.median_period_s, Cell::Float),
-                Cell::known(state.max_gap_s, Cell::Float),
+                TableCell::count(state.count),
+                TableCell::known(state.bytes, TableCell::count),
+                TableCell::known(state.hz, TableCell::Float),
+                TableCell::known(state.median_period_s, TableCell::Float),
+                TableCell::known(state.max_gap_s, TableCell::Float),
                 text(topic.qos.as_deref()),
                 time(topic.first),
                 time(topic.last),
@@ -248,14 +248,14 @@ fn edges(mission: &Mission, row: Row<'_>) {
                 start.clone(),
                 end.clone(),
                 length.clone(),
-                Cell::text(what),
-                Cell::text(elements.nodes[edge.node as usize].name.as_str()),
-                Cell::text(elements.topics[edge.topic as usize].name.as_str()),
-                Cell::text(state.state.word()),
-                Cell::text(state.degree.word()),
+                TableCell::text(what),
+                TableCell::text(elements.nodes[edge.node as usize].name.as_str()),
+                TableCell::text(elements.topics[edge.topic as usize].name.as_str()),
+                TableCell::text(state.state.word()),
+                TableCell::text(state.degree.word()),
                 words(edge.evidence),
-                Cell::known(state.count, Cell::count),
-                Cell::known(state.hz, Cell::Float),
+                TableCell::known(state.count, TableCell::count),
+                TableCell::known(state.hz, TableCell::Float),
                 time(edge.first),
                 time(edge.last),
             ]);
@@ -276,7 +276,7 @@ fn changes(mission: &Mission, row: Row<'_>) {
             let [node, topic] = ends(mission, what);
             let [from_hz, to_hz, from, to] = detail;
             let [win, start, end, length] = cells_of(window);
-            let (kind, what) = (Cell::text(kind), Cell::text(what.word()));
+            let (kind, what) = (TableCell::text(kind), TableCell::text(what.word()));
             row(&[
                 win,
                 start,
@@ -297,21 +297,31 @@ fn changes(mission: &Mission, row: Row<'_>) {
 }
 
 /// What a change says beside its time: `from_hz to_hz from_value to_value`.
-type DetailCells<'a> = [Cell<'a>; 4];
+type DetailCells<'a> = [TableCell<'a>; 4];
 
-const NO_DETAIL: DetailCells<'static> = [Cell::Null, Cell::Null, Cell::Null, Cell::Null];
+const NO_DETAIL: DetailCells<'static> = [
+    TableCell::Null,
+    TableCell::Null,
+    TableCell::Null,
+    TableCell::Null,
+];
 
 fn rates(from_hz: f64, to_hz: f64) -> DetailCells<'static> {
     [
-        Cell::Float(from_hz),
-        Cell::Float(to_hz),
-        Cell::Null,
-        Cell::Null,
+        TableCell::Float(from_hz),
+        TableCell::Float(to_hz),
+        TableCell::Null,
+        TableCell::Null,
     ]
 }
 
 fn values<'a>(from: impl Into<Cow<'a, str>>, to: impl Into<Cow<'a, str>>) -> DetailCells<'a> {
-    [Cell::Null, Cell::Null, Cell::text(from), Cell::text(to)]
+    [
+        TableCell::Null,
+        TableCell::Null,
+        TableCell::text(from),
+        TableCell::text(to),
+    ]
 }
 
 /// The kind of a change, what it is about, when it was, and its detail.
@@ -349,24 +359,24 @@ fn ledger(mission: &Mission, row: Row<'_>) {
         let [node, topic] = ends(mission, entry.what);
         let [from_hz, to_hz, from, to] = detail(mission, entry);
         row(&[
-            Cell::count(id),
-            Cell::text(entry.kind.word()),
-            Cell::text(entry.what.word()),
+            TableCell::count(id),
+            TableCell::text(entry.kind.word()),
+            TableCell::text(entry.what.word()),
             node,
             topic,
-            Cell::Time(entry.time),
-            Cell::Time(entry.earliest),
-            Cell::Time(entry.latest),
+            TableCell::Time(entry.time),
+            TableCell::Time(entry.earliest),
+            TableCell::Time(entry.latest),
             time(entry.until),
             from_hz,
             to_hz,
             from,
             to,
-            Cell::text(entry.degree.word()),
+            TableCell::text(entry.degree.word()),
             words(entry.evidence),
-            Cell::known(entry.part_of, Cell::count),
-            Cell::Flag(entry.quiet),
-            Cell::count(entry.weight),
+            TableCell::known(entry.part_of, TableCell::count),
+            TableCell::Flag(entry.quiet),
+            TableCell::count(entry.weight),
         ]);
     }
 }
@@ -383,14 +393,14 @@ fn detail<'a>(mission: &Mission, entry: &'a Entry) -> DetailCells<'a> {
 fn phases(mission: &Mission, row: Row<'_>) {
     for (at, phase) in mission.ledger.phases.iter().enumerate() {
         row(&[
-            Cell::count(at),
-            Cell::Time(phase.span.start),
-            Cell::Time(phase.span.end),
-            Cell::Int(phase.span.nanos()),
-            Cell::text(&*phase.name),
-            Cell::count(phase.nodes_added),
-            Cell::count(phase.nodes_removed),
-            Cell::known(phase.same_as, Cell::count),
+            TableCell::count(at),
+            TableCell::Time(phase.span.start),
+            TableCell::Time(phase.span.end),
+            TableCell::Int(phase.span.nanos()),
+            TableCell::text(&*phase.name),
+            TableCell::count(phase.nodes_added),
+            TableCell::count(phase.nodes_removed),
+            TableCell::known(phase.same_as, TableCell::count),
         ]);
     }
 }
@@ -401,39 +411,39 @@ fn names(mission: &Mission, nodes: &[NodeId]) -> String {
 }
 
 /// The node and the topic of an element; unknown for the one it does not have.
-fn ends(mission: &Mission, what: Element) -> [Cell<'_>; 2] {
+fn ends(mission: &Mission, what: Element) -> [TableCell<'_>; 2] {
     let elements = &mission.elements;
-    let node = |id: u32| Cell::text(elements.nodes[id as usize].name.as_str());
-    let topic = |id: u32| Cell::text(elements.topics[id as usize].name.as_str());
+    let node = |id: u32| TableCell::text(elements.nodes[id as usize].name.as_str());
+    let topic = |id: u32| TableCell::text(elements.topics[id as usize].name.as_str());
     let both = |edge: &Edge| [node(edge.node), topic(edge.topic)];
     match what {
-        Element::Node(id) => [node(id), Cell::Null],
-        Element::Topic(id) => [Cell::Null, topic(id)],
+        Element::Node(id) => [node(id), TableCell::Null],
+        Element::Topic(id) => [TableCell::Null, topic(id)],
         Element::Publish(id) => both(&elements.publishes[id as usize]),
         Element::Subscribe(id) => both(&elements.subscribes[id as usize]),
     }
 }
 
 /// `win start_ns end_ns length_ns` of a window.
-fn cells_of(window: &Window) -> [Cell<'static>; 4] {
+fn cells_of(window: &Window) -> [TableCell<'static>; 4] {
     let span = window.span;
-    let (start, end) = (Cell::Time(span.start), Cell::Time(span.end));
+    let (start, end) = (TableCell::Time(span.start), TableCell::Time(span.end));
     [
-        Cell::count(window.index),
+        TableCell::count(window.index),
         start,
         end,
-        Cell::Int(span.nanos()),
+        TableCell::Int(span.nanos()),
     ]
 }
 
-pub(super) fn words(evidence: Evidence) -> Cell<'static> {
-    Cell::text(evidence.words().collect::<Vec<_>>().join(" "))
+pub(super) fn words(evidence: Evidence) -> TableCell<'static> {
+    TableCell::text(evidence.words().collect::<Vec<_>>().join(" "))
 }
 
-pub(super) fn text(text: Option<&str>) -> Cell<'_> {
-    Cell::known(text, Cell::text)
+pub(super) fn text(text: Option<&str>) -> TableCell<'_> {
+    TableCell::known(text, TableCell::text)
 }
 
-pub(super) fn time(stamp: Option<Stamp>) -> Cell<'static> {
-    Cell::known(stamp, Cell::Time)
+pub(super) fn time(stamp: Option<Stamp>) -> TableCell<'static> {
+    TableCell::known(stamp, TableCell::Time)
 }

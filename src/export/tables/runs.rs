@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::mission::{Row, text, time, words};
-use crate::base::table::Cell;
+use crate::base::table::TableCell;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::graph::diff::Change;
@@ -52,13 +52,13 @@ impl Run {
     }
 
     /// Its first window, its times, and its length.
-    fn cells(&self, mission: &Mission) -> [Cell<'static>; 4] {
+    fn cells(&self, mission: &Mission) -> [TableCell<'static>; 4] {
         let span = self.span(mission);
         [
-            Cell::count(self.first as u64),
+            TableCell::count(self.first as u64),
             time(Some(span.start)),
             time(Some(span.end)),
-            Cell::Int(span.nanos()),
+            TableCell::Int(span.nanos()),
         ]
     }
 
@@ -118,12 +118,12 @@ pub(super) fn nodes(mission: &Mission, row: Row<'_>) {
                 start,
                 end,
                 length,
-                Cell::text(node.name.as_str()),
-                Cell::text(&*node.role),
-                Cell::text(run.state.word()),
-                Cell::text(run.degree.word()),
+                TableCell::text(node.name.as_str()),
+                TableCell::text(&*node.role),
+                TableCell::text(run.state.word()),
+                TableCell::text(run.degree.word()),
                 words(node.evidence),
-                Cell::known(run.sent(mission).1, Cell::Float),
+                TableCell::known(run.sent(mission).1, TableCell::Float),
                 text(lifecycle),
                 time(node.first),
                 time(node.last),
@@ -143,16 +143,16 @@ pub(super) fn topics(mission: &Mission, row: Row<'_>) {
                 start,
                 end,
                 length,
-                Cell::text(topic.name.as_str()),
-                Cell::text(topic.types.join(" ")),
-                Cell::text(run.state.word()),
-                Cell::text(run.degree.word()),
+                TableCell::text(topic.name.as_str()),
+                TableCell::text(topic.types.join(" ")),
+                TableCell::text(run.state.word()),
+                TableCell::text(run.degree.word()),
                 words(topic.evidence),
-                Cell::known(count, Cell::count),
-                Cell::known(run.bytes.filter(|_| count.is_some()), Cell::count),
-                Cell::known(hz, Cell::Float),
-                Cell::known(run.median, Cell::Float),
-                Cell::known(run.gap, Cell::Float),
+                TableCell::known(count, TableCell::count),
+                TableCell::known(run.bytes.filter(|_| count.is_some()), TableCell::count),
+                TableCell::known(hz, TableCell::Float),
+                TableCell::known(run.median, TableCell::Float),
+                TableCell::known(run.gap, TableCell::Float),
                 text(topic.qos.as_deref()),
                 time(topic.first),
                 time(topic.last),
@@ -188,14 +188,14 @@ fn edge_rows(
             start,
             end,
             length,
-            Cell::text(what.word()),
-            Cell::text(elements.nodes[edge.node as usize].name.as_str()),
-            Cell::text(elements.topics[edge.topic as usize].name.as_str()),
-            Cell::text(run.state.word()),
-            Cell::text(run.degree.word()),
+            TableCell::text(what.word()),
+            TableCell::text(elements.nodes[edge.node as usize].name.as_str()),
+            TableCell::text(elements.topics[edge.topic as usize].name.as_str()),
+            TableCell::text(run.state.word()),
+            TableCell::text(run.degree.word()),
             words(edge.evidence),
-            Cell::known(count, Cell::count),
-            Cell::known(hz, Cell::Float),
+            TableCell::known(count, TableCell::count),
+            TableCell::known(hz, TableCell::Float),
             time(edge.first),
             time(edge.last),
         ]);

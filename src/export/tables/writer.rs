@@ -67,7 +67,7 @@ pub(crate) fn whole(format: TableFormat, table: &Batch) -> Result<Vec<u8>> {
 
 /// A table being written.
 pub(crate) enum Writer<W: Write + Send> {
-    Csv(Box<csv::Rows<W>>),
+    Csv(Box<csv::CsvRows<W>>),
     #[cfg(feature = "parquet")]
     Parquet(Box<parquet::Rows<W>>),
 }
@@ -82,7 +82,7 @@ impl<W: Write + Send> Writer<W> {
     ) -> io::Result<Self> {
         let _ = facts;
         match format {
-            TableFormat::Csv => Ok(Self::Csv(Box::new(csv::Rows::new(to, batch)?))),
+            TableFormat::Csv => Ok(Self::Csv(Box::new(csv::CsvRows::new(to, batch)?))),
             #[cfg(feature = "parquet")]
             TableFormat::Parquet => {
                 let rows = parquet::Rows::new(to, batch, facts)?;

@@ -1,13 +1,13 @@
 //! Changes one value of a YAML text and leaves every other character as it is.
 
-use crate::base::yaml::{BadYaml, Data, Place, Placed, parse_placed};
+use crate::base::yaml::{BadYaml, YamlData, YamlPart, YamlPlace, parse_placed};
 
 /// A text under way.
 #[derive(Clone, Debug)]
 pub(super) struct Text(pub(super) String);
 
 /// A pair of a mapping.
-type Pair = (String, Place, Placed);
+type Pair = (String, YamlPlace, YamlPart);
 
 impl Text {
     /// Sets `key` of an entry to `value`, both as YAML; does nothing where there is no such entry.
@@ -22,7 +22,7 @@ impl Text {
         let Some((_, at, body)) = find(&whole, section).and_then(|s| find_pair(s, entry)) else {
             return Ok(());
         };
-        if let Data::Map(pairs) = &body.data {
+        if let YamlData::Map(pairs) = &body.data {
             match pairs.iter().find(|(own, ..)| own == key) {
                 Some(pair) => self.replace(pair, value),
                 None => self.add(body, pairs, key, value),
@@ -67,7 +67,7 @@ impl Text {
     ) -> Result<(), BadYaml> {
         let whole = parse_placed(&self.0)?;
         let pairs = find(&whole, section).map(|s| (s, &s.data));
-        let Some((body, Data::Map(pairs))) = pairs else {
+        let Some((body, YamlData::Map(pairs))) = pairs else {
             self.begin(&whole, section, key, value);
             return Ok(());
         };
@@ -90,7 +90,7 @@ impl Text {
     }
 
     /// Adds a section that is not there, or holds nothing.
-    fn begin(&mut self, whole: &Placed, section: &str, key: &str, value: &str) {
+    fn begin(&mut self, whole: &YamlPart, section: &str, key: &str, value: &str) {
         let line = format!("  {key}: {value}\n");
         if let Some((_, at, _)) = find_pair(whole, section) {
             let end = self.line_end(self.after_key(*at));
@@ -126,7 +126,7 @@ impl Text {
             .replace_range(start..end.max(start), &format!("{gap}{value}"));
     }
 
-    fn add(&mut self, body: &Placed, pairs: &[Pair], key: &str, value: &str) {
+    fn add(&mut self, body: &YamlPart, pairs: &[Pair], key: &str, value: &str) {
         if self.is_flow(body) {
             let close = self.close(self.offset(body.at)).saturating_sub(1);
             let comma = if pairs.is_empty() { "" } else { ", " };
@@ -139,7 +139,7 @@ impl Text {
         }
     }
 
-    fn remove(&mut self, body: &Placed, pair: &Pair) {
+    fn remove(&mut self, body: &YamlPart, pair: &Pair) {
         let end = self.end(pair);
         if !self.is_flow(body) {
             let start = self.line_start(pair.1.line);
@@ -163,18 +163,20 @@ impl Text {
     fn end(&self, pair: &Pair) -> usize {
         let colon = self.after_key(pair.1);
         match &pair.2.data {
-            Data::Scalar(text) if text.is_empty() && self.line_of(colon) != pair.2.at.line => colon,
-            Data::List(list) if !self.is_flow(&pair.2) => {
+            YamlData::Scalar(text) if text.is_empty() && self.line_of(colon) != pair.2.at.line => {
+                colon
+            }
+            YamlData::List(list) if !self.is_flow(&pair.2) => {
                 list.last().map_or(colon, |last| self.end_of_value(last))
             }
-            Data::Map(pairs) if !self.is_flow(&pair.2) => {
+            YamlData::Map(pairs) if !self.is_flow(&pair.2) => {
                 pairs.last().map_or(colon, |last| self.end(last))
             }
             _ => self.end_of_value(&pair.2).max(colon),
         }
     }
 
-    fn end_of_value(&self, value: &Placed) -> usize {
+    fn end_of_value(&self, value: &YamlPart) -> usize {
         let start = self.offset(value.at);
         if self.0[start..].starts_with(['[', '{', '"', '\'']) {
             return self.close(start);
@@ -220,12 +222,12 @@ impl Text {
         self.0.len()
     }
 
-    fn is_flow(&self, part: &Placed) -> bool {
+    fn is_flow(&self, part: &YamlPart) -> bool {
         self.0[self.offset(part.at)..].starts_with(['{', '['])
     }
 
     /// The place behind the colon of a key.
-    fn after_key(&self, at: Place) -> usize {
+    fn after_key(&self, at: YamlPlace) -> usize {
         let start = self.offset(at);
         let key = match self.0[start..].chars().next() {
             Some('"' | '\'') => self.close(start),
@@ -240,7 +242,7 @@ impl Text {
     }
 
     /// The byte at which a place stands.
-    fn offset(&self, at: Place) -> usize {
+    fn offset(&self, at: YamlPlace) -> usize {
         let start = self.line_start(at.line);
         let line = &self.0[start..];
         let mut chars = line.char_indices();
@@ -268,13 +270,13 @@ impl Text {
 }
 
 /// The value of a key.
-fn find<'a>(part: &'a Placed, key: &str) -> Option<&'a Placed> {
+fn find<'a>(part: &'a YamlPart, key: &str) -> Option<&'a YamlPart> {
     find_pair(part, key).map(|(.., value)| value)
 }
 
-fn find_pair<'a>(part: &'a Placed, key: &str) -> Option<&'a Pair> {
+fn find_pair<'a>(part: &'a YamlPart, key: &str) -> Option<&'a Pair> {
     match &part.data {
-        Data::Map(pairs) => pairs.iter().find(|(own, ..)| own == key),
+        YamlData::Map(pairs) => pairs.iter().find(|(own, ..)| own == key),
         _ => None,
     }
 }

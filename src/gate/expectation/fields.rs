@@ -4,11 +4,11 @@ use std::path::Path;
 
 use super::super::pattern::Pattern;
 use super::super::range::{During, Range};
-use super::{At, Place};
+use super::{At, YamlPlace};
 use crate::base::error::{Error, Result};
 use crate::base::nearest::nearest;
 use crate::base::time::parse_nanos;
-use crate::base::yaml::{Data, Placed};
+use crate::base::yaml::{YamlData, YamlPart};
 
 /// The document under way.
 #[derive(Clone, Copy)]
@@ -20,7 +20,7 @@ impl<'a> Document<'a> {
     /// What is wrong at a place, and the way out.
     pub(super) fn bad(
         self,
-        at: Place,
+        at: YamlPlace,
         reason: impl Into<String>,
         hint: impl Into<String>,
     ) -> Error {
@@ -36,7 +36,7 @@ impl<'a> Document<'a> {
     /// A word that is not one of those known.
     pub(super) fn unknown<'w>(
         self,
-        at: Place,
+        at: YamlPlace,
         what: &str,
         word: &str,
         known: impl Iterator<Item = &'w str> + Clone,
@@ -54,12 +54,12 @@ impl<'a> Document<'a> {
     /// The pairs of a mapping; none of what is left empty.
     pub(super) fn pairs(
         self,
-        part: &'a Placed,
+        part: &'a YamlPart,
         what: &str,
-    ) -> Result<&'a [(String, Place, Placed)]> {
+    ) -> Result<&'a [(String, YamlPlace, YamlPart)]> {
         match &part.data {
-            Data::Map(pairs) => Ok(pairs),
-            Data::Scalar(text) if text.is_empty() => Ok(&[]),
+            YamlData::Map(pairs) => Ok(pairs),
+            YamlData::Scalar(text) if text.is_empty() => Ok(&[]),
             _ => Err(self.bad(
                 part.at,
                 format!("{what} is not a mapping"),
@@ -69,10 +69,10 @@ impl<'a> Document<'a> {
     }
 
     /// The members of a list; none of what is left empty.
-    pub(super) fn list(self, part: &'a Placed, what: &str) -> Result<&'a [Placed]> {
+    pub(super) fn list(self, part: &'a YamlPart, what: &str) -> Result<&'a [YamlPart]> {
         match &part.data {
-            Data::List(list) => Ok(list),
-            Data::Scalar(text) if text.is_empty() => Ok(&[]),
+            YamlData::List(list) => Ok(list),
+            YamlData::Scalar(text) if text.is_empty() => Ok(&[]),
             _ => Err(self.bad(
                 part.at,
                 format!("{what} is not a list"),
@@ -82,9 +82,9 @@ impl<'a> Document<'a> {
     }
 
     /// The text of a scalar that is not empty.
-    pub(super) fn text(self, part: &'a Placed, what: &str) -> Result<&'a str> {
+    pub(super) fn text(self, part: &'a YamlPart, what: &str) -> Result<&'a str> {
         match &part.data {
-            Data::Scalar(text) if !text.is_empty() => Ok(text),
+            YamlData::Scalar(text) if !text.is_empty() => Ok(text),
             _ => Err(self.bad(part.at, format!("{what} is not a text"), "write one value")),
         }
     }
@@ -92,7 +92,7 @@ impl<'a> Document<'a> {
     /// The mapping `part` with the keys that it may hold.
     pub(super) fn fields(
         self,
-        part: &'a Placed,
+        part: &'a YamlPart,
         what: &'a str,
         known: &'static [&'static str],
     ) -> Result<Fields<'a>> {
@@ -115,18 +115,18 @@ impl<'a> Document<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Fields<'a> {
     pub(super) document: Document<'a>,
-    pub(super) at: Place,
-    pairs: &'a [(String, Place, Placed)],
+    pub(super) at: YamlPlace,
+    pairs: &'a [(String, YamlPlace, YamlPart)],
 }
 
 impl<'a> Fields<'a> {
     /// The value of a key, if it is there.
-    pub(super) fn get(&self, key: &str) -> Option<&'a Placed> {
+    pub(super) fn get(&self, key: &str) -> Option<&'a YamlPart> {
         self.pairs.iter().find(|(k, ..)| k == key).map(|(.., v)| v)
     }
 
     /// The value of a key that must be there.
-    pub(super) fn need(&self, key: &str, hint: &str) -> Result<&'a Placed> {
+    pub(super) fn need(&self, key: &str, hint: &str) -> Result<&'a YamlPart> {
         let missing = || {
             self.document
                 .bad(self.at, format!("`{key}` is missing"), hint)
@@ -135,7 +135,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The first key that is not one of these.
-    pub(super) fn other(&self, keys: &[&str]) -> Option<(&'a str, Place)> {
+    pub(super) fn other(&self, keys: &[&str]) -> Option<(&'a str, YamlPlace)> {
         let other = self
             .pairs
             .iter()

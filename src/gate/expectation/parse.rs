@@ -4,12 +4,12 @@ use std::path::Path;
 
 use super::fields::{Document, Fields};
 use super::{
-    Allowance, Closed, Demand, Event, EventKind, Expectation, Named, NodeFacts, Place, Policy,
-    Rule, SCHEMA, TopicFacts, While,
+    Allowance, Closed, Demand, Event, EventKind, Expectation, Named, NodeFacts, Policy, Rule,
+    SCHEMA, TopicFacts, While, YamlPlace,
 };
 use crate::base::error::Result;
 use crate::base::time::{Moment, Period, Stamp};
-use crate::base::yaml::{Placed, parse_placed};
+use crate::base::yaml::{YamlPart, parse_placed};
 use crate::gate::Kind;
 use crate::gate::pattern::Pattern;
 
@@ -116,7 +116,7 @@ const ALLOW: &[&str] = &["finding", "name", "until", "why"];
 pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
     let document = Document { path };
     let whole = parse_placed(text).map_err(|bad| {
-        let at = Place {
+        let at = YamlPlace {
             line: bad.line,
             column: bad.column,
         };
@@ -143,7 +143,7 @@ pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
     })
 }
 
-fn policy(file: &Fields<'_>, top: Place) -> Result<Policy> {
+fn policy(file: &Fields<'_>, top: YamlPlace) -> Result<Policy> {
     let mut policy = Policy {
         at: top,
         nodes: Closed::Allow,
@@ -198,7 +198,7 @@ fn section<T>(
 fn each<T>(
     file: &Fields<'_>,
     key: &str,
-    one: impl Fn(Document<'_>, &Placed) -> Result<T>,
+    one: impl Fn(Document<'_>, &YamlPart) -> Result<T>,
 ) -> Result<Vec<T>> {
     let Some(part) = file.get(key) else {
         return Ok(Vec::new());
@@ -250,7 +250,7 @@ fn rules(file: &Fields<'_>) -> Result<Vec<Rule>> {
     Ok(rules)
 }
 
-fn rule(document: Document<'_>, part: &Placed) -> Result<Rule> {
+fn rule(document: Document<'_>, part: &YamlPart) -> Result<Rule> {
     let fields = document.fields(part, "a rule", RULE)?;
     let id = fields.need("id", "every rule has an `id: a-name`")?;
     let id = document.text(id, "`id`")?.to_owned();
@@ -382,7 +382,7 @@ fn event(rule: &Fields<'_>, key: &str) -> Result<Event> {
     })
 }
 
-fn allowance(document: Document<'_>, part: &Placed) -> Result<Allowance> {
+fn allowance(document: Document<'_>, part: &YamlPart) -> Result<Allowance> {
     let fields = document.fields(part, "an allowance", ALLOW)?;
     let finding = fields.need("finding", "name the finding, such as `topic-rate-low`")?;
     let word = document.text(finding, "`finding`")?;

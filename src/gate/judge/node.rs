@@ -3,7 +3,7 @@
 use super::{Judge, absence, near};
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{Named, NodeFacts, Place};
+use crate::gate::expectation::{Named, NodeFacts, YamlPlace};
 use crate::gate::facts::SHUTDOWN_NS;
 use crate::gate::finding::{Cause, Finding, Kind};
 use crate::gate::pattern::Pattern;
@@ -59,7 +59,7 @@ impl Judge<'_> {
         }
     }
 
-    pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: Place) -> Vec<Finding> {
+    pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
         let roles = self.facts.nodes(pattern);
         let found = roles.into_iter().map(|(role, nodes)| {
             let lives = self.facts.lives(nodes);
@@ -81,7 +81,12 @@ impl Judge<'_> {
     }
 
     /// Whether a node is there, and stays.
-    pub(super) fn presence(&self, pattern: &Pattern, at: Place, facts: &NodeFacts) -> Vec<Finding> {
+    pub(super) fn presence(
+        &self,
+        pattern: &Pattern,
+        at: YamlPlace,
+        facts: &NodeFacts,
+    ) -> Vec<Finding> {
         let roles = self.facts.nodes(pattern);
         let name = pattern.as_str();
         if roles.is_empty() {
@@ -101,7 +106,7 @@ impl Judge<'_> {
     }
 
     /// That the bag does not tell whether a node is there.
-    fn unnamed(&self, name: &str, at: Place) -> Finding {
+    fn unnamed(&self, name: &str, at: YamlPlace) -> Finding {
         let (why, hint) = if self.facts.is_rewritten() {
             (
                 "a tool merged the senders of this bag",
@@ -117,7 +122,7 @@ impl Judge<'_> {
         Finding::unknown(Kind::NodeMissing, name, at, says).hint(hint)
     }
 
-    fn missing(&self, pattern: &Pattern, at: Place) -> Finding {
+    fn missing(&self, pattern: &Pattern, at: YamlPlace) -> Finding {
         let name = pattern.as_str();
         let roles = self.facts.roles().map(|(role, _)| role.to_owned());
         let mut finding = Finding::new(
@@ -134,7 +139,7 @@ impl Judge<'_> {
         }
     }
 
-    fn gone(&self, role: &str, nodes: &[NodeId], at: Place) -> Option<Finding> {
+    fn gone(&self, role: &str, nodes: &[NodeId], at: YamlPlace) -> Option<Finding> {
         let whole = self.facts.mission.span;
         let end = self.facts.lives(nodes).last()?.end;
         if whole.end.since(end) <= SHUTDOWN_NS {
@@ -165,7 +170,7 @@ impl Judge<'_> {
         Some(finding)
     }
 
-    fn late(&self, roles: &Roles<'_>, facts: &NodeFacts, at: Place) -> Vec<Finding> {
+    fn late(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(within) = &facts.within else {
             return Vec::new();
         };
@@ -194,7 +199,7 @@ impl Judge<'_> {
         late.collect()
     }
 
-    fn restarted(&self, roles: &Roles<'_>, facts: &NodeFacts, at: Place) -> Vec<Finding> {
+    fn restarted(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(range) = &facts.restarts else {
             return Vec::new();
         };
@@ -228,7 +233,7 @@ impl Judge<'_> {
         found.collect()
     }
 
-    fn lifecycle(&self, roles: &Roles<'_>, facts: &NodeFacts, at: Place) -> Vec<Finding> {
+    fn lifecycle(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(state) = &facts.lifecycle else {
             return Vec::new();
         };

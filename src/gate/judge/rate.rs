@@ -3,7 +3,7 @@
 use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{Place, TopicFacts, While};
+use crate::gate::expectation::{TopicFacts, While, YamlPlace};
 use crate::gate::facts::{Rate, SHUTDOWN_NS};
 use crate::gate::finding::{Finding, Kind};
 use crate::gate::range::Range;
@@ -11,7 +11,7 @@ use crate::graph::TopicId;
 
 impl Judge<'_> {
     /// Whether a topic's rate lies in its range, in as many windows as it must.
-    pub(super) fn rate(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+    pub(super) fn rate(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(range) = facts.hz.as_ref().map(|hz| hz.value) else {
             return Vec::new();
         };
@@ -40,7 +40,7 @@ impl Judge<'_> {
     }
 
     /// Where no window is judged: a condition that never held is kept, all else cannot be told.
-    fn no_window(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+    fn no_window(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         if facts.whilst.is_some() {
             return Vec::new();
         }
@@ -89,7 +89,7 @@ impl Judge<'_> {
         bad: &[Rate],
         judged: usize,
         range: Range,
-        at: Place,
+        at: YamlPlace,
     ) -> Option<Finding> {
         let (first, last) = (bad.first()?, bad.last()?);
         let name = self.facts.topic(topic);
@@ -129,7 +129,7 @@ impl Judge<'_> {
     }
 
     /// Whether a topic was never silent for too long.
-    pub(super) fn gap(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+    pub(super) fn gap(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(most) = facts.max_gap.as_ref().map(|gap| gap.value) else {
             return Vec::new();
         };

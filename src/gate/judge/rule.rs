@@ -3,7 +3,9 @@
 use super::{Judge, absence};
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{At, Demand, Event, EventKind, NodeFacts, Place, Rule, TopicFacts};
+use crate::gate::expectation::{
+    At, Demand, Event, EventKind, NodeFacts, Rule, TopicFacts, YamlPlace,
+};
 use crate::gate::finding::{Cause, Finding, Kind};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::{During, Range};
@@ -167,7 +169,7 @@ impl Judge<'_> {
 
     fn no_answer(
         &self,
-        at: Place,
+        at: YamlPlace,
         (when, cause): (&Event, &Entry),
         expect: &Event,
         within: i64,
@@ -206,7 +208,7 @@ impl Judge<'_> {
         finding
     }
 
-    fn changes(&self, at: Place, during: Option<During>, many: Range) -> Vec<Finding> {
+    fn changes(&self, at: YamlPlace, during: Option<During>, many: Range) -> Vec<Finding> {
         let whole = self.facts.mission.span;
         let span = during.map_or(whole, |d| d.on(whole));
         let entries: Vec<_> = self.facts.mission.ledger.headlines(span).collect();

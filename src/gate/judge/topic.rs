@@ -4,7 +4,7 @@ use super::{Judge, absence, near};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::Degree;
-use crate::gate::expectation::{At, Named, Place, TopicFacts};
+use crate::gate::expectation::{At, Named, TopicFacts, YamlPlace};
 use crate::gate::finding::{Finding, Kind};
 use crate::gate::pattern::Pattern;
 use crate::graph::TopicId;
@@ -67,7 +67,7 @@ impl Judge<'_> {
         }
     }
 
-    pub(super) fn forbidden_topics(&self, pattern: &Pattern, at: Place) -> Vec<Finding> {
+    pub(super) fn forbidden_topics(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
         let found = self.facts.topics(pattern).into_iter().map(|topic| {
             let name = self.facts.topic(topic);
             let says = format!("{name} is in the bag, and `{pattern}` is forbidden");
@@ -82,7 +82,7 @@ impl Judge<'_> {
     pub(super) fn topic_presence(
         &self,
         pattern: &Pattern,
-        at: Place,
+        at: YamlPlace,
         facts: &TopicFacts,
     ) -> Vec<Finding> {
         if facts.optional || !self.facts.topics(pattern).is_empty() {
@@ -104,7 +104,7 @@ impl Judge<'_> {
         }]
     }
 
-    fn kind(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+    fn kind(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(kind) = &facts.kind else {
             return Vec::new();
         };
@@ -251,7 +251,7 @@ impl Judge<'_> {
         Some(finding)
     }
 
-    fn latched(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+    fn latched(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(wanted) = &facts.latched else {
             return Vec::new();
         };
@@ -272,7 +272,7 @@ impl Judge<'_> {
         }
     }
 
-    fn qos(&self, topic: TopicId, facts: &TopicFacts, at: Place) -> Vec<Finding> {
+    fn qos(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(wanted) = &facts.qos else {
             return Vec::new();
         };

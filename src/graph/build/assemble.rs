@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::io;
 
-use super::history::{Course, History};
+use super::history::{ElementHistory, History};
 use super::rates::{Sums, rates};
 use super::senders::sender;
-use super::windows::Windows;
+use super::windows::SortedWindows;
 use crate::base::error::Result;
 use crate::base::time::Span;
 use crate::evidence::Degree;
@@ -14,8 +14,8 @@ use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::graph::{
-    Column, ColumnWriter, Cursor, EdgeId, EdgeState, Graphs, GraphsWriter, NodeState, Row, State,
-    TopicState, per_second,
+    Column, ColumnCursor, ColumnWriter, EdgeId, EdgeState, Graphs, GraphsWriter, NodeState, Row,
+    State, TopicState, per_second,
 };
 
 /// The graphs of the windows of one division of time.
@@ -39,10 +39,10 @@ pub(crate) fn graphs(
     windows: &[Span],
     grace: usize,
 ) -> Result<Windowed> {
-    let mut all = Assembly {
+    let mut all = GraphAssembly {
         graphs: GraphsWriter::new(windows.to_vec()),
         messages: vec![0; windows.len()],
-        windows: Windows(windows),
+        windows: SortedWindows(windows),
         grace,
         findings,
         history,
@@ -60,10 +60,10 @@ pub(crate) fn graphs(
     })
 }
 
-struct Assembly<'a> {
+struct GraphAssembly<'a> {
     graphs: GraphsWriter,
     messages: Vec<u64>,
-    windows: Windows<'a>,
+    windows: SortedWindows<'a>,
     /// Windows of silence before somebody who never speaks again counts as gone.
     grace: usize,
     findings: &'a Findings,
@@ -76,7 +76,7 @@ struct Assembly<'a> {
     topics: BTreeMap<u32, Column>,
 }
 
-impl Assembly<'_> {
+impl GraphAssembly<'_> {
     /// Counts messages, topic by topic.
     fn topics(&mut self, recorded: &Recorded) -> io::Result<()> {
         let history = self.history;
@@ -199,7 +199,7 @@ impl Assembly<'_> {
         for ((id, edge), course) in (0..).zip(edges).zip(&self.history.subscribes) {
             let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
-                let topic = topic.as_mut().and_then(Cursor::next);
+                let topic = topic.as_mut().and_then(ColumnCursor::next);
                 if !self.sees(course, *window) {
                     continue;
                 }
@@ -215,7 +215,7 @@ impl Assembly<'_> {
     }
 
     /// Whether an element is seen in a window.
-    fn sees(&self, course: &Course, window: Span) -> bool {
+    fn sees(&self, course: &ElementHistory, window: Span) -> bool {
         let last = course.lives.len().saturating_sub(1);
         course.lives.iter().enumerate().any(|(at, life)| {
             let to = if at == last && self.grace > 0 {

@@ -17,7 +17,7 @@ use crate::evidence::Degree;
 use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::Key;
+use crate::evidence::proof::ElementKey;
 use crate::graph::lives::{
     Bound, Known, Life, Lives, Stretch, Transition, Voice, all_silent, silences,
 };
@@ -34,13 +34,13 @@ pub(crate) struct History {
     /// When messages came, as figures show it.
     pub sending: Sending,
     /// Of each node, in order.
-    pub(crate) nodes: Vec<Course>,
+    pub(crate) nodes: Vec<ElementHistory>,
     /// Of each topic.
-    pub(crate) topics: Vec<Course>,
+    pub(crate) topics: Vec<ElementHistory>,
     /// Of each publication.
-    pub(crate) publishes: Vec<Course>,
+    pub(crate) publishes: Vec<ElementHistory>,
     /// Of each subscription.
-    pub(crate) subscribes: Vec<Course>,
+    pub(crate) subscribes: Vec<ElementHistory>,
     pub(crate) node_ids: BTreeMap<Name, NodeId>,
     pub(crate) topic_ids: BTreeMap<Name, TopicId>,
     /// The places of each topic's streams.
@@ -49,7 +49,7 @@ pub(crate) struct History {
 
 /// How one element looks over the mission but for its messages.
 #[derive(Clone, Debug)]
-pub(crate) struct Course {
+pub(crate) struct ElementHistory {
     pub(crate) lives: Vec<Lifetime>,
     pub(crate) degree: Degree,
     /// The state that nothing changes while it lives: declared or latched.
@@ -60,7 +60,7 @@ pub(crate) struct Course {
     silences: Vec<(Stamp, Option<Stamp>)>,
 }
 
-impl Course {
+impl ElementHistory {
     fn new(track: &Liveness, silences: Vec<(Stamp, Option<Stamp>)>) -> Self {
         let fixed = match () {
             () if track.is_declared() => Some(State::Declared),
@@ -127,16 +127,16 @@ fn assembled(tracks: &Tracks, traffic: &Traffic, findings: &Findings) -> History
         publishers: BTreeMap::new(),
     };
     for (what, track) in tracks {
-        if let (Key::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
+        if let (ElementKey::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
             *all.publishers.entry(*topic).or_default() += 1;
         }
     }
     for (what, track) in tracks {
         match *what {
-            Key::Node(node) => all.node(node, track),
-            Key::Topic(topic) => all.topic(topic, track),
-            Key::Publish(node, topic) => all.publish(node, topic, track),
-            Key::Subscribe(topic, node) => all.subscribe(topic, node, track),
+            ElementKey::Node(node) => all.node(node, track),
+            ElementKey::Topic(topic) => all.topic(topic, track),
+            ElementKey::Publish(node, topic) => all.publish(node, topic, track),
+            ElementKey::Subscribe(topic, node) => all.subscribe(topic, node, track),
         }
     }
     all.voices();
@@ -201,7 +201,7 @@ impl Assembly<'_> {
             runs: spans(track),
         });
         all.lives.nodes.push(known(track, self.findings.mission));
-        let mut course = Course::new(track, silent);
+        let mut course = ElementHistory::new(track, silent);
         // A node lives by more than messages.
         course.needs_messages = false;
         if track.speaks && !course.is_declared() {
@@ -239,7 +239,7 @@ impl Assembly<'_> {
         let sending = traffic.map(|of| of.sending.clone());
         all.sending.topics.push(sending.unwrap_or_default());
         all.lives.topics.push(known(track, self.findings.mission));
-        all.topics.push(Course::new(track, silent));
+        all.topics.push(ElementHistory::new(track, silent));
     }
 
     /// How many publishers of a topic the bag counts beyond those that are known.
@@ -262,7 +262,7 @@ impl Assembly<'_> {
         all.lives
             .publishes
             .push(known(track, self.findings.mission));
-        all.publishes.push(Course::new(track, silent));
+        all.publishes.push(ElementHistory::new(track, silent));
     }
 
     fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
@@ -272,7 +272,7 @@ impl Assembly<'_> {
         all.lives
             .subscribes
             .push(known(track, self.findings.mission));
-        all.subscribes.push(Course::new(track, Vec::new()));
+        all.subscribes.push(ElementHistory::new(track, Vec::new()));
     }
 
     fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Edge {

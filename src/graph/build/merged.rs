@@ -10,13 +10,13 @@ use crate::base::role::{role, start};
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::{Key, Reliability};
+use crate::evidence::proof::{ElementKey, Reliability};
 use crate::graph::lives::Stretch;
 
 /// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on says nothing:
 /// somebody else may have taken the topic over.
 pub(crate) fn fall_silent(
-    tracks: &mut BTreeMap<Key, Liveness>,
+    tracks: &mut BTreeMap<ElementKey, Liveness>,
     traffic: &Traffic,
     findings: &Findings,
 ) {
@@ -27,7 +27,8 @@ pub(crate) fn fall_silent(
         };
         for (node, stretches) in turns(&nodes, sender, findings) {
             let pulse = Pulse::of(stretches, &[]).filter(|pulse| pulse.broke_off(end));
-            if let (Some(pulse), Some(track)) = (pulse, tracks.get_mut(&Key::Publish(node, topic)))
+            if let (Some(pulse), Some(track)) =
+                (pulse, tracks.get_mut(&ElementKey::Publish(node, topic)))
             {
                 track.signs.push(pulse.last());
                 track.heard = track.heard.max(Some(pulse.last()));
@@ -38,10 +39,10 @@ pub(crate) fn fall_silent(
 }
 
 /// Who is known to publish each topic.
-fn publishers(tracks: &BTreeMap<Key, Liveness>) -> BTreeMap<Name, Vec<Name>> {
+fn publishers(tracks: &BTreeMap<ElementKey, Liveness>) -> BTreeMap<Name, Vec<Name>> {
     let mut all: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
     for what in tracks.keys() {
-        if let Key::Publish(node, topic) = what {
+        if let ElementKey::Publish(node, topic) = what {
             all.entry(*topic).or_default().push(*node);
         }
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::io;
 use std::sync::Arc;
 
-use super::windows::Windows;
+use super::windows::SortedWindows;
 use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
@@ -45,7 +45,7 @@ pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicC
     let mut all = Vec::new();
     for (topic, streams) in streams {
         let topic: Arc<str> = topic.into();
-        let sums = rates(recorded, &streams, &Windows(windows)).map_err(spool_error)?;
+        let sums = rates(recorded, &streams, &SortedWindows(windows)).map_err(spool_error)?;
         all.extend(sums.into_iter().map(|sum| TopicCount {
             topic: Arc::clone(&topic),
             window: sum.window,
@@ -56,7 +56,7 @@ pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicC
 }
 
 /// A window that messages still fall into.
-struct Open {
+struct OpenWindow {
     window: usize,
     count: u64,
     bytes: u64,
@@ -73,12 +73,12 @@ const MOST_GAPS: usize = 1 << 20;
 pub(crate) fn rates(
     recorded: &Recorded,
     streams: &[usize],
-    windows: &Windows<'_>,
+    windows: &SortedWindows<'_>,
 ) -> io::Result<Vec<Sums>> {
     let ids: Vec<_> = streams.iter().map(|s| recorded.streams[*s].times).collect();
     let sized = ids.iter().all(|id| recorded.messages.sized(*id));
     let mut all = Vec::new();
-    let mut open: VecDeque<Open> = VecDeque::new();
+    let mut open: VecDeque<OpenWindow> = VecDeque::new();
     let mut next = 0;
     recorded.messages.merge(&ids, |timed| {
         if !recorded.believes(timed.time) {
@@ -92,7 +92,7 @@ pub(crate) fn rates(
         }
         while windows.start(next).is_some_and(|start| start <= timed.time) {
             if timed.time < windows.end(next) {
-                open.push_back(Open::new(next, streams.len()));
+                open.push_back(OpenWindow::new(next, streams.len()));
             }
             next += 1;
         }
@@ -104,7 +104,7 @@ pub(crate) fn rates(
     Ok(all)
 }
 
-impl Open {
+impl OpenWindow {
     fn new(window: usize, streams: usize) -> Self {
         Self {
             window,

@@ -10,7 +10,7 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{Reliability, Stream};
 use crate::graph::lives::Stretch;
-use crate::graph::sending::{Runs, shortest_silence};
+use crate::graph::sending::{SendingRuns, shortest_silence};
 
 /// What happened on each topic.
 pub(crate) type Traffic = BTreeMap<Name, Senders>;
@@ -65,7 +65,7 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
     let least = shortest_silence(recorded.span.map_or(0, |span| span.nanos()));
     let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
     let (of, mut heard) = places(&of_topic);
-    let mut all = Runs::default();
+    let mut all = SendingRuns::default();
     recorded.messages.merge(&ids, |timed| {
         if !recorded.believes(timed.time) {
             return;
@@ -78,17 +78,17 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
     Ok(Senders {
         streams,
         traces,
-        list: heard.into_iter().map(Heard::into_sender).collect(),
+        list: heard.into_iter().map(SenderTimes::into_sender).collect(),
         of,
         sending: all.stretches(),
     })
 }
 
 /// What is heard of one sender.
-struct Heard {
+struct SenderTimes {
     node: Option<Name>,
     latched: bool,
-    runs: Runs,
+    runs: SendingRuns,
     times: Vec<Stamp>,
     /// Of so many messages one is kept, unless it comes late.
     every: usize,
@@ -100,7 +100,7 @@ const MOST_TIMES: usize = 1 << 22;
 /// A message after so much silence is kept in any case, and the one before it.
 const LATE_NS: i64 = 500_000_000;
 
-impl Heard {
+impl SenderTimes {
     fn hear(&mut self, time: Stamp, least: i64) {
         self.runs.hear(time, least);
         let late = self
@@ -139,17 +139,17 @@ impl Heard {
 }
 
 /// The sender of each stream, and what is heard of each sender: nothing yet.
-fn places(streams: &[&Stream]) -> (Vec<usize>, Vec<Heard>) {
+fn places(streams: &[&Stream]) -> (Vec<usize>, Vec<SenderTimes>) {
     let mut latched: BTreeMap<Option<Name>, bool> = BTreeMap::new();
     for stream in streams {
         *latched.entry(sender(stream)).or_insert(true) &= stream.latched;
     }
     let place = |stream: &&Stream| latched.range(..sender(stream)).count();
     let places = streams.iter().map(place).collect();
-    let heard = latched.iter().map(|(node, latched)| Heard {
+    let heard = latched.iter().map(|(node, latched)| SenderTimes {
         node: *node,
         latched: *latched,
-        runs: Runs::default(),
+        runs: SendingRuns::default(),
         times: Vec::new(),
         every: 1,
         passed: 0,

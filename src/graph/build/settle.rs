@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use super::liveness::{Lifetime, Liveness};
 use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
-use crate::evidence::proof::{Key, Proof, Validity};
+use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::restarts::Restarts;
 
 /// Works out all lives; `mission` is its first and its last moment.
 pub(crate) fn settle(
-    tracks: &mut BTreeMap<Key, Liveness>,
+    tracks: &mut BTreeMap<ElementKey, Liveness>,
     proofs: &[Proof],
     restarts: &Restarts,
     mission: (Stamp, Stamp),
@@ -20,20 +20,26 @@ pub(crate) fn settle(
         let (node, topic) = ends(what);
         let last = closed.entry(node).or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
-        tracks.entry(Key::Node(node)).or_default().learn(&track);
-        tracks.entry(Key::Topic(topic)).or_default().know(&track);
+        tracks
+            .entry(ElementKey::Node(node))
+            .or_default()
+            .learn(&track);
+        tracks
+            .entry(ElementKey::Topic(topic))
+            .or_default()
+            .know(&track);
     }
     // Whose last connection was closed, and who was not heard of again, is gone.
     for (node, end) in closed {
         let end = end.filter(|end| *end > Stamp::MIN);
-        if let (Some(end), Some(track)) = (end, tracks.get_mut(&Key::Node(node)))
+        if let (Some(end), Some(track)) = (end, tracks.get_mut(&ElementKey::Node(node)))
             && track.signs.iter().all(|sign| *sign <= end)
         {
             track.ends.push(end);
         }
     }
     for (what, track) in tracks.iter_mut() {
-        if let Key::Node(node) = what {
+        if let ElementKey::Node(node) = what {
             track.live(mission);
             for restart in restarts.get(node).into_iter().flatten() {
                 track.restart(restart);
@@ -43,18 +49,20 @@ pub(crate) fn settle(
     let mut of_topics: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
     for (what, mut track) in edges(tracks) {
         let (node, topic) = ends(what);
-        let around = tracks.get(&Key::Node(node)).map_or(&[][..], |t| &t.lives);
+        let around = tracks
+            .get(&ElementKey::Node(node))
+            .map_or(&[][..], |t| &t.lives);
         track.live_within(around);
         of_topics.entry(topic).or_default().extend(&track.lives);
         tracks.insert(what, track);
     }
     for (what, lives) in live_like(tracks, proofs, false) {
-        if !matches!(what, Key::Node(_)) {
+        if !matches!(what, ElementKey::Node(_)) {
             of_topics.entry(ends(what).1).or_default().extend(lives);
         }
     }
     for (what, track) in tracks.iter_mut() {
-        if let Key::Topic(topic) = what {
+        if let ElementKey::Topic(topic) = what {
             let edges = of_topics.remove(topic).unwrap_or_default();
             track.live(mission);
             track.live_with(edges);
@@ -65,14 +73,14 @@ pub(crate) fn settle(
 
 /// Lets elements live like others, which are topics or not; tells which did.
 fn live_like(
-    tracks: &mut BTreeMap<Key, Liveness>,
+    tracks: &mut BTreeMap<ElementKey, Liveness>,
     proofs: &[Proof],
     topics: bool,
-) -> Vec<(Key, Vec<Lifetime>)> {
+) -> Vec<(ElementKey, Vec<Lifetime>)> {
     let mut done = Vec::new();
     for proof in proofs {
         if let Validity::Like(other) = proof.when
-            && matches!(other, Key::Topic(_)) == topics
+            && matches!(other, ElementKey::Topic(_)) == topics
             && let Some(lives) = tracks.get(&other).map(|t| t.lives.clone())
             && let Some(track) = tracks.get_mut(&proof.what)
             && track.signs.is_empty()
@@ -85,16 +93,17 @@ fn live_like(
 }
 
 /// All edges.
-fn edges(tracks: &BTreeMap<Key, Liveness>) -> Vec<(Key, Liveness)> {
-    let is_edge = |what: &Key| matches!(what, Key::Publish(..) | Key::Subscribe(..));
+fn edges(tracks: &BTreeMap<ElementKey, Liveness>) -> Vec<(ElementKey, Liveness)> {
+    let is_edge =
+        |what: &ElementKey| matches!(what, ElementKey::Publish(..) | ElementKey::Subscribe(..));
     let edges = tracks.iter().filter(|(what, _)| is_edge(what));
     edges.map(|(what, track)| (*what, track.clone())).collect()
 }
 
 /// The node and the topic of an edge.
-fn ends(edge: Key) -> (Name, Name) {
+fn ends(edge: ElementKey) -> (Name, Name) {
     match edge {
-        Key::Publish(node, topic) | Key::Subscribe(topic, node) => (node, topic),
-        Key::Node(name) | Key::Topic(name) => (name, name),
+        ElementKey::Publish(node, topic) | ElementKey::Subscribe(topic, node) => (node, topic),
+        ElementKey::Node(name) | ElementKey::Topic(name) => (name, name),
     }
 }

@@ -8,12 +8,12 @@ use super::senders::{Senders, Traffic};
 use crate::base::time::Stamp;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
-use crate::evidence::proof::{Key, Proof, Validity};
+use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::restarts::Restart;
 use crate::evidence::{Evidence, SOURCES};
 
 /// What is known about the life of every element.
-pub(crate) type Tracks = BTreeMap<Key, Liveness>;
+pub(crate) type Tracks = BTreeMap<ElementKey, Liveness>;
 
 /// Puts the signs of every proof on the track of its element.
 pub(crate) fn tracks(
@@ -25,8 +25,10 @@ pub(crate) fn tracks(
     let sent = sent(&findings.proofs);
     for proof in &findings.proofs {
         let node = match proof.what {
-            Key::Node(node) | Key::Publish(node, _) | Key::Subscribe(_, node) => Some(node),
-            Key::Topic(_) => None,
+            ElementKey::Node(node)
+            | ElementKey::Publish(node, _)
+            | ElementKey::Subscribe(_, node) => Some(node),
+            ElementKey::Topic(_) => None,
         };
         let restarts = node.and_then(|node| findings.restarts.get(&node));
         let restarts = restarts.map_or(&[][..], Vec::as_slice);
@@ -82,7 +84,7 @@ pub(crate) fn tracks(
         }
     }
     for (node, restarts) in &findings.restarts {
-        let track = tracks.entry(Key::Node(*node)).or_default();
+        let track = tracks.entry(ElementKey::Node(*node)).or_default();
         for restart in restarts {
             track.signs.extend([restart.death, restart.birth]);
             track.ends.push(restart.death);
@@ -95,7 +97,7 @@ pub(crate) fn tracks(
 fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
     let sent = proofs.iter().filter_map(|proof| match proof {
         Proof {
-            what: Key::Publish(..),
+            what: ElementKey::Publish(..),
             when: Validity::Messages(at),
             ..
         } => Some(*at),

@@ -6,9 +6,9 @@ use crate::base::time::{Span, Stamp};
 
 /// Windows sorted by start, none of them inside another.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Windows<'a>(pub(crate) &'a [Span]);
+pub(crate) struct SortedWindows<'a>(pub(crate) &'a [Span]);
 
-impl Windows<'_> {
+impl SortedWindows<'_> {
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }
@@ -57,7 +57,7 @@ mod tests {
     #[test]
     fn windows_are_half_open_and_may_overlap() {
         let spans = spans(&[(0, 10), (5, 15), (10, 20)]);
-        let windows = Windows(&spans);
+        let windows = SortedWindows(&spans);
         assert_eq!(windows.over(Stamp(5), Stamp(5)), 0..2);
         assert_eq!(windows.over(Stamp(10), Stamp(10)), 1..3);
         assert_eq!(windows.over(Stamp(3), Stamp(4)), 0..1);

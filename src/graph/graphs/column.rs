@@ -136,8 +136,8 @@ impl Column {
     }
 
     /// Goes through it from the first window.
-    pub(crate) fn cursor(&self) -> Cursor<'_> {
-        Cursor {
+    pub(crate) fn cursor(&self) -> ColumnCursor<'_> {
+        ColumnCursor {
             bytes: &self.bytes,
             memory: Memory::default(),
             away: 0,
@@ -148,14 +148,14 @@ impl Column {
 
 /// Goes through a column.
 #[derive(Clone, Debug)]
-pub(crate) struct Cursor<'a> {
+pub(crate) struct ColumnCursor<'a> {
     bytes: &'a [u8],
     memory: Memory,
     away: u64,
     same: u64,
 }
 
-impl Cursor<'_> {
+impl ColumnCursor<'_> {
     /// The row of the next window; `None` where the element is not there, and after the last.
     pub(crate) fn next(&mut self) -> Option<Row> {
         if self.same > 0 {

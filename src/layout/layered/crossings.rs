@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::layout::{Kind, Layers, Rows, monotone};
+use crate::layout::{LayerItem, LayerRows, Layers, monotone};
 
 /// What moves as one inside its cluster: an item, or a whole cluster from its top to its bottom border.
 #[derive(Clone, Copy)]
@@ -19,7 +19,7 @@ struct Unit {
 /// The rows while they are being sorted.
 pub(crate) struct CrossingReducer<'a> {
     layers: &'a Layers,
-    pub(crate) rows: Rows,
+    pub(crate) rows: LayerRows,
     /// The place of each item in its row.
     place: Vec<usize>,
     /// Where each item wants to be; NaN for anywhere.
@@ -295,12 +295,17 @@ fn bracketed(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<usize> {
     }
     for (cluster, members) in inside {
         let border = |v: &usize, kind| layers.home[*v] == cluster && layers.kind[*v] == kind;
-        row.extend(members.iter().copied().filter(|v| border(v, Kind::Top)));
+        row.extend(
+            members
+                .iter()
+                .copied()
+                .filter(|v| border(v, LayerItem::Top)),
+        );
         let (borders, rest): (Vec<usize>, _) = members
             .into_iter()
-            .partition(|v| border(v, Kind::Top) || border(v, Kind::Bottom));
+            .partition(|v| border(v, LayerItem::Top) || border(v, LayerItem::Bottom));
         row.extend(bracketed(layers, cluster, rest));
-        row.extend(borders.into_iter().filter(|v| border(v, Kind::Bottom)));
+        row.extend(borders.into_iter().filter(|v| border(v, LayerItem::Bottom)));
     }
     row
 }
@@ -310,9 +315,10 @@ fn units(layers: &Layers, items: &[usize]) -> Vec<Unit> {
     let mut units = Vec::new();
     let mut start = 0;
     while start < items.len() {
-        let cluster = (layers.kind[items[start]] == Kind::Top).then(|| layers.home[items[start]]);
+        let cluster =
+            (layers.kind[items[start]] == LayerItem::Top).then(|| layers.home[items[start]]);
         let closes =
-            |v: &usize| layers.kind[*v] == Kind::Bottom && Some(layers.home[*v]) == cluster;
+            |v: &usize| layers.kind[*v] == LayerItem::Bottom && Some(layers.home[*v]) == cluster;
         let length = cluster
             .and_then(|_| items[start..].iter().position(closes))
             .unwrap_or(0)

@@ -16,7 +16,7 @@ pub(crate) fn fold(
         return None;
     }
     let layers = layers.max(deep);
-    let graph = Graph::new(rank, edges);
+    let graph = Adjacency::new(rank, edges);
     let mut load = vec![0_usize; layers + 1];
     for v in (0..rank.len()).filter(|&v| !graph.is_source(v) && !graph.is_leaf(v)) {
         load[rank[v]] += 1;
@@ -61,7 +61,7 @@ pub(crate) fn suitable(n: usize, aspect: f64) -> [usize; 2] {
 }
 
 /// The edges both ways, and the longest path behind each vertex.
-struct Graph {
+struct Adjacency {
     before: Vec<Vec<usize>>,
     after: Vec<Vec<usize>>,
     depth: Vec<usize>,
@@ -69,7 +69,7 @@ struct Graph {
     order: Vec<usize>,
 }
 
-impl Graph {
+impl Adjacency {
     fn new(rank: &[usize], edges: &[(usize, usize)]) -> Self {
         let n = rank.len();
         let (mut before, mut after) = (vec![Vec::new(); n], vec![Vec::new(); n]);

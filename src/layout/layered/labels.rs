@@ -24,7 +24,7 @@ const HIDING: f64 = 4.0;
 
 /// Places the labels of all routes; one that has no room anywhere gets none. Short edges choose first.
 pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
-    let lines: Vec<Line> = layout.routes.iter().map(Line::new).collect();
+    let lines: Vec<Segments> = layout.routes.iter().map(Segments::new).collect();
     if plan.links.iter().all(|link| link.label.is_none()) {
         return;
     }
@@ -36,7 +36,7 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
             .then(a.cmp(&b))
     });
     let area = layout.size.w * layout.size.h / layout.boxes.len().max(1) as f64;
-    let mut taken = Field::new(area.sqrt().max(40.0));
+    let mut taken = Obstacles::new(area.sqrt().max(40.0));
     for rect in &layout.boxes {
         taken.insert(rect.grown(1.0), 0);
     }
@@ -51,7 +51,7 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
             0,
         );
     }
-    let mut edges = Field::new(taken.cell);
+    let mut edges = Obstacles::new(taken.cell);
     for &i in &order {
         if edges.noted > CELLS {
             break;
@@ -84,13 +84,13 @@ fn between(a: Point, b: Point) -> Rect {
 }
 
 /// A route as a chain of short straight pieces.
-struct Line {
+struct Segments {
     points: Vec<Point>,
     /// How far along the line each point is.
     at: Vec<f64>,
 }
 
-impl Line {
+impl Segments {
     fn new(route: &Route) -> Self {
         let mut points = vec![route.start];
         for &[a, b, to] in &route.curves {
@@ -128,7 +128,7 @@ impl Line {
     }
 
     /// The best middle for a label of this size, if any is free.
-    fn spot(&self, size: Size, own: usize, taken: &Field, edges: &Field) -> Option<Point> {
+    fn spot(&self, size: Size, own: usize, taken: &Obstacles, edges: &Obstacles) -> Option<Point> {
         let mut best: Option<(f64, Point)> = None;
         for (turn, &part) in STATIONS.iter().enumerate() {
             let Some((point, sideways)) = self.station(part) else {
@@ -194,7 +194,7 @@ fn on_cubic(points: [Point; 4], t: f64) -> Point {
 }
 
 /// Rectangles with a number each, found by place.
-struct Field {
+struct Obstacles {
     cell: f64,
     cells: BTreeMap<(i64, i64), Vec<usize>>,
     rects: Vec<(Rect, usize)>,
@@ -204,7 +204,7 @@ struct Field {
     looks: Cell<u64>,
 }
 
-impl Field {
+impl Obstacles {
     fn new(cell: f64) -> Self {
         Self {
             cell,

@@ -3,7 +3,7 @@
 //! It knows its sibling that sorts; the two are one step, in two files for their length.
 
 use super::crossings::CrossingReducer;
-use crate::layout::{Layers, Rows};
+use crate::layout::{LayerRows, Layers};
 
 /// How often one order is swept at most, and after how many sweeps without gain it is given up.
 const SWEEPS: usize = 24;
@@ -13,11 +13,11 @@ const SHAKES: usize = 8;
 
 /// The best order found and its number of crossings, borders of clusters included. `effort` counts edges swept: the
 /// search begins anew, then shakes the best order, until it is spent.
-pub(crate) fn order(layers: &Layers, effort: usize) -> (Rows, u64) {
+pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
     let mut search = Search {
         layers,
         effort,
-        best: (Rows::new(), u64::MAX),
+        best: (LayerRows::new(), u64::MAX),
     };
     search.improve(&depth_first(layers, true), true);
     if search.effort > 0 {
@@ -41,7 +41,7 @@ pub(crate) fn order(layers: &Layers, effort: usize) -> (Rows, u64) {
 struct Search<'a> {
     layers: &'a Layers,
     effort: usize,
-    best: (Rows, u64),
+    best: (LayerRows, u64),
 }
 
 impl Search<'_> {
@@ -79,7 +79,7 @@ impl Search<'_> {
         let mut search = Search {
             layers: &flat,
             effort: self.effort,
-            best: (Rows::new(), u64::MAX),
+            best: (LayerRows::new(), u64::MAX),
         };
         search.improve(&depth_first(&flat, false), true);
         self.effort = search.effort;
@@ -160,13 +160,13 @@ fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::Kind;
+    use crate::layout::LayerItem;
 
     /// Three layers of two; each item leads to the one diagonally across.
     fn crossed() -> Layers {
         let mut layers = Layers {
             vertices: 6,
-            kind: vec![Kind::Vertex; 6],
+            kind: vec![LayerItem::Vertex; 6],
             rank: vec![0, 0, 1, 1, 2, 2],
             home: vec![0; 6],
             up: vec![Vec::new(); 6],

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::layout::{Part, Plan};
+use crate::layout::{Component, Plan};
 
 /// The parts of a plan that know nothing of each other, by their first vertices.
-pub(crate) fn parts(plan: &Plan) -> Vec<Part> {
+pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
     let n = plan.vertices.len();
-    let mut groups = Groups::new(n + plan.clusters.len());
+    let mut groups = DisjointSets::new(n + plan.clusters.len());
     for i in plan.valid_links() {
         groups.join(plan.links[i].from, plan.links[i].to);
     }
@@ -23,7 +23,7 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Part> {
             groups.join(n + c, n + parent);
         }
     }
-    let mut parts: BTreeMap<usize, Part> = BTreeMap::new();
+    let mut parts: BTreeMap<usize, Component> = BTreeMap::new();
     for v in 0..n {
         let part = parts.entry(groups.leader(v)).or_default();
         part.pieces.push(pieces.leader(v));
@@ -40,7 +40,7 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Part> {
 }
 
 /// The part with its ends, homes and pieces told by places in it.
-fn localised(plan: &Plan, mut part: Part) -> Part {
+fn localised(plan: &Plan, mut part: Component) -> Component {
     let at = |v: usize| part.vertices.binary_search(&v).unwrap_or(0);
     part.ends = part
         .links
@@ -73,9 +73,9 @@ fn clusters_of(plan: &Plan, vertices: &[usize]) -> Vec<usize> {
 
 /// Disjoint sets of numbers.
 #[derive(Clone)]
-struct Groups(Vec<usize>);
+struct DisjointSets(Vec<usize>);
 
-impl Groups {
+impl DisjointSets {
     fn new(n: usize) -> Self {
         Self((0..n).collect())
     }

@@ -1,12 +1,12 @@
 //! Where the items of each layer stand across: as near to their neighbours as order and gaps allow.
 
-use crate::layout::{Kind, Layers, Rows, monotone};
+use crate::layout::{LayerItem, LayerRows, Layers, monotone};
 
 /// How often all layers are placed.
 const SWEEPS: usize = 40;
 
 /// The middle of each item across. `half` is half the extent of each item, `gaps` the room between neighbours per row.
-pub(crate) fn place(layers: &Layers, rows: &Rows, apart: &[Vec<f64>]) -> Vec<f64> {
+pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
     let mut y = packed(layers, rows, apart);
     for sweep in 0..SWEEPS {
         for step in 0..rows.len() {
@@ -27,7 +27,7 @@ pub(crate) fn place(layers: &Layers, rows: &Rows, apart: &[Vec<f64>]) -> Vec<f64
 }
 
 /// Every row packed around 0.
-fn packed(layers: &Layers, rows: &Rows, apart: &[Vec<f64>]) -> Vec<f64> {
+fn packed(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
     let mut y = vec![0.0; layers.rank.len()];
     for (row, apart) in rows.iter().zip(apart) {
         let mut at = -apart.iter().sum::<f64>() / 2.0;
@@ -45,7 +45,7 @@ fn packed(layers: &Layers, rows: &Rows, apart: &[Vec<f64>]) -> Vec<f64> {
 fn goals(layers: &Layers, row: &[usize], y: &[f64], sweep: usize) -> (Vec<f64>, Vec<f64>) {
     let (mut goal, mut weight) = (Vec::new(), Vec::new());
     for &v in row {
-        let both = sweep >= 6 && (sweep < 100 || layers.kind[v] != Kind::Bend);
+        let both = sweep >= 6 && (sweep < 100 || layers.kind[v] != LayerItem::Bend);
         let before = layers.up[v]
             .iter()
             .filter(|_| both || sweep.is_multiple_of(2));
@@ -63,17 +63,22 @@ fn goals(layers: &Layers, row: &[usize], y: &[f64], sweep: usize) -> (Vec<f64>, 
 }
 
 /// How much two linked items want to stand in line: bends most, so that long edges come out straight.
-fn stiffness(a: Kind, b: Kind) -> f64 {
+fn stiffness(a: LayerItem, b: LayerItem) -> f64 {
     match (a, b) {
-        (Kind::Vertex, Kind::Vertex) => 1.0,
-        (Kind::Vertex, _) | (_, Kind::Vertex) => 2.5,
-        (Kind::Bend, _) | (_, Kind::Bend) => 8.0,
+        (LayerItem::Vertex, LayerItem::Vertex) => 1.0,
+        (LayerItem::Vertex, _) | (_, LayerItem::Vertex) => 2.5,
+        (LayerItem::Bend, _) | (_, LayerItem::Bend) => 8.0,
         _ => 24.0,
     }
 }
 
 /// Gives each border one place in all its layers: the middle of the highest and the lowest places that keep every gap.
-fn straighten_borders(layers: &Layers, rows: &Rows, apart: &[Vec<f64>], y: &[f64]) -> Vec<f64> {
+fn straighten_borders(
+    layers: &Layers,
+    rows: &LayerRows,
+    apart: &[Vec<f64>],
+    y: &[f64],
+) -> Vec<f64> {
     let n = y.len();
     let mut same: Vec<usize> = (0..n).collect();
     for (cluster, &(low, high)) in layers.span.iter().enumerate().skip(1) {
@@ -130,8 +135,13 @@ fn pushed(n: usize, edges: impl Iterator<Item = (usize, usize, f64)>, goal: &[f6
 }
 
 /// Places the items anew between the borders, which stay.
-fn inside_borders(layers: &Layers, rows: &Rows, apart: &[Vec<f64>], mut y: Vec<f64>) -> Vec<f64> {
-    let border = |v: usize| matches!(layers.kind[v], Kind::Top | Kind::Bottom);
+fn inside_borders(
+    layers: &Layers,
+    rows: &LayerRows,
+    apart: &[Vec<f64>],
+    mut y: Vec<f64>,
+) -> Vec<f64> {
+    let border = |v: usize| matches!(layers.kind[v], LayerItem::Top | LayerItem::Bottom);
     for sweep in (6..14).chain([100, 102, 104]) {
         for step in 0..rows.len() {
             let rank = if sweep % 2 == 0 {

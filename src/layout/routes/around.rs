@@ -25,12 +25,12 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
         let count = met.entry((from.min(to), from.max(to))).or_insert(0);
         *count += 1;
         let ends = (
-            Place {
+            VertexPlace {
                 plan,
                 boxes,
                 v: from,
             },
-            Place { plan, boxes, v: to },
+            VertexPlace { plan, boxes, v: to },
         );
         if from == to {
             routes[i] = ends.0.self_loop(*count);
@@ -47,13 +47,13 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
 }
 
 /// A vertex where it stands.
-struct Place<'a> {
+struct VertexPlace<'a> {
     plan: &'a Plan,
     boxes: &'a [Rect],
     v: usize,
 }
 
-impl Place<'_> {
+impl VertexPlace<'_> {
     fn rect(&self) -> Rect {
         self.boxes[self.v]
     }
@@ -108,7 +108,7 @@ fn contains(rect: &Rect, outline: Outline, p: Point) -> bool {
 }
 
 /// The ends of the `count`-th edge between two boxes, inside both, beside those of the edges before.
-fn shifted((from, to): &(Place, Place), count: usize) -> (Point, Point) {
+fn shifted((from, to): &(VertexPlace, VertexPlace), count: usize) -> (Point, Point) {
     let (start, end) = (from.rect().centre(), to.rect().centre());
     let step = (count / 2) as f64
         * if count.is_multiple_of(2) {
@@ -134,7 +134,7 @@ fn shifted((from, to): &(Place, Place), count: usize) -> (Point, Point) {
 }
 
 /// The way cut at the outlines, as straight pieces.
-fn drawn((a, b): &(Place, Place), way: &[Point]) -> Route {
+fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
     let last = way.len() - 1;
     let start = a.leaves(way[0], way[1]);
     let mut points = vec![start];

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Info;
-use crate::base::table::{Batch, Cell, Kind};
+use crate::base::table::{Batch, ColumnKind, TableCell};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 
@@ -18,26 +18,26 @@ pub struct SurveyRow {
     pub info: Option<Info>,
 }
 
-const COLUMNS: &[(&str, Kind)] = &[
-    ("path", Kind::Text),
-    ("bag_format", Kind::Text),
-    ("compression", Kind::Text),
-    ("tier", Kind::Text),
-    ("is_complete", Kind::Flag),
-    ("file_bytes", Kind::I64),
-    ("start_ns", Kind::Time),
-    ("duration_s", Kind::F64),
-    ("messages", Kind::I64),
-    ("topics", Kind::I64),
-    ("nodes", Kind::I64),
-    ("publishes", Kind::I64),
-    ("subscribes", Kind::I64),
-    ("nodes_measured", Kind::I64),
-    ("publishes_measured", Kind::I64),
-    ("subscribes_measured", Kind::I64),
-    ("subscribes_stated", Kind::I64),
-    ("evidence", Kind::Text),
-    ("error", Kind::Text),
+const COLUMNS: &[(&str, ColumnKind)] = &[
+    ("path", ColumnKind::Text),
+    ("bag_format", ColumnKind::Text),
+    ("compression", ColumnKind::Text),
+    ("tier", ColumnKind::Text),
+    ("is_complete", ColumnKind::Flag),
+    ("file_bytes", ColumnKind::I64),
+    ("start_ns", ColumnKind::Time),
+    ("duration_s", ColumnKind::F64),
+    ("messages", ColumnKind::I64),
+    ("topics", ColumnKind::I64),
+    ("nodes", ColumnKind::I64),
+    ("publishes", ColumnKind::I64),
+    ("subscribes", ColumnKind::I64),
+    ("nodes_measured", ColumnKind::I64),
+    ("publishes_measured", ColumnKind::I64),
+    ("subscribes_measured", ColumnKind::I64),
+    ("subscribes_stated", ColumnKind::I64),
+    ("evidence", ColumnKind::Text),
+    ("error", ColumnKind::Text),
 ];
 
 /// The survey as a table, a row per bag, readable or not.
@@ -49,36 +49,36 @@ pub(crate) fn survey_table(rows: &[SurveyRow]) -> Batch {
     table
 }
 
-fn cells(row: &SurveyRow) -> Vec<Cell<'_>> {
-    let path = Cell::text(&row.path);
+fn cells(row: &SurveyRow) -> Vec<TableCell<'_>> {
+    let path = TableCell::text(&row.path);
     let Some(info) = &row.info else {
-        let mut cells = vec![Cell::Null; COLUMNS.len()];
+        let mut cells = vec![TableCell::Null; COLUMNS.len()];
         cells[0] = path;
-        cells[COLUMNS.len() - 1] = Cell::known(row.error.as_deref(), Cell::text);
+        cells[COLUMNS.len() - 1] = TableCell::known(row.error.as_deref(), TableCell::text);
         return cells;
     };
     let bag = info.bags.first();
     let evidence: Vec<&str> = info.evidence.iter().map(|e| e.source).collect();
     vec![
         path,
-        Cell::known(bag, |b| Cell::text(&b.format)),
-        Cell::known(bag, |b| Cell::text(b.compression.join(" "))),
-        Cell::known(bag, |b| Cell::text(b.tier)),
-        Cell::known(bag, |b| Cell::Flag(b.complete)),
-        Cell::known(bag, |b| Cell::count(b.file_bytes)),
-        Cell::Time(Stamp(info.start_ns)),
-        Cell::Float(info.duration_s),
-        Cell::count(info.messages),
-        Cell::count(info.topics.len()),
-        Cell::count(info.nodes_by_degree.total()),
-        Cell::count(info.publishes_by_degree.total()),
-        Cell::count(info.subscribes_by_degree.total()),
-        Cell::count(info.nodes_by_degree.measured),
-        Cell::count(info.publishes_by_degree.measured),
-        Cell::count(info.subscribes_by_degree.measured),
-        Cell::count(info.subscribes_by_degree.stated),
-        Cell::text(evidence.join(" ")),
-        Cell::known(row.error.as_deref(), Cell::text),
+        TableCell::known(bag, |b| TableCell::text(&b.format)),
+        TableCell::known(bag, |b| TableCell::text(b.compression.join(" "))),
+        TableCell::known(bag, |b| TableCell::text(b.tier)),
+        TableCell::known(bag, |b| TableCell::Flag(b.complete)),
+        TableCell::known(bag, |b| TableCell::count(b.file_bytes)),
+        TableCell::Time(Stamp(info.start_ns)),
+        TableCell::Float(info.duration_s),
+        TableCell::count(info.messages),
+        TableCell::count(info.topics.len()),
+        TableCell::count(info.nodes_by_degree.total()),
+        TableCell::count(info.publishes_by_degree.total()),
+        TableCell::count(info.subscribes_by_degree.total()),
+        TableCell::count(info.nodes_by_degree.measured),
+        TableCell::count(info.publishes_by_degree.measured),
+        TableCell::count(info.subscribes_by_degree.measured),
+        TableCell::count(info.subscribes_by_degree.stated),
+        TableCell::text(evidence.join(" ")),
+        TableCell::known(row.error.as_deref(), TableCell::text),
     ]
 }
 

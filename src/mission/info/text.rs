@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Degrees, Info, NodeInfo, TopicInfo};
+use super::{DegreeCounts, Info, NodeInfo, TopicInfo};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 
@@ -116,7 +116,7 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
 }
 
 /// Such as `34 nodes (31 measured, 3 stated)`.
-fn how_many(what: &str, degrees: Degrees) -> String {
+fn how_many(what: &str, degrees: DegreeCounts) -> String {
     let parts = [
         (degrees.measured, "measured"),
         (degrees.stated, "stated"),

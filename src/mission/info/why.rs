@@ -46,7 +46,7 @@ pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Resu
 }
 
 /// The same piece of evidence, once or more often.
-struct Said<'a> {
+struct Repeated<'a> {
     /// The first of them.
     piece: &'a EvidenceLine,
     count: usize,
@@ -55,8 +55,8 @@ struct Said<'a> {
 }
 
 /// Pieces that differ in nothing but their time as one each, in the order of their first.
-fn said(pieces: &[EvidenceLine]) -> Vec<Said<'_>> {
-    let mut all: Vec<Said<'_>> = Vec::new();
+fn said(pieces: &[EvidenceLine]) -> Vec<Repeated<'_>> {
+    let mut all: Vec<Repeated<'_>> = Vec::new();
     let mut places = BTreeMap::new();
     for piece in pieces {
         let key = (piece.source, piece.degree, piece.text.as_str());
@@ -66,7 +66,7 @@ fn said(pieces: &[EvidenceLine]) -> Vec<Said<'_>> {
                 said.count += 1;
                 said.last = said.last.max(piece.time);
             }
-            None => all.push(Said {
+            None => all.push(Repeated {
                 piece,
                 count: 1,
                 last: piece.time,

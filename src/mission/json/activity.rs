@@ -14,8 +14,8 @@ use serde::ser::{SerializeMap as _, Serializer};
 
 use super::names::Ids;
 use super::raw::RawState;
-use super::rows::{Runs, ends};
-use super::runs::{self, In, RawElements, Whole};
+use super::rows::{RunRows, ends};
+use super::runs::{self, In, RawElements, WithColumns};
 use super::write::List;
 use crate::base::time::{Span, Stamp};
 use crate::graph::sending::Sending;
@@ -39,34 +39,34 @@ impl<'a> ActivityOf<'a> {
         }
     }
 
-    fn seen<E>(&self, what: Element, element: E) -> Whole<'_, E> {
+    fn seen<E>(&self, what: Element, element: E) -> WithColumns<'_, E> {
         let seen = In {
             what,
             graphs: &self.graphs,
         };
-        Whole { element, seen }
+        WithColumns { element, seen }
     }
 }
 
 #[derive(Serialize)]
-struct Named<'a> {
+struct ElementSending<'a> {
     name: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    sending: Option<Runs<'a>>,
+    sending: Option<RunRows<'a>>,
 }
 
 #[derive(Serialize)]
-struct Joined<'a> {
+struct EdgeSending<'a> {
     node: &'a str,
     topic: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    sending: Option<Runs<'a>>,
+    sending: Option<RunRows<'a>>,
 }
 
-impl<'a> Joined<'a> {
+impl<'a> EdgeSending<'a> {
     fn new(edge: &Edge, elements: &'a Elements, sending: Option<&'a Vec<Span>>) -> Self {
         let (node, topic) = ends(edge, elements);
-        let sending = sending.map(|spans| Runs(spans));
+        let sending = sending.map(|spans| RunRows(spans));
         Self {
             node,
             topic,
@@ -87,7 +87,7 @@ impl Serialize for ActivityOf<'_> {
         let end = cells.last().map(|cell| cell.span.end.0);
         map.serialize_entry("bounds_ns", &List(starts.chain(end)))?;
         let nodes = (0..).zip(&elements.nodes).map(|(id, node)| {
-            let named = Named {
+            let named = ElementSending {
                 name: node.name.as_str(),
                 sending: None,
             };
@@ -96,8 +96,8 @@ impl Serialize for ActivityOf<'_> {
         map.serialize_entry("nodes", &List(nodes))?;
         let topics = (0..).zip(&elements.topics).map(|(id, topic)| {
             let spans = sending.topics.get(id as usize);
-            let sending = spans.map(|spans| Runs(spans));
-            let named = Named {
+            let sending = spans.map(|spans| RunRows(spans));
+            let named = ElementSending {
                 name: topic.name.as_str(),
                 sending,
             };
@@ -106,12 +106,18 @@ impl Serialize for ActivityOf<'_> {
         map.serialize_entry("topics", &List(topics))?;
         let publishes = (0..).zip(&elements.publishes).map(|(id, edge)| {
             let spans = sending.publishes.get(id as usize);
-            self.seen(Element::Publish(id), Joined::new(edge, elements, spans))
+            self.seen(
+                Element::Publish(id),
+                EdgeSending::new(edge, elements, spans),
+            )
         });
         map.serialize_entry("publishes", &List(publishes))?;
-        let subscribes = (0..)
-            .zip(&elements.subscribes)
-            .map(|(id, edge)| self.seen(Element::Subscribe(id), Joined::new(edge, elements, None)));
+        let subscribes = (0..).zip(&elements.subscribes).map(|(id, edge)| {
+            self.seen(
+                Element::Subscribe(id),
+                EdgeSending::new(edge, elements, None),
+            )
+        });
         map.serialize_entry("subscribes", &List(subscribes))?;
         map.end()
     }

@@ -10,7 +10,7 @@ use crate::mission::EntryId;
 
 /// An element by its name, or an edge by its two.
 #[derive(Serialize)]
-pub(crate) struct Named<'a> {
+pub(crate) struct RawElementName<'a> {
     what: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     name: Option<&'a str>,
@@ -20,7 +20,7 @@ pub(crate) struct Named<'a> {
     topic: Option<&'a str>,
 }
 
-impl<'a> Named<'a> {
+impl<'a> RawElementName<'a> {
     pub(crate) fn new(what: Element, elements: &'a Elements) -> Self {
         let alone = |name: &'a str| Self {
             what: what.word(),
@@ -51,7 +51,7 @@ pub(crate) struct ChangeRow<'a> {
     kind: &'static str,
     entry: EntryId,
     #[serde(flatten)]
-    named: Named<'a>,
+    named: RawElementName<'a>,
     #[serde(flatten)]
     rest: ChangeValues<'a>,
 }
@@ -121,7 +121,7 @@ impl<'a> ChangeRow<'a> {
         Self {
             kind: change.word(),
             entry,
-            named: Named::new(what, elements),
+            named: RawElementName::new(what, elements),
             rest,
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::changes::Named;
+use super::changes::RawElementName;
 use super::write::words;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
@@ -17,7 +17,7 @@ pub(crate) struct EntryRow<'a> {
     id: u32,
     kind: &'static str,
     #[serde(flatten)]
-    named: Named<'a>,
+    named: RawElementName<'a>,
     #[serde(skip_serializing_if = "Option::is_none")]
     role: Option<&'a str>,
     time_ns: i64,
@@ -62,7 +62,7 @@ pub(crate) fn entries<'a>(
     (0..).zip(&ledger.entries).map(move |(id, entry)| EntryRow {
         id,
         kind: entry.kind.word(),
-        named: Named::new(entry.what, elements),
+        named: RawElementName::new(entry.what, elements),
         role: role(entry.what, elements),
         time_ns: entry.time.0,
         earliest_ns: entry.earliest.0,
@@ -177,8 +177,8 @@ pub(crate) struct RawEntry {
     until_ns: Option<i64>,
     from_hz: Option<f64>,
     to_hz: Option<f64>,
-    from: Option<Names>,
-    to: Option<Names>,
+    from: Option<OneOrMore>,
+    to: Option<OneOrMore>,
     degree: Option<String>,
     #[serde(default)]
     evidence: Vec<String>,
@@ -191,7 +191,7 @@ pub(crate) struct RawEntry {
 
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Names {
+enum OneOrMore {
     One(String),
     Many(Vec<String>),
 }
@@ -284,11 +284,11 @@ fn read_detail(row: &RawEntry, elements: &Elements) -> Option<Detail> {
         all.collect::<Option<Vec<_>>>()
     };
     Some(match (&row.from, &row.to) {
-        (Some(Names::Many(from)), Some(Names::Many(to))) => Detail::Senders {
+        (Some(OneOrMore::Many(from)), Some(OneOrMore::Many(to))) => Detail::Senders {
             from: nodes(from)?,
             to: nodes(to)?,
         },
-        (Some(Names::One(from)), Some(Names::One(to))) => Detail::Values {
+        (Some(OneOrMore::One(from)), Some(OneOrMore::One(to))) => Detail::Values {
             from: Arc::from(from.as_str()),
             to: Arc::from(to.as_str()),
         },

@@ -8,12 +8,12 @@ use crate::base::words::visible_json;
 
 /// Breaks lines down to a depth; everything deeper stays on its line.
 #[derive(Debug, Default)]
-pub(crate) struct Lines {
+pub(crate) struct LineFormatter {
     depth: usize,
     deepest: usize,
 }
 
-impl Lines {
+impl LineFormatter {
     /// Breaks lines so deep: 1 the mission's keys, 2 its windows, 3 their keys, 4 the elements in their lists.
     pub(crate) fn down_to(deepest: usize) -> Self {
         Self { depth: 0, deepest }
@@ -43,7 +43,7 @@ impl Lines {
     }
 }
 
-impl Formatter for Lines {
+impl Formatter for LineFormatter {
     /// Part of a text, with characters that nobody would see as `\uXXXX`: they mean the same and steer no terminal.
     fn write_string_fragment<W: ?Sized + Write>(
         &mut self,

@@ -8,9 +8,9 @@ use crate::graph::{Edge, EdgeState, Elements, Node, NodeState, Topic, TopicState
 
 /// When an element is there, as pairs of nanoseconds.
 #[derive(Clone, Copy)]
-pub(crate) struct Runs<'a>(pub(crate) &'a [Span]);
+pub(crate) struct RunRows<'a>(pub(crate) &'a [Span]);
 
-impl Serialize for Runs<'_> {
+impl Serialize for RunRows<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(self.0.iter().map(|run| [run.start.0, run.end.0]))
     }
@@ -28,7 +28,7 @@ pub(crate) struct NodeOf<'a> {
     evidence: Vec<&'static str>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
-    runs: Runs<'a>,
+    runs: RunRows<'a>,
 }
 
 impl<'a> NodeOf<'a> {
@@ -39,7 +39,7 @@ impl<'a> NodeOf<'a> {
             evidence: words(node.evidence),
             first_ns: nanos(node.first),
             last_ns: nanos(node.last),
-            runs: Runs(&node.runs),
+            runs: RunRows(&node.runs),
         }
     }
 }
@@ -54,7 +54,7 @@ pub(crate) struct TopicOf<'a> {
     unknown_publishers: Option<u32>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
-    runs: Runs<'a>,
+    runs: RunRows<'a>,
 }
 
 impl<'a> TopicOf<'a> {
@@ -67,7 +67,7 @@ impl<'a> TopicOf<'a> {
             unknown_publishers: topic.unknown_publishers,
             first_ns: nanos(topic.first),
             last_ns: nanos(topic.last),
-            runs: Runs(&topic.runs),
+            runs: RunRows(&topic.runs),
         }
     }
 }
@@ -80,7 +80,7 @@ pub(crate) struct EdgeOf<'a> {
     evidence: Vec<&'static str>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
-    runs: Runs<'a>,
+    runs: RunRows<'a>,
 }
 
 impl<'a> EdgeOf<'a> {
@@ -92,7 +92,7 @@ impl<'a> EdgeOf<'a> {
             evidence: words(edge.evidence),
             first_ns: nanos(edge.first),
             last_ns: nanos(edge.last),
-            runs: Runs(&edge.runs),
+            runs: RunRows(&edge.runs),
         }
     }
 }
@@ -106,7 +106,7 @@ pub(crate) struct NodeRow<'a> {
     evidence: Vec<&'static str>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
-    runs: Runs<'a>,
+    runs: RunRows<'a>,
     hz: Option<f64>,
     lifecycle: Option<&'a str>,
 }
@@ -122,7 +122,7 @@ impl<'a> NodeRow<'a> {
             evidence: words(node.evidence),
             first_ns: nanos(node.first),
             last_ns: nanos(node.last),
-            runs: Runs(&node.runs),
+            runs: RunRows(&node.runs),
             hz: state.hz,
             lifecycle: state.lifecycle.as_deref(),
         }
@@ -145,7 +145,7 @@ pub(crate) struct TopicRow<'a> {
     unknown_publishers: Option<u32>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
-    runs: Runs<'a>,
+    runs: RunRows<'a>,
 }
 
 impl<'a> TopicRow<'a> {
@@ -166,7 +166,7 @@ impl<'a> TopicRow<'a> {
             unknown_publishers: topic.unknown_publishers,
             first_ns: nanos(topic.first),
             last_ns: nanos(topic.last),
-            runs: Runs(&topic.runs),
+            runs: RunRows(&topic.runs),
         }
     }
 }
@@ -196,7 +196,7 @@ struct EdgeRow<'a> {
     hz: Option<f64>,
     first_ns: Option<i64>,
     last_ns: Option<i64>,
-    runs: Runs<'a>,
+    runs: RunRows<'a>,
 }
 
 impl<'a> EdgeRow<'a> {
@@ -209,7 +209,7 @@ impl<'a> EdgeRow<'a> {
             hz: state.hz,
             first_ns: nanos(edge.first),
             last_ns: nanos(edge.last),
-            runs: Runs(&edge.runs),
+            runs: RunRows(&edge.runs),
         }
     }
 }

@@ -20,4 +20,4 @@ mod write;
 mod tests;
 
 pub(crate) use read::{RawElements, RawWhole, graphs};
-pub(crate) use write::{In, Whole, elements};
+pub(crate) use write::{In, WithColumns, elements};

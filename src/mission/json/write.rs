@@ -8,7 +8,7 @@ use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 use super::activity::ActivityOf;
 use super::changes::ChangeRow;
 use super::entries::{PhaseRow, entries};
-use super::lines::Lines;
+use super::lines::LineFormatter;
 use super::rows::{NodeRow, PublishRow, SubscribeRow, TopicRow};
 use super::runs;
 use crate::bag::Report;
@@ -30,14 +30,14 @@ pub fn write_json(mission: &Mission, out: &mut dyn Write) -> std::io::Result<()>
     let json = Json {
         mission,
         places: mission.layout.as_ref(),
-        form: Form::Auto,
+        form: JsonForm::Auto,
     };
     json.write(out)
 }
 
 /// How the windows of a mission are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Form {
+pub enum JsonForm {
     /// By their number: as windows up to 2000, as runs beyond.
     #[default]
     Auto,
@@ -59,15 +59,15 @@ pub(crate) struct Json<'a> {
     /// Where everything was drawn, if it was.
     pub places: Option<&'a Places>,
     /// How its windows are written.
-    pub form: Form,
+    pub form: JsonForm,
 }
 
 impl Json<'_> {
     fn is_runs(&self) -> bool {
         match self.form {
-            Form::Auto => self.mission.windows.len() > MOST_WINDOWS,
-            Form::Windows => false,
-            Form::Runs => true,
+            JsonForm::Auto => self.mission.windows.len() > MOST_WINDOWS,
+            JsonForm::Windows => false,
+            JsonForm::Runs => true,
         }
     }
 
@@ -76,7 +76,7 @@ impl Json<'_> {
     /// # Errors
     /// Whatever `out` refuses.
     pub(crate) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
-        let lines = Lines::down_to(if self.is_runs() { 3 } else { 4 });
+        let lines = LineFormatter::down_to(if self.is_runs() { 3 } else { 4 });
         let mut serializer = serde_json::Serializer::with_formatter(&mut *out, lines);
         self.serialize(&mut serializer)?;
         out.write_all(b"\n")

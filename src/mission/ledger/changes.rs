@@ -14,7 +14,7 @@ pub(crate) fn explain(
     elements: &Elements,
     ledger: &Ledger,
 ) -> Vec<(Vec<Change>, Vec<EntryId>)> {
-    let turns = Turns::new(ledger);
+    let turns = EntryTurns::new(ledger);
     let mut before: Option<(Span, Graph)> = None;
     let mut all = Vec::new();
     for (span, graph) in windows {
@@ -34,12 +34,12 @@ pub(crate) fn explain(
 }
 
 /// When entries say that elements begin or end, sorted.
-struct Turns {
+struct EntryTurns {
     begins: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
     ends: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
 }
 
-impl Turns {
+impl EntryTurns {
     fn new(ledger: &Ledger) -> Self {
         let (mut begins, mut ends) = (BTreeMap::new(), BTreeMap::new());
         let add = |to: &mut BTreeMap<Element, Vec<_>>, what, time, id| {
@@ -80,7 +80,7 @@ fn structure(
     new: &Graph,
     span: Span,
     elements: &Elements,
-    turns: &Turns,
+    turns: &EntryTurns,
     list: &mut Vec<(Change, EntryId)>,
 ) {
     let diff = diff(old, new);
@@ -90,7 +90,7 @@ fn structure(
         .chain(ids(&diff.subscribes.added, |s| Element::Subscribe(s.id)));
     for what in added {
         let time = elements.life(what).0.filter(|t| span.contains(*t));
-        if let Some((at, id)) = Turns::find(&turns.begins, what, span.end) {
+        if let Some((at, id)) = EntryTurns::find(&turns.begins, what, span.end) {
             let time = time.or(Some(at).filter(|at| span.contains(*at)));
             list.push((Change::Added { what, time }, id));
         }
@@ -100,7 +100,7 @@ fn structure(
         .chain(ids(&diff.publishes.removed, |id| Element::Publish(*id)))
         .chain(ids(&diff.subscribes.removed, |id| Element::Subscribe(*id)));
     for what in removed {
-        if let Some((at, id)) = Turns::find(&turns.ends, what, span.end) {
+        if let Some((at, id)) = EntryTurns::find(&turns.ends, what, span.end) {
             let time = Some(at).filter(|at| *at < span.end);
             list.push((Change::Removed { what, time }, id));
         }

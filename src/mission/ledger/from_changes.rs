@@ -14,7 +14,7 @@ pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Ledger {
     let mut entries: Vec<Entry> = Vec::new();
     for window in windows {
         let offset = entries.len();
-        let owners = Owners::new(elements, window);
+        let owners = WindowTurns::new(elements, window);
         let all: Vec<Entry> = owners.entries().collect();
         for entry in &all {
             let part_of = entry.part_of.map(|at| id(offset + whole(&all, at)));
@@ -68,7 +68,7 @@ fn id(place: usize) -> EntryId {
 }
 
 /// What came or went in one window, and which of it belongs to which.
-struct Owners<'a> {
+struct WindowTurns<'a> {
     elements: &'a Elements,
     window: &'a Window,
     /// What came, what went: the place of its change.
@@ -80,7 +80,7 @@ struct Owners<'a> {
     senders: BTreeMap<TopicId, Vec<(Element, NodeId)>>,
 }
 
-impl<'a> Owners<'a> {
+impl<'a> WindowTurns<'a> {
     fn new(elements: &'a Elements, window: &'a Window) -> Self {
         let mut owners = Self {
             elements,

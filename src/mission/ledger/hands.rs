@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::make::{Drafts, Told};
+use super::make::{Drafts, LedgerInput};
 use super::{Detail, Kind};
 use crate::base::time::Stamp;
 use crate::graph::lives::{Bound, Voice};
@@ -20,7 +20,7 @@ const FEWEST: u64 = 3;
 
 /// An interval of sending of one role, without a gap.
 #[derive(Clone, Debug)]
-struct Sending {
+struct RoleSending {
     role: Arc<str>,
     node: NodeId,
     first: Stamp,
@@ -29,7 +29,7 @@ struct Sending {
 }
 
 /// Tells of all hand-overs.
-pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut of: BTreeMap<TopicId, Vec<&Voice>> = BTreeMap::new();
     for voice in &told.lives.voices {
         of.entry(voice.topic).or_default().push(voice);
@@ -50,17 +50,17 @@ pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
 }
 
 /// When each role sends, sorted by its first message.
-fn sendings(told: &Told<'_>, voices: &[&Voice]) -> Vec<Sending> {
-    let mut all: Vec<Sending> = Vec::new();
+fn sendings(told: &LedgerInput<'_>, voices: &[&Voice]) -> Vec<RoleSending> {
+    let mut all: Vec<RoleSending> = Vec::new();
     for voice in voices {
         let Some(node) = voice.node else { continue };
-        let mut own: Vec<Sending> = Vec::new();
+        let mut own: Vec<RoleSending> = Vec::new();
         for stretch in &voice.stretches {
             match own.last_mut() {
                 Some(last) if stretch.is_joined => {
                     (last.last, last.count) = (stretch.last, last.count + stretch.count);
                 }
-                _ => own.push(Sending {
+                _ => own.push(RoleSending {
                     role: Arc::clone(&told.elements.nodes[node as usize].role),
                     node,
                     first: stretch.first,
@@ -76,7 +76,7 @@ fn sendings(told: &Told<'_>, voices: &[&Voice]) -> Vec<Sending> {
 }
 
 /// Every end of sending that another role's beginning makes good.
-fn replaced(all: &[Sending]) -> Vec<(Sending, Sending)> {
+fn replaced(all: &[RoleSending]) -> Vec<(RoleSending, RoleSending)> {
     let mut found = Vec::new();
     for old in all.iter().filter(|s| s.count >= FEWEST) {
         let own = || {
@@ -116,7 +116,13 @@ fn replaced(all: &[Sending]) -> Vec<(Sending, Sending)> {
     found
 }
 
-fn hand(told: &Told<'_>, drafts: &mut Drafts, topic: TopicId, old: &Sending, new: &Sending) {
+fn hand(
+    told: &LedgerInput<'_>,
+    drafts: &mut Drafts,
+    topic: TopicId,
+    old: &RoleSending,
+    new: &RoleSending,
+) {
     let at = Bound {
         time: new.first,
         earliest: old.last.min(new.first),
@@ -142,7 +148,7 @@ struct Pace {
 }
 
 /// Tells where most messages of a topic come from another sender than before, while both go on.
-fn shares(told: &Told<'_>, drafts: &mut Drafts, topic: TopicId, voices: &[&Voice]) {
+fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, voices: &[&Voice]) {
     let paces: Vec<Pace> = voices
         .iter()
         .filter_map(|v| Some((v.node?, v)))

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::make::{Drafts, Told};
+use super::make::{Drafts, LedgerInput};
 use super::{EntryId, Kind};
 use crate::base::time::Stamp;
 use crate::graph::lives::{Bound, Known};
@@ -26,7 +26,7 @@ struct Wholes {
 }
 
 /// Tells of all lives.
-pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut wholes = Wholes::default();
     for turns in turns_by_role(told).values() {
         tell_role(told, drafts, &mut wholes, turns);
@@ -85,11 +85,11 @@ fn kind(turn: Turn) -> Kind {
 }
 
 /// The turns of a role, sorted by time.
-type Turns = Vec<(Stamp, Turn, NodeId, Bound)>;
+type RoleTurns = Vec<(Stamp, Turn, NodeId, Bound)>;
 
 /// The turns of all nodes: of each anonymous role together; any other node is a role of its own.
-fn turns_by_role<'a>(told: &Told<'a>) -> BTreeMap<&'a str, Turns> {
-    let mut all: BTreeMap<&str, Turns> = BTreeMap::new();
+fn turns_by_role<'a>(told: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
+    let mut all: BTreeMap<&str, RoleTurns> = BTreeMap::new();
     let nodes = (0..).zip(told.elements.nodes.iter().zip(&told.lives.nodes));
     for (id, (node, known)) in nodes.filter(|(id, _)| !told.is_timeless(Element::Node(*id))) {
         let of = all.entry(&*node.role).or_default();
@@ -102,7 +102,7 @@ fn turns_by_role<'a>(told: &Told<'a>) -> BTreeMap<&'a str, Turns> {
 }
 
 /// Tells of one role: an end that a beginning follows is a restart.
-fn tell_role(told: &Told<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &Turns) {
+fn tell_role(told: &LedgerInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &RoleTurns) {
     let mut rest = turns.as_slice();
     while let Some((&(_, turn, node, at), after)) = rest.split_first() {
         let back = after
@@ -144,7 +144,7 @@ fn tell_role(told: &Told<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &
 
 /// Tells of an edge: as a part of what its node does at that time, or alone.
 fn tell_edge(
-    told: &Told<'_>,
+    told: &LedgerInput<'_>,
     drafts: &mut Drafts,
     wholes: &mut Wholes,
     what: Element,

@@ -9,7 +9,7 @@ use crate::graph::{Element, Elements, Node};
 
 /// What the entries are made from.
 #[derive(Clone, Copy)]
-pub(crate) struct Told<'a> {
+pub(crate) struct LedgerInput<'a> {
     pub(crate) elements: &'a Elements,
     pub(crate) lives: &'a Lives,
     /// The share by which a rate must change, 0...
@@ -31,7 +31,7 @@ impl Drafts {
 }
 
 /// Every entry of a mission, sorted.
-pub(crate) fn make(told: &Told<'_>) -> Vec<Entry> {
+pub(crate) fn make(told: &LedgerInput<'_>) -> Vec<Entry> {
     let mut drafts = Drafts::default();
     lifetimes::tell(told, &mut drafts);
     silence::tell(told, &mut drafts);
@@ -74,7 +74,7 @@ pub(crate) fn sorted(mut list: Vec<Entry>, elements: &Elements) -> (Vec<Entry>, 
     (list, new)
 }
 
-impl Told<'_> {
+impl LedgerInput<'_> {
     /// An entry about an element at a moment.
     pub(crate) fn entry(&self, kind: Kind, what: Element, at: Bound) -> Entry {
         Entry {
@@ -152,7 +152,7 @@ fn is_tool(node: &Node) -> bool {
 }
 
 /// When nodes changed their lifecycle states.
-fn lifecycles(told: &Told<'_>, drafts: &mut Drafts) {
+fn lifecycles(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut states: std::collections::BTreeMap<u32, std::sync::Arc<str>> =
         std::collections::BTreeMap::new();
     for change in &told.lives.transitions {

@@ -1,6 +1,6 @@
 //! Whose rate changed: where two even stretches of one sender meet.
 
-use super::make::{Drafts, Told};
+use super::make::{Drafts, LedgerInput};
 use super::{Detail, Kind};
 use crate::graph::Element;
 use crate::graph::lives::{Bound, Stretch, Voice};
@@ -13,7 +13,7 @@ const HOLDS_NS: i64 = 3_000_000_000;
 const PAUSE_NS: i64 = 5_000_000_000;
 
 /// Tells of all changes of rate.
-pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let voices = told.lives.voices.iter();
     for voice in voices.filter(|v| !v.is_latched && !told.is_by_the_way(v.topic)) {
         for pair in voice.stretches.windows(2) {
@@ -49,7 +49,7 @@ fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
 }
 
 /// Whether the sender began anew between the two.
-fn is_away(told: &Told<'_>, voice: &Voice, before: &Stretch, after: &Stretch) -> bool {
+fn is_away(told: &LedgerInput<'_>, voice: &Voice, before: &Stretch, after: &Stretch) -> bool {
     let known = told.known(told.sender(voice));
     let lives = known.into_iter().flat_map(|k| &k.lives);
     !after.is_joined
@@ -58,7 +58,7 @@ fn is_away(told: &Told<'_>, voice: &Voice, before: &Stretch, after: &Stretch) ->
             .any(|end| before.last <= end.latest && end.time <= after.first)
 }
 
-impl Told<'_> {
+impl LedgerInput<'_> {
     /// The publication of a voice; its topic where nobody knows who sends.
     pub(super) fn sender(&self, voice: &Voice) -> Element {
         let place = voice.node.and_then(|node| {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::make::{Drafts, Told};
+use super::make::{Drafts, LedgerInput};
 use super::{EntryId, Kind};
 use crate::base::time::{Span, Stamp};
 use crate::graph::lives::{Bound, Known, Stretch, Voice, all_silent};
@@ -12,7 +12,7 @@ use crate::graph::{Element, NodeId, TopicId};
 type Silence = (Stamp, Option<Stamp>);
 
 /// Tells of all silences.
-pub(super) fn tell(told: &Told<'_>, drafts: &mut Drafts) {
+pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let pauses = Pauses::new(&told.lives.voices);
     let gone = Gone::new(drafts);
     let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EntryId)>> = BTreeMap::new();
@@ -68,7 +68,7 @@ impl Gone {
 
 /// The voices of each node, or of each topic.
 fn by<'a>(
-    told: &Told<'a>,
+    told: &LedgerInput<'a>,
     key: impl Fn(&Voice) -> Option<u32>,
 ) -> BTreeMap<TopicId, Vec<&'a Voice>> {
     let mut of: BTreeMap<u32, Vec<&Voice>> = BTreeMap::new();
@@ -80,7 +80,12 @@ fn by<'a>(
     of
 }
 
-fn silences(told: &Told<'_>, what: Element, voices: &[&Voice], pauses: &Pauses) -> Vec<Silence> {
+fn silences(
+    told: &LedgerInput<'_>,
+    what: Element,
+    voices: &[&Voice],
+    pauses: &Pauses,
+) -> Vec<Silence> {
     let spans = told.known(what).map(spans).unwrap_or_default();
     let stretches: Vec<&[Stretch]> = voices.iter().map(|v| &v.stretches[..]).collect();
     let mut all = all_silent(&stretches, &spans);
@@ -92,7 +97,12 @@ fn spans(known: &Known) -> Vec<Span> {
     known.lives.iter().map(|life| life.span).collect()
 }
 
-fn entry(told: &Told<'_>, what: Element, (from, to): Silence, voices: &[&Voice]) -> super::Entry {
+fn entry(
+    told: &LedgerInput<'_>,
+    what: Element,
+    (from, to): Silence,
+    voices: &[&Voice],
+) -> super::Entry {
     let last = voices
         .iter()
         .flat_map(|v| &v.stretches)

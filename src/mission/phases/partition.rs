@@ -85,14 +85,14 @@ fn rows(widths: &[i64], present: &[Presence]) -> Vec<(Vec<i64>, i128)> {
 mod tests {
     use std::sync::Arc;
 
-    use super::super::presence::Subject;
+    use super::super::presence::PresentThing;
     use super::*;
 
     /// Where a mission is cut, of which each text is an element and each sign a cell of a second.
     fn cuts(rows: &[(&str, usize)]) -> Vec<usize> {
         let presence = |(text, many): &(&str, usize)| {
             let row = Presence {
-                subject: Subject::Node(Arc::from("/n")),
+                subject: PresentThing::Node(Arc::from("/n")),
                 cells: text.chars().map(|c| c == '#').collect(),
             };
             vec![row; *many]

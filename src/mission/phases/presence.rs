@@ -14,7 +14,7 @@ const FILLED: i64 = 50;
 
 /// What is there or not.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Subject {
+pub(crate) enum PresentThing {
     /// A node, by role.
     Node(Arc<str>),
     /// A publication: role and topic.
@@ -23,7 +23,7 @@ pub(crate) enum Subject {
     Topic(Arc<str>),
 }
 
-impl Subject {
+impl PresentThing {
     /// The name of a node or topic; a publication's topic.
     pub(crate) fn name(&self) -> Arc<str> {
         match self {
@@ -35,7 +35,7 @@ impl Subject {
 /// Something, and the cells in which it is there.
 #[derive(Clone, Debug)]
 pub(crate) struct Presence {
-    pub(crate) subject: Subject,
+    pub(crate) subject: PresentThing,
     pub(crate) cells: Vec<bool>,
 }
 
@@ -43,9 +43,9 @@ impl Presence {
     /// Whether phases are told by it: nodes, or topics where there are only these.
     pub(crate) fn counts(&self, topics: bool) -> bool {
         match self.subject {
-            Subject::Node(_) => !topics,
-            Subject::Topic(_) => topics,
-            Subject::Publication(..) => false,
+            PresentThing::Node(_) => !topics,
+            PresentThing::Topic(_) => topics,
+            PresentThing::Publication(..) => false,
         }
     }
 }
@@ -54,13 +54,13 @@ impl Presence {
 pub(crate) fn is_topics(present: &[Presence]) -> bool {
     present
         .iter()
-        .any(|p| matches!(p.subject, Subject::Topic(_)))
+        .any(|p| matches!(p.subject, PresentThing::Topic(_)))
 }
 
 /// Every element's presence, sorted: nodes by role and their publications that carry messages; topics with messages
 /// where less than half of these have a known publisher. Housekeeping and recorders are left out.
 pub(crate) fn presences(elements: &Elements, activity: &Activity) -> Vec<Presence> {
-    let mut all: BTreeMap<Subject, Vec<bool>> = BTreeMap::new();
+    let mut all: BTreeMap<PresentThing, Vec<bool>> = BTreeMap::new();
     let many = activity.cells.len();
     let known = knows_publishers(elements, activity);
     for (at, cell) in activity.cells.iter().enumerate() {
@@ -113,7 +113,7 @@ pub(crate) fn knows_publishers(elements: &Elements, activity: &Activity) -> bool
 }
 
 /// Nodes that are alive and publications that are active or latched.
-fn nodes(elements: &Elements, cell: &Cell) -> Vec<Subject> {
+fn nodes(elements: &Elements, cell: &Cell) -> Vec<PresentThing> {
     let node = |id: u32| {
         let node = elements.nodes.get(id as usize);
         node.filter(|n| !is_hidden_node(n))
@@ -128,17 +128,17 @@ fn nodes(elements: &Elements, cell: &Cell) -> Vec<Subject> {
             .filter(|_| carries)?;
         let topic = elements.topics.get(of.topic as usize)?;
         let name = topic.name.shared();
-        (!is_quiet(&name)).then_some(Subject::Publication(node(of.node)?, name))
+        (!is_quiet(&name)).then_some(PresentThing::Publication(node(of.node)?, name))
     });
-    alive.map(Subject::Node).chain(sends).collect()
+    alive.map(PresentThing::Node).chain(sends).collect()
 }
 
 /// Topics that carry messages.
-fn topics(elements: &Elements, cell: &Cell) -> Vec<Subject> {
+fn topics(elements: &Elements, cell: &Cell) -> Vec<PresentThing> {
     let active = cell.graph.topics.iter().filter(|t| t.count > 0);
     let names = active.filter_map(|t| elements.topics.get(t.id as usize));
     let names = names.map(|t| t.name.shared()).filter(|n| !is_quiet(n));
-    names.map(Subject::Topic).collect()
+    names.map(PresentThing::Topic).collect()
 }
 
 /// The cells with every absence of at most `most` nanoseconds between two presences filled.

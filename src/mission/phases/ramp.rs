@@ -10,7 +10,7 @@ const SHORT: i64 = 8;
 
 /// What a phase does to the one before it.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum PhaseEffect {
     Up,
     Down,
 }
@@ -21,14 +21,14 @@ pub(crate) fn joined(
     found: &[Configuration],
     whole: i64,
 ) -> (Vec<Span>, Vec<Configuration>, Vec<bool>) {
-    let ways: Vec<Option<Way>> = (0..found.len())
+    let ways: Vec<Option<PhaseEffect>> = (0..found.len())
         .map(|k| {
             let short = i128::from(spans[k].nanos()) * 100 < i128::from(whole) * i128::from(SHORT);
             let before = &found[k.checked_sub(1)?].names;
             let now = &found[k].names;
             match (short, before.is_subset(now), now.is_subset(before)) {
-                (true, true, false) => Some(Way::Up),
-                (true, false, true) => Some(Way::Down),
+                (true, true, false) => Some(PhaseEffect::Up),
+                (true, false, true) => Some(PhaseEffect::Down),
                 _ => None,
             }
         })

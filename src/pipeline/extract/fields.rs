@@ -7,7 +7,7 @@ use super::{Extract, Extracted, of_report, stop};
 use crate::bag::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
-use crate::base::table::{Batch, Column, Kind, Values};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn};
 use crate::base::time::Stamp;
 use crate::evidence::message::fields::Decoder;
 use crate::export::tables::TableFormat;
@@ -112,7 +112,7 @@ impl Tables {
         if let Some(at) = self.all.iter().position(same) {
             return at;
         }
-        let columns = std::iter::once(Column::full(TIME, Kind::Time, 0));
+        let columns = std::iter::once(TableColumn::full(TIME, ColumnKind::Time, 0));
         self.all.push(Table {
             topic: connection.topic.as_str().to_owned(),
             type_name: connection.type_name.as_ref().to_owned(),
@@ -128,7 +128,7 @@ impl Tables {
     /// Adds a message to a table; `false` if it could not be decoded.
     fn add(&mut self, at: usize, message: &Message<'_>) -> bool {
         let table = &mut self.all[at];
-        if let Values::I64(times) = &mut table.batch.columns[0].values {
+        if let ColumnValues::I64(times) = &mut table.batch.columns[0].values {
             times.push(message.time.0);
         }
         if table

@@ -5,10 +5,10 @@ use crate::bag::{Connection, ConnectionId, Message, Sink as Takes, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, Notices};
-use crate::base::table::{Batch, Cell, Kind};
+use crate::base::table::{Batch, ColumnKind, TableCell};
 use crate::base::time::Stamp;
 use crate::evidence::times::{SeriesId, Stamps, Timed};
-use crate::export::sink::Sink;
+use crate::export::sink::OutputSink;
 use crate::export::tables::writer::Writer;
 use crate::pipeline::Watch;
 use crate::view::NameFilter;
@@ -16,12 +16,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// The columns of the table.
-const COLUMNS: &[(&str, Kind)] = &[
-    ("time_ns", Kind::Time),
-    ("topic", Kind::Text),
-    ("type", Kind::Text),
-    ("publisher", Kind::Text),
-    ("size_bytes", Kind::I64),
+const COLUMNS: &[(&str, ColumnKind)] = &[
+    ("time_ns", ColumnKind::Time),
+    ("topic", ColumnKind::Text),
+    ("type", ColumnKind::Text),
+    ("publisher", ColumnKind::Text),
+    ("size_bytes", ColumnKind::I64),
 ];
 
 /// How many rows are gathered before they are written.
@@ -30,7 +30,7 @@ const MOST_ROWS: usize = 16 * 1024;
 /// Reads all times first, which takes little memory (what does not fit goes to an unnamed file), then writes them
 /// sorted: bags that overlap in time are one table in order.
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
-    let sink = Sink::create(&job.target, None)?;
+    let sink = OutputSink::create(&job.target, None)?;
     let range = job.range(watch)?;
     let mut taken = Taken::default();
     for mut reader in job.open()? {
@@ -126,7 +126,7 @@ impl Takes for OfBag<'_> {
 }
 
 /// Writes all rows in order of time, those of one time in the order of their connections.
-fn write(job: &Extract, taken: &mut Taken, sink: Sink, watch: &mut dyn Watch) -> Result<u64> {
+fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Watch) -> Result<u64> {
     let spool = |e| Error::io("read", Path::new("temporary file of times"))(e);
     taken.stamps.finish().map_err(spool)?;
     let failed = || Error::io("write", job.target.path());
@@ -153,12 +153,12 @@ fn write(job: &Extract, taken: &mut Taken, sink: Sink, watch: &mut dyn Watch) ->
     Ok(rows)
 }
 
-fn row<'a>(source: &'a Source, timed: &Timed) -> [Cell<'a>; 5] {
+fn row<'a>(source: &'a Source, timed: &Timed) -> [TableCell<'a>; 5] {
     [
-        Cell::Time(timed.time),
-        Cell::text(source.topic.as_str()),
-        Cell::text(&*source.type_name),
-        Cell::known(source.publisher.as_deref(), Cell::text),
-        Cell::known(source.is_sized.then_some(timed.size), Cell::count),
+        TableCell::Time(timed.time),
+        TableCell::text(source.topic.as_str()),
+        TableCell::text(&*source.type_name),
+        TableCell::known(source.publisher.as_deref(), TableCell::text),
+        TableCell::known(source.is_sized.then_some(timed.size), TableCell::count),
     ]
 }

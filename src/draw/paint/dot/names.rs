@@ -32,12 +32,12 @@ pub(crate) fn escape_name(name: &str) -> String {
 
 /// The id of every item and namespace of a view, ready to be written.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Ids {
+pub(super) struct DotIds {
     pub(super) items: Vec<String>,
     pub(super) namespaces: Vec<String>,
 }
 
-impl Ids {
+impl DotIds {
     pub(super) fn new(view: &View) -> Self {
         let mut taken = BTreeSet::new();
         let item = |kind, name: &str| match kind {
@@ -136,7 +136,7 @@ mod tests {
                 ..ViewOptions::default()
             },
         );
-        let ids = Ids::new(&view);
+        let ids = DotIds::new(&view);
         let want = [
             "n___a___b",
             "n___a__b",

@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 
 use super::names::quoted;
-use super::{Drawing, line, pen_width, rate};
+use super::{DotView, line, pen_width, rate};
 use crate::draw::style::Body;
 use crate::graph::State;
 use crate::view::{Arrow, Frame, Item, ItemKind, Shown};
 
 const FONTS: &str = "Helvetica,Arial,sans-serif";
 
-pub(super) fn write(drawing: &Drawing<'_>, frame: &Frame, title: &str) -> String {
+pub(super) fn write(drawing: &DotView<'_>, frame: &Frame, title: &str) -> String {
     let style = &drawing.style;
     let mut out = format!(
         "digraph graphname {{\n graph [rankdir=LR, compound=true, label={}, labelloc=t, fontsize=16, fontcolor=\"{}\", fontname=\"{FONTS}\"];\n",
@@ -38,7 +38,7 @@ pub(super) fn write(drawing: &Drawing<'_>, frame: &Frame, title: &str) -> String
 
 /// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
 fn members(
-    drawing: &Drawing<'_>,
+    drawing: &DotView<'_>,
     frame: &Frame,
     out: &mut String,
     home: Option<usize>,
@@ -77,7 +77,7 @@ fn members(
     }
 }
 
-fn node(drawing: &Drawing<'_>, item: &Item, shown: &Shown) -> String {
+fn node(drawing: &DotView<'_>, item: &Item, shown: &Shown) -> String {
     let (shape, body) = look(drawing, item.kind);
     let change = drawing.colour(shown);
     let dead = matches!(shown.state, State::Silent | State::Declared);
@@ -99,7 +99,7 @@ fn node(drawing: &Drawing<'_>, item: &Item, shown: &Shown) -> String {
     out
 }
 
-fn look<'a>(drawing: &'a Drawing<'_>, kind: ItemKind) -> (&'static str, &'a Body) {
+fn look<'a>(drawing: &'a DotView<'_>, kind: ItemKind) -> (&'static str, &'a Body) {
     match kind {
         ItemKind::Node => ("ellipse", &drawing.style.node),
         ItemKind::Namespace => ("box3d", &drawing.style.node),
@@ -108,7 +108,7 @@ fn look<'a>(drawing: &'a Drawing<'_>, kind: ItemKind) -> (&'static str, &'a Body
     }
 }
 
-fn edge(drawing: &Drawing<'_>, out: &mut String, arrow: &Arrow, shown: &Shown) {
+fn edge(drawing: &DotView<'_>, out: &mut String, arrow: &Arrow, shown: &Shown) {
     let ids = &drawing.ids.items;
     let (Some(from), Some(to)) = (ids.get(arrow.from as usize), ids.get(arrow.to as usize)) else {
         return;
@@ -143,7 +143,7 @@ mod tests {
     fn it_has_a_title_and_colours_and_no_places() {
         let mission = mission(&["/ns/a>/t@3", "/ns/a>/t@3 /b</t"]);
         let (view, _) = view(&mission, &ViewOptions::default());
-        let drawing = Drawing::new(&mission, &view, Style::builtin("light").unwrap());
+        let drawing = DotView::new(&mission, &view, Style::builtin("light").unwrap());
         let file = drawing.write(&view.frames[1], "a \"bag\", window 2 of 2");
         assert!(file.contains(r#"label="a \"bag\", window 2 of 2""#) && !file.contains("pos="));
         let added = format!(

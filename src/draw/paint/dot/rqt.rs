@@ -7,7 +7,7 @@
 use std::fmt::Write as _;
 
 use super::names::{escape_name, quoted};
-use super::{Drawing, line, pen_width, rate};
+use super::{DotView, line, pen_width, rate};
 use crate::base::geometry::{Point, Rect};
 use crate::graph::Element;
 use crate::layout::{Layout, Route};
@@ -27,8 +27,8 @@ pub(super) fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
     }
 }
 
-pub(super) fn write(drawing: &Drawing<'_>, layout: &Layout, frame: &Frame) -> String {
-    let writer = Writer {
+pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, frame: &Frame) -> String {
+    let writer = RqtWriter {
         drawing,
         layout,
         frame,
@@ -46,13 +46,13 @@ pub(super) fn write(drawing: &Drawing<'_>, layout: &Layout, frame: &Frame) -> St
     out
 }
 
-struct Writer<'a> {
-    drawing: &'a Drawing<'a>,
+struct RqtWriter<'a> {
+    drawing: &'a DotView<'a>,
     layout: &'a Layout,
     frame: &'a Frame,
 }
 
-impl Writer<'_> {
+impl RqtWriter<'_> {
     /// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
     fn members(&self, out: &mut String, home: Option<usize>, inhabited: &[bool], depth: usize) {
         let indent = " ".repeat(depth);
@@ -317,7 +317,7 @@ mod tests {
         let mission = mission(windows);
         let (view, _) = view(&mission, options);
         let style = Style::builtin("light").unwrap();
-        let drawing = Drawing::new(&mission, &view, style).laid_out(&Fonts::bundled());
+        let drawing = DotView::new(&mission, &view, style).laid_out(&Fonts::bundled());
         drawing.write(view.frames.last().unwrap(), "")
     }
 

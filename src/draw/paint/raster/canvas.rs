@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::tiles::{SIDE, Tiles};
-use super::{Drawn, Painter, Pixels, Sheet, opaque};
+use super::{Painter, PixelSheet, Pixels, RasterGroup, opaque};
 use crate::base::error::Result;
 use crate::draw::scene::{Group, Scene};
 
@@ -21,9 +21,9 @@ pub struct Canvas<'a> {
 
 struct Last {
     scene: Scene,
-    drawn: Vec<Arc<Drawn>>,
-    sheet: Sheet,
-    scratch: Sheet,
+    drawn: Vec<Arc<RasterGroup>>,
+    sheet: PixelSheet,
+    scratch: PixelSheet,
     /// What differs from the scene before; `None` for all of it.
     dirty: Option<Tiles>,
 }
@@ -72,8 +72,8 @@ impl Last {
         let read = |group| painter.read(&scene, group);
         let drawn: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
         Ok(Self {
-            sheet: Sheet::covered(&scene, &drawn, scale)?,
-            scratch: Sheet::of(&scene, scale)?,
+            sheet: PixelSheet::covered(&scene, &drawn, scale)?,
+            scratch: PixelSheet::of(&scene, scale)?,
             scene,
             drawn,
             dirty: None,
@@ -106,7 +106,7 @@ impl Last {
     }
 
     /// Draws what meets these tiles, and copies the tiles alone.
-    fn mend(&mut self, scene: &Scene, drawn: &[Arc<Drawn>], dirty: &Tiles) {
+    fn mend(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>], dirty: &Tiles) {
         self.scratch.clear(dirty, scene);
         for group in drawn.iter().filter(|d| d.tiles.meets(dirty)) {
             self.scratch.draw(group);
@@ -126,7 +126,12 @@ impl Last {
     }
 
     /// The tiles under everything that differs; `None` where all has to be drawn anew.
-    fn dirty(&self, scene: &Scene, drawn: &[Arc<Drawn>], stays: &[Option<usize>]) -> Option<Tiles> {
+    fn dirty(
+        &self,
+        scene: &Scene,
+        drawn: &[Arc<RasterGroup>],
+        stays: &[Option<usize>],
+    ) -> Option<Tiles> {
         // What stays must stay in order, or what lies above what would differ.
         if !stays.iter().flatten().is_sorted() {
             return None;
@@ -142,7 +147,7 @@ impl Last {
     }
 }
 
-impl Sheet {
+impl PixelSheet {
     /// The bytes of each row of pixels inside the tiles, by their place.
     fn rows(&self, tiles: &Tiles) -> impl Iterator<Item = Range<usize>> + use<> {
         let (width, height) = (self.pixels.width as usize, self.pixels.height as usize);

@@ -1,10 +1,10 @@
 //! First pass over a C++ file: its classes, what its types are called, and what its variables stand for.
 
-use super::Reader;
+use super::CppReader;
 use super::made::Callee;
 use crate::evidence::syntax::{Node, children, line};
 
-impl<'a> Reader<'a> {
+impl<'a> CppReader<'a> {
     /// First pass: classes, names of types, and what variables stand for.
     pub(super) fn look(&mut self, node: Node<'a>) {
         match node.kind() {

@@ -7,7 +7,7 @@ use crate::evidence::syntax::{Node, Parsed, children};
 
 /// Names that stand for others in a file.
 #[derive(Debug, Default)]
-pub(super) struct Names {
+pub(super) struct Aliases {
     aliases: BTreeMap<String, String>,
     /// Namespaces all of whose names are used.
     open: Vec<String>,
@@ -16,7 +16,7 @@ pub(super) struct Names {
 /// Aliases of aliases further than this are not followed.
 const DEEPEST: usize = 8;
 
-impl Names {
+impl Aliases {
     /// Takes an element in that gives a name to something.
     pub(super) fn look(&mut self, parsed: &Parsed, node: Node<'_>) {
         let text = |node: Node<'_>| parsed.text(node).trim().to_owned();

@@ -1,12 +1,12 @@
 //! Second pass over a C++ file: the calls and variables that make publishers, subscribers and nodes.
 
 use super::super::declaration::{Call, Made, short};
-use super::Reader;
+use super::CppReader;
 use super::look::first_parameter;
 use super::made::{self, Callee, by_constructor, by_function, is_recorder};
 use crate::evidence::syntax::{Node, children, line, walk};
 
-impl<'a> Reader<'a> {
+impl<'a> CppReader<'a> {
     /// Second pass: calls and variables that make something.
     pub(super) fn take(&mut self, node: Node<'a>) {
         match node.kind() {

@@ -1,11 +1,11 @@
 //! The texts that expressions of C++ stand for: literals, constants, members, defaults of parameters.
 
 use super::super::texts::{DEEPEST, LONGEST, most_work};
-use super::Reader;
+use super::CppReader;
 use super::made::Callee;
 use crate::evidence::syntax::{Node, children};
 
-impl<'a> Reader<'a> {
+impl<'a> CppReader<'a> {
     pub(super) fn literal(&self, node: Node<'a>) -> String {
         children(node)
             .into_iter()

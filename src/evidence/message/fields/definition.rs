@@ -21,7 +21,7 @@ pub(super) enum Array {
 
 /// A message: its package, its own name, its fields.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Message {
+pub(super) struct MessageFields {
     package: String,
     name: String,
     pub(super) fields: Vec<Field>,
@@ -30,7 +30,7 @@ pub(super) struct Message {
 /// A definition, the outermost message first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Definition {
-    pub(super) messages: Vec<Message>,
+    pub(super) messages: Vec<MessageFields>,
 }
 
 impl Definition {
@@ -47,11 +47,11 @@ impl Definition {
         if text.contains("module ") && text.contains("struct ") {
             return Err("its definition is written in IDL, which is not decoded".to_owned());
         }
-        let mut messages = vec![Message::new(type_name)];
+        let mut messages = vec![MessageFields::new(type_name)];
         for line in text.lines() {
             let line = without_comment(line);
             if let Some(name) = line.strip_prefix("MSG:") {
-                messages.push(Message::new(name.trim()));
+                messages.push(MessageFields::new(name.trim()));
             } else if let (Some(field), Some(message)) = (field(line)?, messages.last_mut()) {
                 message.fields.push(field);
             }
@@ -65,7 +65,7 @@ impl Definition {
     /// # Errors
     /// If the definition does not hold it.
     pub(super) fn find(&self, from: usize, kind: &str) -> Result<usize, String> {
-        let wanted = Message::new(kind);
+        let wanted = MessageFields::new(kind);
         let own = &self.messages[from].package;
         let package = if wanted.package.is_empty() {
             own
@@ -82,7 +82,7 @@ impl Definition {
     }
 }
 
-impl Message {
+impl MessageFields {
     /// `std_msgs/Header`, `std_msgs/msg/Header` or `Header`, without fields yet.
     fn new(name: &str) -> Self {
         let mut parts = name.split('/');

@@ -30,7 +30,7 @@ fn decoded(connection: &Connection, data: &[u8]) -> Result<Batch, String> {
 /// The table as CSV.
 fn csv(connection: &Connection, data: &[u8]) -> String {
     let batch = decoded(connection, data).unwrap();
-    let mut rows = crate::base::csv::Rows::new(Vec::new(), &batch).unwrap();
+    let mut rows = crate::base::csv::CsvRows::new(Vec::new(), &batch).unwrap();
     rows.write(&batch).unwrap();
     String::from_utf8(rows.finish().unwrap()).unwrap()
 }

@@ -4,7 +4,7 @@ use super::super::tree::Tree;
 use super::UNREAD;
 use super::call::Arguments;
 use super::evaluator::Evaluator;
-use super::value::Value;
+use super::value::PythonValue;
 
 /// Actions that start no node and change no name.
 const OTHER: &[&str] = &[
@@ -26,24 +26,24 @@ const OTHER: &[&str] = &[
 
 impl Evaluator<'_> {
     /// The action that a call makes; `None` if it makes none.
-    pub(super) fn action(&mut self, name: &str, arguments: &Arguments) -> Option<Value> {
+    pub(super) fn action(&mut self, name: &str, arguments: &Arguments) -> Option<PythonValue> {
         let mut tree = match name {
             "LaunchDescription" => {
                 return Some(match arguments.get(0, "initial_entities") {
-                    Some(list @ Value::List(_)) => list.clone(),
-                    Some(Value::None) | None => Value::List(Vec::new()),
-                    Some(other) => Value::List(vec![other.clone()]),
+                    Some(list @ PythonValue::List(_)) => list.clone(),
+                    Some(PythonValue::None) | None => PythonValue::List(Vec::new()),
+                    Some(other) => PythonValue::List(vec![other.clone()]),
                 });
             }
             "OpaqueFunction" => self.opaque(arguments),
             _ => tree(name, arguments)?,
         };
         tree.line = arguments.line;
-        if let Some(Value::Action(condition)) = arguments.named("condition") {
+        if let Some(PythonValue::Action(condition)) = arguments.named("condition") {
             tree.attributes.extend(condition.attributes.iter().cloned());
         } else if arguments
             .named("condition")
-            .is_some_and(|c| *c != Value::None)
+            .is_some_and(|c| *c != PythonValue::None)
         {
             tree.attributes
                 .push(("if".to_owned(), "$(unknown)".to_owned()));
@@ -52,25 +52,25 @@ impl Evaluator<'_> {
             tree.attributes
                 .insert(0, ("if".to_owned(), "$(unknown)".to_owned()));
         }
-        Some(Value::Action(tree))
+        Some(PythonValue::Action(tree))
     }
 
     /// A function that the launch system calls: followed like any other of this file; what it asks the running system
     /// is not known.
     fn opaque(&mut self, arguments: &Arguments) -> Tree {
         let function = match arguments.get(0, "function") {
-            Some(Value::Function(name)) => self.function(name),
+            Some(PythonValue::Function(name)) => self.function(name),
             _ => None,
         };
         let Some(function) = function else {
             return element(UNREAD, &[]);
         };
-        let mut positional = vec![Value::Unknown(arguments.line)];
-        if let Some(Value::List(more)) = arguments.named("args") {
+        let mut positional = vec![PythonValue::Unknown(arguments.line)];
+        if let Some(PythonValue::List(more)) = arguments.named("args") {
             positional.extend(more.iter().cloned());
         }
         let named = match arguments.named("kwargs") {
-            Some(Value::Dict(map)) => map.clone(),
+            Some(PythonValue::Dict(map)) => map.clone(),
             _ => Vec::new(),
         };
         let made = self.call(function, &positional, &named);
@@ -174,9 +174,9 @@ fn node(tag: &str, given: &Arguments) -> Tree {
             ),
         ],
     );
-    if let Some(Value::List(remaps)) = given.named("remappings") {
+    if let Some(PythonValue::List(remaps)) = given.named("remappings") {
         for remap in remaps {
-            if let Value::List(pair) = remap
+            if let PythonValue::List(pair) = remap
                 && let [from, to] = &pair[..]
             {
                 let sides = [
@@ -198,17 +198,17 @@ fn include(given: &Arguments) -> Tree {
         &[("file", file), ("pass_all_args", Some("true".to_owned()))],
     );
     let pairs = match given.get(1, "launch_arguments") {
-        Some(Value::List(pairs)) => pairs.clone(),
-        Some(Value::Dict(map)) => {
-            let pair = |(key, value): &(String, Value)| {
-                Value::List(vec![Value::Text(key.clone()), value.clone()])
+        Some(PythonValue::List(pairs)) => pairs.clone(),
+        Some(PythonValue::Dict(map)) => {
+            let pair = |(key, value): &(String, PythonValue)| {
+                PythonValue::List(vec![PythonValue::Text(key.clone()), value.clone()])
             };
             map.iter().map(pair).collect()
         }
         _ => Vec::new(),
     };
     for pair in pairs {
-        if let Value::List(pair) = pair
+        if let PythonValue::List(pair) = pair
             && let [name, value] = &pair[..]
         {
             let sides = [
@@ -233,11 +233,11 @@ fn element(tag: &str, attributes: &[(&str, Option<String>)]) -> Tree {
 }
 
 /// The actions in a value, lists taken apart; what is not known is left as such.
-pub(super) fn trees(value: &Value) -> Vec<Tree> {
+pub(super) fn trees(value: &PythonValue) -> Vec<Tree> {
     match value {
-        Value::List(list) => list.iter().flat_map(trees).collect(),
-        Value::Action(tree) => vec![tree.clone()],
-        Value::Unknown(line) => vec![Tree {
+        PythonValue::List(list) => list.iter().flat_map(trees).collect(),
+        PythonValue::Action(tree) => vec![tree.clone()],
+        PythonValue::Unknown(line) => vec![Tree {
             tag: UNREAD.to_owned(),
             line: *line,
             ..Tree::default()

@@ -1,25 +1,25 @@
 //! Calls in a launch file: functions of the file, paths and texts, lists that grow, and the launch system's substitutions.
 
 use super::evaluator::Evaluator;
-use super::value::Value;
+use super::value::PythonValue;
 use crate::evidence::syntax::{Node, children, line};
 
 /// The arguments of a call, in order and by name.
 #[derive(Debug, Default)]
 pub(super) struct Arguments {
-    pub(super) positional: Vec<Value>,
-    pub(super) named: Vec<(String, Value)>,
+    pub(super) positional: Vec<PythonValue>,
+    pub(super) named: Vec<(String, PythonValue)>,
     pub(super) line: usize,
 }
 
 impl Arguments {
     /// The argument of this name, or the one at `place`.
-    pub(super) fn get(&self, place: usize, name: &str) -> Option<&Value> {
+    pub(super) fn get(&self, place: usize, name: &str) -> Option<&PythonValue> {
         self.named(name).or(self.positional.get(place))
     }
 
     /// The argument of this name.
-    pub(super) fn named(&self, name: &str) -> Option<&Value> {
+    pub(super) fn named(&self, name: &str) -> Option<&PythonValue> {
         self.named
             .iter()
             .find(|(n, _)| n == name)
@@ -29,15 +29,15 @@ impl Arguments {
     /// The same as a text of launch files.
     pub(super) fn text(&self, place: usize, name: &str) -> Option<String> {
         self.get(place, name)
-            .filter(|v| **v != Value::None)
-            .map(Value::launch_text)
+            .filter(|v| **v != PythonValue::None)
+            .map(PythonValue::launch_text)
     }
 }
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn call_expression(&mut self, node: Node<'a>) -> Value {
+    pub(super) fn call_expression(&mut self, node: Node<'a>) -> PythonValue {
         let Some(function) = node.child_by_field_name("function") else {
-            return Value::Unknown(line(node));
+            return PythonValue::Unknown(line(node));
         };
         let arguments = self.arguments(node);
         if function.kind() == "attribute"
@@ -53,7 +53,7 @@ impl<'a> Evaluator<'a> {
         }
         let full = self.text(function);
         let name = full.rsplit('.').next().unwrap_or(full);
-        if let ("arg", Some(Value::Text(argument))) = (full, arguments.positional.first()) {
+        if let ("arg", Some(PythonValue::Text(argument))) = (full, arguments.positional.first()) {
             return self.lookup(argument, node);
         }
         if let Some(own) = self.function(name) {
@@ -63,7 +63,7 @@ impl<'a> Evaluator<'a> {
             .action(name, &arguments)
             .or_else(|| substitution(name, &arguments))
             .or_else(|| plain(full, &arguments))
-            .unwrap_or(Value::Unknown(line(node)));
+            .unwrap_or(PythonValue::Unknown(line(node)));
         self.kept(value, node)
     }
 
@@ -87,7 +87,9 @@ impl<'a> Evaluator<'a> {
                     arguments.named.push((self.text(name).to_owned(), value));
                 }
                 ("dictionary_splat", ..) => {
-                    if let Some(Value::Dict(map)) = argument.named_child(0).map(|n| self.value(n)) {
+                    if let Some(PythonValue::Dict(map)) =
+                        argument.named_child(0).map(|n| self.value(n))
+                    {
                         arguments.named.extend(map);
                     }
                 }
@@ -105,19 +107,25 @@ impl<'a> Evaluator<'a> {
     }
 
     /// A method of a value that is known: lists grow, texts are formatted.
-    fn method(&mut self, object: Node<'a>, name: &str, arguments: &Arguments) -> Option<Value> {
+    fn method(
+        &mut self,
+        object: Node<'a>,
+        name: &str,
+        arguments: &Arguments,
+    ) -> Option<PythonValue> {
         let first = || arguments.positional.first().cloned();
         match name {
             "append" | "add_action" | "add_entity" => self.grow(object, vec![first()?]),
             "insert" => self.grow(object, vec![arguments.positional.get(1)?.clone()]),
             "extend" => match first()? {
-                Value::List(list) => self.grow(object, list),
+                PythonValue::List(list) => self.grow(object, list),
                 other => self.grow(object, vec![other]),
             },
             "items" => match self.value(object) {
-                Value::Dict(map) => {
-                    let pair = |(key, value)| Value::List(vec![Value::Text(key), value]);
-                    Some(Value::List(map.into_iter().map(pair).collect()))
+                PythonValue::Dict(map) => {
+                    let pair =
+                        |(key, value)| PythonValue::List(vec![PythonValue::Text(key), value]);
+                    Some(PythonValue::List(map.into_iter().map(pair).collect()))
                 }
                 _ => None,
             },
@@ -127,23 +135,23 @@ impl<'a> Evaluator<'a> {
                 let share = self.value(object).text()?;
                 share
                     .starts_with("$(find-pkg-share")
-                    .then_some(Value::Text(share))
+                    .then_some(PythonValue::Text(share))
             }
             "format" => {
                 let text = self.value(object).text()?;
-                formatted(&text, arguments).map(Value::Text)
+                formatted(&text, arguments).map(PythonValue::Text)
             }
             "lower" => self
                 .value(object)
                 .text()
                 .filter(|t| !t.contains("$("))
-                .map(|t| Value::Text(t.to_lowercase())),
+                .map(|t| PythonValue::Text(t.to_lowercase())),
             "get" => {
                 if self.text(object) == "os.environ" {
                     return plain("os.getenv", arguments);
                 }
                 match self.value(object) {
-                    Value::Dict(map) => {
+                    PythonValue::Dict(map) => {
                         let key = first()?.launch_text();
                         let found = map
                             .into_iter()
@@ -151,7 +159,11 @@ impl<'a> Evaluator<'a> {
                             .map(|(_, value)| value);
                         Some(
                             found.unwrap_or(
-                                arguments.positional.get(1).cloned().unwrap_or(Value::None),
+                                arguments
+                                    .positional
+                                    .get(1)
+                                    .cloned()
+                                    .unwrap_or(PythonValue::None),
                             ),
                         )
                     }
@@ -163,17 +175,17 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Adds to the list that a name stands for.
-    fn grow(&mut self, object: Node<'a>, more: Vec<Value>) -> Option<Value> {
-        let more = self.kept(Value::List(more), object);
-        if let (Value::List(list), Value::List(more)) = (self.variable(object)?, more) {
+    fn grow(&mut self, object: Node<'a>, more: Vec<PythonValue>) -> Option<PythonValue> {
+        let more = self.kept(PythonValue::List(more), object);
+        if let (PythonValue::List(list), PythonValue::List(more)) = (self.variable(object)?, more) {
             list.extend(more);
         }
-        Some(Value::None)
+        Some(PythonValue::None)
     }
 
     /// `Path(…).parent` and the like.
-    pub(super) fn attribute(&mut self, node: Node<'a>) -> Value {
-        let unknown = Value::Unknown(line(node));
+    pub(super) fn attribute(&mut self, node: Node<'a>) -> PythonValue {
+        let unknown = PythonValue::Unknown(line(node));
         let Some(object) = node.child_by_field_name("object") else {
             return unknown;
         };
@@ -181,14 +193,14 @@ impl<'a> Evaluator<'a> {
             .child_by_field_name("attribute")
             .map_or("", |n| self.text(n));
         match (name, self.value(object)) {
-            ("parent", Value::Text(path)) => Value::Text(parent(&path).to_owned()),
+            ("parent", PythonValue::Text(path)) => PythonValue::Text(parent(&path).to_owned()),
             _ => unknown,
         }
     }
 }
 
 /// What the launch system fills in, in the words of its XML form.
-fn substitution(name: &str, arguments: &Arguments) -> Option<Value> {
+fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
     let text = |place, name| arguments.text(place, name);
     let made = match name {
         "LaunchConfiguration" => match text(1, "default") {
@@ -210,7 +222,7 @@ fn substitution(name: &str, arguments: &Arguments) -> Option<Value> {
             }
         }
         "PathJoinSubstitution" | "PathJoin" => match arguments.get(0, "substitutions")? {
-            Value::List(parts) => path(parts),
+            PythonValue::List(parts) => path(parts),
             other => other.launch_text(),
         },
         "PythonExpression" => format!("$(eval {})", text(0, "expression")?),
@@ -231,24 +243,26 @@ fn substitution(name: &str, arguments: &Arguments) -> Option<Value> {
         | "FrontendLaunchDescriptionSource" => text(0, "launch_file_path")?,
         _ => return None,
     };
-    Some(Value::Text(made))
+    Some(PythonValue::Text(made))
 }
 
 /// Functions of Python itself.
-fn plain(full: &str, arguments: &Arguments) -> Option<Value> {
+fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
     let first = arguments.positional.first();
-    let text = || first.map(Value::launch_text);
+    let text = || first.map(PythonValue::launch_text);
     match full {
-        "os.path.join" | "path.join" | "join" => Some(Value::Text(path(&arguments.positional))),
-        "os.path.dirname" | "path.dirname" => Some(Value::Text(parent(&text()?).to_owned())),
+        "os.path.join" | "path.join" | "join" => {
+            Some(PythonValue::Text(path(&arguments.positional)))
+        }
+        "os.path.dirname" | "path.dirname" => Some(PythonValue::Text(parent(&text()?).to_owned())),
         "os.path.abspath" | "os.path.realpath" | "os.path.normpath" | "Path" | "pathlib.Path"
-        | "str" => text().map(Value::Text),
+        | "str" => text().map(PythonValue::Text),
         "os.getenv" | "os.environ.get" => substitution("getenv", arguments),
-        "list" | "tuple" => Some(first.cloned().unwrap_or(Value::List(Vec::new()))),
-        "dict" => Some(Value::Dict(arguments.named.clone())),
+        "list" | "tuple" => Some(first.cloned().unwrap_or(PythonValue::List(Vec::new()))),
+        "dict" => Some(PythonValue::Dict(arguments.named.clone())),
         "range" => {
             let number = |at: usize| match arguments.positional.get(at) {
-                Some(Value::Number(number)) => Some(*number),
+                Some(PythonValue::Number(number)) => Some(*number),
                 _ => None,
             };
             let (from, to) = match number(1) {
@@ -256,18 +270,18 @@ fn plain(full: &str, arguments: &Arguments) -> Option<Value> {
                 None => (0, number(0)?),
             };
             let is_small = to.checked_sub(from).is_some_and(|n| n <= 1000);
-            is_small.then(|| Value::List((from..to).map(Value::Number).collect()))
+            is_small.then(|| PythonValue::List((from..to).map(PythonValue::Number).collect()))
         }
         "len" => match first? {
-            Value::List(list) => i64::try_from(list.len()).ok().map(Value::Number),
+            PythonValue::List(list) => i64::try_from(list.len()).ok().map(PythonValue::Number),
             _ => None,
         },
         "enumerate" => match first? {
-            Value::List(list) => {
+            PythonValue::List(list) => {
                 let pairs = (0..)
                     .zip(list)
-                    .map(|(n, v)| Value::List(vec![Value::Number(n), v.clone()]));
-                Some(Value::List(pairs.collect()))
+                    .map(|(n, v)| PythonValue::List(vec![PythonValue::Number(n), v.clone()]));
+                Some(PythonValue::List(pairs.collect()))
             }
             _ => None,
         },
@@ -276,7 +290,7 @@ fn plain(full: &str, arguments: &Arguments) -> Option<Value> {
 }
 
 /// The parts of a path behind each other; one that begins with a slash stands for itself.
-fn path(parts: &[Value]) -> String {
+fn path(parts: &[PythonValue]) -> String {
     let mut joined = String::new();
     for part in parts {
         let part = part.launch_text();

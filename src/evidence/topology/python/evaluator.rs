@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::super::substitution::LONGEST;
-use super::value::{DEEPEST, Value};
+use super::value::{DEEPEST, PythonValue};
 use crate::base::budget::LaunchWork;
 use crate::evidence::syntax::{Node, Parsed, children, line};
 
@@ -16,7 +16,7 @@ const STEP: usize = 16;
 
 pub(super) struct Evaluator<'a> {
     pub(super) parsed: &'a Parsed,
-    frames: Vec<Frame>,
+    frames: Vec<Locals>,
     functions: BTreeMap<String, Node<'a>>,
     pub(super) budget: LaunchWork,
     /// How many conditions that are not known stand around the statement.
@@ -26,25 +26,25 @@ pub(super) struct Evaluator<'a> {
 
 /// The names of a function that is being followed.
 #[derive(Default)]
-struct Frame {
-    names: BTreeMap<String, Value>,
-    returned: Option<Value>,
+struct Locals {
+    names: BTreeMap<String, PythonValue>,
+    returned: Option<PythonValue>,
     /// `undecided` where the function was called.
     undecided: usize,
 }
 
 /// What comes after a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Flow {
+enum ControlFlow {
     Next,
     Done,
 }
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn new(parsed: &'a Parsed, names: BTreeMap<String, Value>) -> Self {
-        let global = Frame {
+    pub(super) fn new(parsed: &'a Parsed, names: BTreeMap<String, PythonValue>) -> Self {
+        let global = Locals {
             names,
-            ..Frame::default()
+            ..Locals::default()
         };
         Self {
             parsed,
@@ -57,20 +57,20 @@ impl<'a> Evaluator<'a> {
     }
 
     /// What `generate_launch_description` returns; `None` if there is no such function.
-    pub(super) fn launch_description(&mut self) -> Option<Value> {
+    pub(super) fn launch_description(&mut self) -> Option<PythonValue> {
         self.run(self.parsed.root());
         let function = *self.functions.get("generate_launch_description")?;
         Some(self.call(function, &[], &[]))
     }
 
     /// The value of the file's only expression; `None` where there is none or it is not known.
-    pub(super) fn whole(&mut self) -> Option<Value> {
+    pub(super) fn whole(&mut self) -> Option<PythonValue> {
         let statement = children(self.parsed.root());
         let expression = statement.first().and_then(|s| s.named_child(0))?;
         if self.parsed.root().has_error() || statement.len() != 1 {
             return None;
         }
-        Some(self.value(expression)).filter(|value| !matches!(value, Value::Unknown(_)))
+        Some(self.value(expression)).filter(|value| !matches!(value, PythonValue::Unknown(_)))
     }
 
     pub(super) fn text(&self, node: Node<'_>) -> &'a str {
@@ -78,28 +78,28 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Keeps a new value, if it is neither too large nor too deep and there is room.
-    pub(super) fn kept(&mut self, value: Value, at: Node<'_>) -> Value {
+    pub(super) fn kept(&mut self, value: PythonValue, at: Node<'_>) -> PythonValue {
         let (size, depth) = value.measure();
         let is_small =
-            depth <= DEEPEST && !matches!(&value, Value::Text(text) if text.len() > LONGEST);
+            depth <= DEEPEST && !matches!(&value, PythonValue::Text(text) if text.len() > LONGEST);
         match self.budget.spend(size) {
             Some(()) if is_small => value,
-            _ => Value::Unknown(line(at)),
+            _ => PythonValue::Unknown(line(at)),
         }
     }
 
-    fn run(&mut self, block: Node<'a>) -> Flow {
+    fn run(&mut self, block: Node<'a>) -> ControlFlow {
         for statement in children(block) {
-            if self.statement(statement) == Flow::Done {
-                return Flow::Done;
+            if self.statement(statement) == ControlFlow::Done {
+                return ControlFlow::Done;
             }
         }
-        Flow::Next
+        ControlFlow::Next
     }
 
-    fn statement(&mut self, node: Node<'a>) -> Flow {
+    fn statement(&mut self, node: Node<'a>) -> ControlFlow {
         if self.budget.spend(STEP).is_none() || self.nested > NESTED {
-            return Flow::Done;
+            return ControlFlow::Done;
         }
         self.nested += 1;
         let flow = match node.kind() {
@@ -107,59 +107,65 @@ impl<'a> Evaluator<'a> {
                 for expression in children(node) {
                     self.effect(expression);
                 }
-                Flow::Next
+                ControlFlow::Next
             }
             "function_definition" => {
                 if let Some(name) = node.child_by_field_name("name") {
                     self.functions.insert(self.text(name).to_owned(), node);
                 }
-                Flow::Next
+                ControlFlow::Next
             }
             "decorated_definition" => {
                 let definition = node.child_by_field_name("definition");
-                definition.map_or(Flow::Next, |inner| self.statement(inner))
+                definition.map_or(ControlFlow::Next, |inner| self.statement(inner))
             }
             "return_statement" => self.returns(node),
             "if_statement" => self.branches(node),
             "for_statement" => self.repeats(node),
             "with_statement" | "try_statement" => {
                 let body = node.child_by_field_name("body");
-                body.map_or(Flow::Next, |body| self.run(body))
+                body.map_or(ControlFlow::Next, |body| self.run(body))
             }
-            _ => Flow::Next,
+            _ => ControlFlow::Next,
         };
         self.nested -= 1;
         flow
     }
 
-    fn returns(&mut self, node: Node<'a>) -> Flow {
-        let value = node.named_child(0).map_or(Value::None, |n| self.value(n));
+    fn returns(&mut self, node: Node<'a>) -> ControlFlow {
+        let value = node
+            .named_child(0)
+            .map_or(PythonValue::None, |n| self.value(n));
         let undecided = self.undecided;
         let Some(frame) = self.frames.last_mut() else {
-            return Flow::Done;
+            return ControlFlow::Done;
         };
         let is_sure = undecided == frame.undecided;
         frame.returned = Some(match (frame.returned.take(), value) {
             (None, value) if is_sure || value.acts() => value,
-            (Some(Value::List(mut before)), after) if after.acts() => {
+            (Some(PythonValue::List(mut before)), after) if after.acts() => {
                 before.push(after);
-                Value::List(before)
+                PythonValue::List(before)
             }
             (Some(before), after) if before.acts() && after.acts() => {
-                Value::List(vec![before, after])
+                PythonValue::List(vec![before, after])
             }
-            _ => Value::Unknown(line(node)),
+            _ => PythonValue::Unknown(line(node)),
         });
-        if is_sure { Flow::Done } else { Flow::Next }
+        if is_sure {
+            ControlFlow::Done
+        } else {
+            ControlFlow::Next
+        }
     }
 
-    fn branches(&mut self, node: Node<'a>) -> Flow {
+    fn branches(&mut self, node: Node<'a>) -> ControlFlow {
         let mut cursor = node.walk();
         let others: Vec<Node<'a>> = node
             .children_by_field_name("alternative", &mut cursor)
             .collect();
         let mut sure = true;
-        let mut flow = Flow::Next;
+        let mut flow = ControlFlow::Next;
         for part in std::iter::once(node).chain(others) {
             let truth = match part.child_by_field_name("condition") {
                 Some(condition) => self.value(condition).truth(),
@@ -179,29 +185,32 @@ impl<'a> Evaluator<'a> {
                 break;
             }
         }
-        if sure { flow } else { Flow::Next }
+        if sure { flow } else { ControlFlow::Next }
     }
 
-    fn repeats(&mut self, node: Node<'a>) -> Flow {
+    fn repeats(&mut self, node: Node<'a>) -> ControlFlow {
         let fields = ["left", "right", "body"].map(|name| node.child_by_field_name(name));
         let [Some(left), Some(right), Some(body)] = fields else {
-            return Flow::Next;
+            return ControlFlow::Next;
         };
         for item in self.items(right) {
             self.assign(left, item);
-            if self.run(body) == Flow::Done {
-                return Flow::Done;
+            if self.run(body) == ControlFlow::Done {
+                return ControlFlow::Done;
             }
         }
-        Flow::Next
+        ControlFlow::Next
     }
 
     /// What a loop goes over, as far as it is known.
-    pub(super) fn items(&mut self, node: Node<'a>) -> Vec<Value> {
+    pub(super) fn items(&mut self, node: Node<'a>) -> Vec<PythonValue> {
         match self.value(node) {
-            Value::List(list) => list,
-            Value::Dict(map) => map.into_iter().map(|(key, _)| Value::Text(key)).collect(),
-            _ => vec![Value::Unknown(line(node))],
+            PythonValue::List(list) => list,
+            PythonValue::Dict(map) => map
+                .into_iter()
+                .map(|(key, _)| PythonValue::Text(key))
+                .collect(),
+            _ => vec![PythonValue::Unknown(line(node))],
         }
     }
 
@@ -225,7 +234,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    pub(super) fn assign(&mut self, target: Node<'a>, value: Value) {
+    pub(super) fn assign(&mut self, target: Node<'a>, value: PythonValue) {
         match (target.kind(), value) {
             ("identifier", value) => {
                 let name = self.text(target).to_owned();
@@ -236,20 +245,20 @@ impl<'a> Evaluator<'a> {
                 let value = if sure || value.acts() {
                     value
                 } else {
-                    Value::Unknown(line(target))
+                    PythonValue::Unknown(line(target))
                 };
                 if let Some(frame) = self.frames.last_mut() {
                     frame.names.insert(name, value);
                 }
             }
-            ("pattern_list" | "tuple_pattern", Value::List(parts)) => {
+            ("pattern_list" | "tuple_pattern", PythonValue::List(parts)) => {
                 for (target, part) in children(target).into_iter().zip(parts) {
                     self.assign(target, part);
                 }
             }
             ("pattern_list" | "tuple_pattern", _) => {
                 for target in children(target) {
-                    self.assign(target, Value::Unknown(line(target)));
+                    self.assign(target, PythonValue::Unknown(line(target)));
                 }
             }
             ("subscript", value) => self.put(target, value),
@@ -258,20 +267,20 @@ impl<'a> Evaluator<'a> {
     }
 
     /// `map['key'] = value`
-    fn put(&mut self, target: Node<'a>, value: Value) {
+    fn put(&mut self, target: Node<'a>, value: PythonValue) {
         let part = |name| target.child_by_field_name(name);
         let (Some(map), Some(key)) = (part("value"), part("subscript")) else {
             return;
         };
         let key = self.value(key).text();
-        if let (Some(Value::Dict(entries)), Some(key)) = (self.variable(map), key) {
+        if let (Some(PythonValue::Dict(entries)), Some(key)) = (self.variable(map), key) {
             entries.retain(|(known, _)| *known != key);
             entries.push((key, value));
         }
     }
 
     /// The variable that a name stands for, to be changed.
-    pub(super) fn variable(&mut self, node: Node<'a>) -> Option<&mut Value> {
+    pub(super) fn variable(&mut self, node: Node<'a>) -> Option<&mut PythonValue> {
         let name = self.parsed.text(node);
         let frames = self.frames.iter_mut().rev();
         frames
@@ -280,22 +289,22 @@ impl<'a> Evaluator<'a> {
     }
 
     /// A copy of the value of a name.
-    pub(super) fn named(&mut self, node: Node<'a>) -> Value {
+    pub(super) fn named(&mut self, node: Node<'a>) -> PythonValue {
         self.lookup(self.text(node), node)
     }
 
     /// A copy of the value that a name stands for at `node`.
-    pub(super) fn lookup(&mut self, name: &str, node: Node<'a>) -> Value {
+    pub(super) fn lookup(&mut self, name: &str, node: Node<'a>) -> PythonValue {
         let found = self.frames.iter().rev().find_map(|f| f.names.get(name));
         match found {
             Some(value) => {
                 let value = value.clone();
                 self.kept(value, node)
             }
-            None if self.functions.contains_key(name) => Value::Function(name.to_owned()),
-            None if name == "true" => Value::Bool(true),
-            None if name == "false" => Value::Bool(false),
-            None => Value::Unknown(line(node)),
+            None if self.functions.contains_key(name) => PythonValue::Function(name.to_owned()),
+            None if name == "true" => PythonValue::Bool(true),
+            None if name == "false" => PythonValue::Bool(false),
+            None => PythonValue::Unknown(line(node)),
         }
     }
 
@@ -308,19 +317,19 @@ impl<'a> Evaluator<'a> {
     pub(super) fn call(
         &mut self,
         function: Node<'a>,
-        positional: &[Value],
-        named: &[(String, Value)],
-    ) -> Value {
+        positional: &[PythonValue],
+        named: &[(String, PythonValue)],
+    ) -> PythonValue {
         let parts = ["parameters", "body"].map(|name| function.child_by_field_name(name));
         let [Some(parameters), Some(body)] = parts else {
-            return Value::Unknown(line(function));
+            return PythonValue::Unknown(line(function));
         };
         if self.nested > NESTED {
-            return Value::Unknown(line(function));
+            return PythonValue::Unknown(line(function));
         }
-        let mut frame = Frame {
+        let mut frame = Locals {
             undecided: self.undecided,
-            ..Frame::default()
+            ..Locals::default()
         };
         for (at, parameter) in children(parameters).into_iter().enumerate() {
             let name = parameter
@@ -336,20 +345,20 @@ impl<'a> Evaluator<'a> {
             let value = given.or_else(|| default.map(|d| self.value(d)));
             frame
                 .names
-                .insert(name, value.unwrap_or(Value::Unknown(line(parameter))));
+                .insert(name, value.unwrap_or(PythonValue::Unknown(line(parameter))));
         }
         self.frames.push(frame);
         self.nested += 1;
         self.run(body);
         self.nested -= 1;
         let frame = self.frames.pop();
-        frame.and_then(|f| f.returned).unwrap_or(Value::None)
+        frame.and_then(|f| f.returned).unwrap_or(PythonValue::None)
     }
 
     /// The value of an expression.
-    pub(super) fn value(&mut self, node: Node<'a>) -> Value {
+    pub(super) fn value(&mut self, node: Node<'a>) -> PythonValue {
         if self.nested > NESTED || self.budget.spend(STEP).is_none() {
-            return Value::Unknown(line(node));
+            return PythonValue::Unknown(line(node));
         }
         self.nested += 1;
         let value = self.expression(node);

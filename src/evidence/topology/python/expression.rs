@@ -1,20 +1,20 @@
 //! The values of expressions in a launch file: literals, sums and formats of texts, comparisons, comprehensions.
 
 use super::evaluator::Evaluator;
-use super::value::Value;
+use super::value::PythonValue;
 use crate::evidence::syntax::{Node, children, line};
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn expression(&mut self, node: Node<'a>) -> Value {
-        let unknown = Value::Unknown(line(node));
+    pub(super) fn expression(&mut self, node: Node<'a>) -> PythonValue {
+        let unknown = PythonValue::Unknown(line(node));
         let field = |name| node.child_by_field_name(name);
         match node.kind() {
             "string" | "concatenated_string" => self.string(node),
-            "integer" => self.text(node).parse().map_or(unknown, Value::Number),
-            "float" => Value::Text(self.text(node).to_owned()),
-            "true" => Value::Bool(true),
-            "false" => Value::Bool(false),
-            "none" => Value::None,
+            "integer" => self.text(node).parse().map_or(unknown, PythonValue::Number),
+            "float" => PythonValue::Text(self.text(node).to_owned()),
+            "true" => PythonValue::Bool(true),
+            "false" => PythonValue::Bool(false),
+            "none" => PythonValue::None,
             "identifier" => self.constant(node),
             "parenthesized_expression" | "await" => {
                 node.named_child(0).map_or(unknown, |n| self.value(n))
@@ -35,15 +35,15 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn constant(&mut self, node: Node<'a>) -> Value {
+    fn constant(&mut self, node: Node<'a>) -> PythonValue {
         match self.text(node) {
-            "__file__" => Value::Text("$(dirname)/launch.py".to_owned()),
-            "__name__" => Value::Text("launch".to_owned()),
+            "__file__" => PythonValue::Text("$(dirname)/launch.py".to_owned()),
+            "__name__" => PythonValue::Text("launch".to_owned()),
             _ => self.named(node),
         }
     }
 
-    fn string(&mut self, node: Node<'a>) -> Value {
+    fn string(&mut self, node: Node<'a>) -> PythonValue {
         let mut text = String::new();
         for part in children(node) {
             match part.kind() {
@@ -53,16 +53,16 @@ impl<'a> Evaluator<'a> {
                     let inner = part
                         .child_by_field_name("expression")
                         .or(part.named_child(0));
-                    let value = inner.map_or(Value::None, |n| self.value(n));
+                    let value = inner.map_or(PythonValue::None, |n| self.value(n));
                     text.push_str(&value.launch_text());
                 }
                 _ => {}
             }
         }
-        self.kept(Value::Text(text), node)
+        self.kept(PythonValue::Text(text), node)
     }
 
-    fn list(&mut self, node: Node<'a>) -> Value {
+    fn list(&mut self, node: Node<'a>) -> PythonValue {
         let mut list = Vec::new();
         for part in children(node) {
             match (part.kind(), part.named_child(0)) {
@@ -70,11 +70,11 @@ impl<'a> Evaluator<'a> {
                 _ => list.push(self.value(part)),
             }
         }
-        self.kept(Value::List(list), node)
+        self.kept(PythonValue::List(list), node)
     }
 
-    fn dictionary(&mut self, node: Node<'a>) -> Value {
-        let mut map: Vec<(String, Value)> = Vec::new();
+    fn dictionary(&mut self, node: Node<'a>) -> PythonValue {
+        let mut map: Vec<(String, PythonValue)> = Vec::new();
         for pair in children(node) {
             let parts = ["key", "value"].map(|name| pair.child_by_field_name(name));
             if let [Some(key), Some(value)] = parts {
@@ -82,30 +82,30 @@ impl<'a> Evaluator<'a> {
                 map.push((key.launch_text(), value));
             }
         }
-        self.kept(Value::Dict(map), node)
+        self.kept(PythonValue::Dict(map), node)
     }
 
-    fn comprehension(&mut self, node: Node<'a>) -> Value {
+    fn comprehension(&mut self, node: Node<'a>) -> PythonValue {
         let parts = children(node);
         let [body, clause, ..] = parts[..] else {
-            return Value::Unknown(line(node));
+            return PythonValue::Unknown(line(node));
         };
         let sides = ["left", "right"].map(|name| clause.child_by_field_name(name));
         let ([Some(left), Some(right)], 2) = (sides, parts.len()) else {
-            return Value::Unknown(line(node));
+            return PythonValue::Unknown(line(node));
         };
         let mut list = Vec::new();
         for item in self.items(right) {
             self.assign(left, item);
             list.push(self.value(body));
         }
-        self.kept(Value::List(list), node)
+        self.kept(PythonValue::List(list), node)
     }
 
-    fn binary(&mut self, node: Node<'a>) -> Value {
+    fn binary(&mut self, node: Node<'a>) -> PythonValue {
         let fields = ["left", "operator", "right"].map(|name| node.child_by_field_name(name));
         let [Some(left), Some(operator), Some(right)] = fields else {
-            return Value::Unknown(line(node));
+            return PythonValue::Unknown(line(node));
         };
         let (left, right) = (self.value(left), self.value(right));
         match self.text(operator) {
@@ -113,51 +113,63 @@ impl<'a> Evaluator<'a> {
             "%" => self.formatted(&left, &right, node),
             // `Path(…) / 'x'`
             "/" => self.kept(
-                Value::Text(format!("{}/{}", left.launch_text(), right.launch_text())),
+                PythonValue::Text(format!("{}/{}", left.launch_text(), right.launch_text())),
                 node,
             ),
             sign => match (sign, left, right) {
-                ("-", Value::Number(a), Value::Number(b)) => a
+                ("-", PythonValue::Number(a), PythonValue::Number(b)) => a
                     .checked_sub(b)
-                    .map_or(Value::Unknown(line(node)), Value::Number),
-                ("*", Value::Number(a), Value::Number(b)) => a
+                    .map_or(PythonValue::Unknown(line(node)), PythonValue::Number),
+                ("*", PythonValue::Number(a), PythonValue::Number(b)) => a
                     .checked_mul(b)
-                    .map_or(Value::Unknown(line(node)), Value::Number),
-                _ => Value::Unknown(line(node)),
+                    .map_or(PythonValue::Unknown(line(node)), PythonValue::Number),
+                _ => PythonValue::Unknown(line(node)),
             },
         }
     }
 
-    pub(super) fn sum(&mut self, left: Value, right: Value, at: Node<'a>) -> Value {
+    pub(super) fn sum(
+        &mut self,
+        left: PythonValue,
+        right: PythonValue,
+        at: Node<'a>,
+    ) -> PythonValue {
         let sum = match (left, right) {
-            (Value::Number(a), Value::Number(b)) => a
+            (PythonValue::Number(a), PythonValue::Number(b)) => a
                 .checked_add(b)
-                .map_or(Value::Unknown(line(at)), Value::Number),
-            (Value::List(mut a), Value::List(b)) => {
+                .map_or(PythonValue::Unknown(line(at)), PythonValue::Number),
+            (PythonValue::List(mut a), PythonValue::List(b)) => {
                 a.extend(b);
-                Value::List(a)
+                PythonValue::List(a)
             }
-            (Value::List(mut a), unknown @ Value::Unknown(_)) => {
+            (PythonValue::List(mut a), unknown @ PythonValue::Unknown(_)) => {
                 a.push(unknown);
-                Value::List(a)
+                PythonValue::List(a)
             }
-            (Value::Text(a), b @ (Value::Text(_) | Value::Unknown(_))) => {
-                Value::Text(a + &b.launch_text())
+            (PythonValue::Text(a), b @ (PythonValue::Text(_) | PythonValue::Unknown(_))) => {
+                PythonValue::Text(a + &b.launch_text())
             }
-            (a @ Value::Unknown(_), Value::Text(b)) => Value::Text(a.launch_text() + &b),
-            _ => Value::Unknown(line(at)),
+            (a @ PythonValue::Unknown(_), PythonValue::Text(b)) => {
+                PythonValue::Text(a.launch_text() + &b)
+            }
+            _ => PythonValue::Unknown(line(at)),
         };
         self.kept(sum, at)
     }
 
     /// `'%s_%d' % (a, b)`
-    fn formatted(&mut self, format: &Value, values: &Value, at: Node<'a>) -> Value {
-        let Value::Text(format) = format else {
-            return Value::Unknown(line(at));
+    fn formatted(
+        &mut self,
+        format: &PythonValue,
+        values: &PythonValue,
+        at: Node<'a>,
+    ) -> PythonValue {
+        let PythonValue::Text(format) = format else {
+            return PythonValue::Unknown(line(at));
         };
         let one = std::slice::from_ref(values);
         let mut values = match values {
-            Value::List(list) => list.iter(),
+            PythonValue::List(list) => list.iter(),
             _ => one.iter(),
         };
         let mut parts = format.split('%');
@@ -165,16 +177,16 @@ impl<'a> Evaluator<'a> {
         for part in parts {
             let value = values
                 .next()
-                .map_or_else(|| "$(unknown)".to_owned(), Value::launch_text);
+                .map_or_else(|| "$(unknown)".to_owned(), PythonValue::launch_text);
             match part.strip_prefix(['s', 'd']) {
                 Some(rest) => text.extend([&value, rest]),
-                None => return Value::Unknown(line(at)),
+                None => return PythonValue::Unknown(line(at)),
             }
         }
-        self.kept(Value::Text(text), at)
+        self.kept(PythonValue::Text(text), at)
     }
 
-    fn logic(&mut self, node: Node<'a>) -> Value {
+    fn logic(&mut self, node: Node<'a>) -> PythonValue {
         let truth = match node.kind() {
             "not_operator" => {
                 let inner = node.child_by_field_name("argument");
@@ -183,7 +195,7 @@ impl<'a> Evaluator<'a> {
             "boolean_operator" => self.both(node),
             _ => self.compared(node),
         };
-        truth.map_or(Value::Unknown(line(node)), Value::Bool)
+        truth.map_or(PythonValue::Unknown(line(node)), PythonValue::Bool)
     }
 
     fn both(&mut self, node: Node<'a>) -> Option<bool> {
@@ -216,38 +228,38 @@ impl<'a> Evaluator<'a> {
             "in" => left.is_in(&right),
             "not in" => left.is_in(&right).map(|inside| !inside),
             sign => match (sign, left, right) {
-                ("<", Value::Number(a), Value::Number(b)) => Some(a < b),
-                (">", Value::Number(a), Value::Number(b)) => Some(a > b),
-                ("<=", Value::Number(a), Value::Number(b)) => Some(a <= b),
-                (">=", Value::Number(a), Value::Number(b)) => Some(a >= b),
+                ("<", PythonValue::Number(a), PythonValue::Number(b)) => Some(a < b),
+                (">", PythonValue::Number(a), PythonValue::Number(b)) => Some(a > b),
+                ("<=", PythonValue::Number(a), PythonValue::Number(b)) => Some(a <= b),
+                (">=", PythonValue::Number(a), PythonValue::Number(b)) => Some(a >= b),
                 _ => None,
             },
         }
     }
 
     /// `a if condition else b`
-    fn choice(&mut self, node: Node<'a>) -> Value {
+    fn choice(&mut self, node: Node<'a>) -> PythonValue {
         let parts = children(node);
         let [yes, condition, no] = parts[..] else {
-            return Value::Unknown(line(node));
+            return PythonValue::Unknown(line(node));
         };
         match self.value(condition).truth() {
             Some(true) => self.value(yes),
             Some(false) => self.value(no),
-            None => Value::Unknown(line(node)),
+            None => PythonValue::Unknown(line(node)),
         }
     }
 
-    fn subscript(&mut self, value: Node<'a>, key: Node<'a>) -> Value {
+    fn subscript(&mut self, value: Node<'a>, key: Node<'a>) -> PythonValue {
         if self.text(value) == "os.environ" {
-            return Value::Text(format!("$(env {})", self.value(key).launch_text()));
+            return PythonValue::Text(format!("$(env {})", self.value(key).launch_text()));
         }
         let (found, key_value) = (self.value(value), self.value(key));
         let part = match (&found, &key_value) {
-            (Value::List(list), Value::Number(at)) => {
+            (PythonValue::List(list), PythonValue::Number(at)) => {
                 usize::try_from(*at).ok().and_then(|at| list.get(at))
             }
-            (Value::Dict(map), key) => {
+            (PythonValue::Dict(map), key) => {
                 let key = key.launch_text();
                 map.iter()
                     .find(|(name, _)| *name == key)
@@ -255,11 +267,11 @@ impl<'a> Evaluator<'a> {
             }
             _ => None,
         };
-        part.cloned().unwrap_or(Value::Unknown(line(key)))
+        part.cloned().unwrap_or(PythonValue::Unknown(line(key)))
     }
 }
 
-impl Value {
+impl PythonValue {
     /// Whether it is one of a list or a part of a text; `None` where that is not known.
     fn is_in(&self, all: &Self) -> Option<bool> {
         match (self, all) {

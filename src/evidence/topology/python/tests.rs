@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::evidence::topology::launch;
-use crate::evidence::topology::{Element, Topology, read};
+use crate::evidence::topology::{NamedElement, Topology, read};
 
 fn topology(text: &str) -> Topology {
     let folder = tempfile::tempdir().unwrap();
@@ -29,8 +29,8 @@ fn indented(lines: &str) -> String {
 }
 
 fn named(topology: &Topology) -> Vec<String> {
-    let name = |element: &Element| match element {
-        Element::Node(name) => Some(name.clone()),
+    let name = |element: &NamedElement| match element {
+        NamedElement::Node(name) => Some(name.clone()),
         _ => None,
     };
     topology
@@ -50,14 +50,14 @@ fn nodes_have_names_namespaces_and_remaps() {
                      remappings=[('scan', 'front/scan'), ('/map', '/maps/now')]),\n        \
                 LifecycleNode(package='a', executable='c', name='map', namespace='')])\n";
     let topology = topology(text);
-    let elements: Vec<Element> = topology.entries.iter().map(|e| e.element.clone()).collect();
+    let elements: Vec<NamedElement> = topology.entries.iter().map(|e| e.element.clone()).collect();
     assert_eq!(
         elements,
         [
-            Element::Node("/map".into()),
-            Element::Node("/r1/nav".into()),
-            Element::Topic("/maps/now".into()),
-            Element::Topic("/r1/front/scan".into()),
+            NamedElement::Node("/map".into()),
+            NamedElement::Node("/r1/nav".into()),
+            NamedElement::Topic("/maps/now".into()),
+            NamedElement::Topic("/r1/front/scan".into()),
         ]
     );
     assert_eq!(topology.entries[1].place, "robot.launch.py line 7");

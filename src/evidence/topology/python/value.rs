@@ -4,7 +4,7 @@ use crate::evidence::topology::tree::Tree;
 
 /// The value of an expression. Texts may hold substitutions `$(…)`, which the launch system would fill in.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
+pub(super) enum PythonValue {
     /// Only running the file would tell; with the line.
     Unknown(usize),
     None,
@@ -22,7 +22,7 @@ pub(super) enum Value {
 /// Values inside values deeper than this are not kept.
 pub(super) const DEEPEST: usize = 48;
 
-impl Value {
+impl PythonValue {
     /// As a text of launch files: parts of a list one behind the other, a part that is not known as `$(unknown)`.
     pub(super) fn launch_text(&self) -> String {
         match self {
@@ -116,12 +116,12 @@ fn of_tree(tree: &Tree) -> (usize, usize) {
 }
 
 /// The value of an argument's text: `true` and `false` are taken as such.
-pub(super) fn of_text(text: &str) -> Value {
+pub(super) fn of_text(text: &str) -> PythonValue {
     match text {
-        "true" | "True" => Value::Bool(true),
-        "false" | "False" => Value::Bool(false),
+        "true" | "True" => PythonValue::Bool(true),
+        "false" | "False" => PythonValue::Bool(false),
         other => other
             .parse()
-            .map_or_else(|_| Value::Text(other.to_owned()), Value::Number),
+            .map_or_else(|_| PythonValue::Text(other.to_owned()), PythonValue::Number),
     }
 }

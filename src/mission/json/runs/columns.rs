@@ -11,15 +11,15 @@ use crate::graph::{Number, Row};
 
 /// Values, each with how often it is repeated.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Column<T>(pub(crate) Vec<(T, u32)>);
+pub(crate) struct JsonColumn<T>(pub(crate) Vec<(T, u32)>);
 
-impl<T> Default for Column<T> {
+impl<T> Default for JsonColumn<T> {
     fn default() -> Self {
         Self(Vec::new())
     }
 }
 
-impl<T: PartialEq> Column<T> {
+impl<T: PartialEq> JsonColumn<T> {
     pub(crate) fn push(&mut self, value: T) {
         match self.0.last_mut() {
             Some((last, times)) if *last == value => *times = times.saturating_add(1),
@@ -28,14 +28,14 @@ impl<T: PartialEq> Column<T> {
     }
 }
 
-impl<T: Default + PartialEq> Column<T> {
+impl<T: Default + PartialEq> JsonColumn<T> {
     /// Whether it says nothing in any window.
     pub(crate) fn is_plain(&self) -> bool {
         self.0.iter().all(|(value, _)| *value == T::default())
     }
 }
 
-impl<T> Column<T> {
+impl<T> JsonColumn<T> {
     /// What every value means, in order.
     pub(crate) fn values<'a, U: Copy + 'a>(
         &'a self,
@@ -46,7 +46,7 @@ impl<T> Column<T> {
     }
 }
 
-impl<T: Serialize> Serialize for Column<T> {
+impl<T: Serialize> Serialize for JsonColumn<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut seq = serializer.serialize_seq(Some(self.0.len()))?;
         for (value, times) in &self.0 {
@@ -62,12 +62,12 @@ impl<T: Serialize> Serialize for Column<T> {
 /// One value, or one with how often it is repeated.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Cell<T> {
+enum RawCell<T> {
     Repeated((T, u32)),
     One(T),
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Column<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for JsonColumn<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_seq(Cells(PhantomData))
     }
@@ -76,18 +76,18 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Column<T> {
 struct Cells<T>(PhantomData<T>);
 
 impl<'de, T: Deserialize<'de>> Visitor<'de> for Cells<T> {
-    type Value = Column<T>;
+    type Value = JsonColumn<T>;
 
     fn expecting(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         to.write_str("a list of values and of `[value, times]`")
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Column<T>, A::Error> {
-        let mut column = Column::default();
-        while let Some(cell) = list.next_element::<Cell<T>>()? {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<JsonColumn<T>, A::Error> {
+        let mut column = JsonColumn::default();
+        while let Some(cell) = list.next_element::<RawCell<T>>()? {
             column.0.push(match cell {
-                Cell::Repeated(both) => both,
-                Cell::One(value) => (value, 1),
+                RawCell::Repeated(both) => both,
+                RawCell::One(value) => (value, 1),
             });
         }
         Ok(column)
@@ -96,13 +96,13 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Cells<T> {
 
 /// A rate: that of the count, or another.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Rate {
+pub(crate) enum JsonRate {
     /// As the count says.
     Counted,
     Other(Option<f64>),
 }
 
-impl Rate {
+impl JsonRate {
     pub(crate) fn of(row: &Row) -> Self {
         row.rate
             .map_or(Self::Counted, |rate| Self::Other(rate.value()))
@@ -116,7 +116,7 @@ impl Rate {
     }
 }
 
-impl Serialize for Rate {
+impl Serialize for JsonRate {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Counted => serializer.serialize_str("="),
@@ -125,7 +125,7 @@ impl Serialize for Rate {
     }
 }
 
-impl<'de> Deserialize<'de> for Rate {
+impl<'de> Deserialize<'de> for JsonRate {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
         #[serde(untagged)]

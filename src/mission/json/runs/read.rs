@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::super::names::Ids;
 use super::super::raw::{RawEdge, RawNode, RawTopic, degree_of, state_of};
-use super::columns::{Column, Rate};
+use super::columns::{JsonColumn, JsonRate};
 use crate::base::time::Span;
 use crate::evidence::Degree;
 use crate::graph::{Graphs, GraphsWriter, Number, Row, State};
@@ -33,15 +33,15 @@ pub(crate) struct RawWhole<E> {
 #[serde(default)]
 struct RawColumns {
     windows: Vec<(usize, usize)>,
-    state: Column<String>,
-    degree: Column<String>,
-    sent: Column<Option<u64>>,
-    count: Column<Option<u64>>,
-    bytes: Column<Option<u64>>,
-    median_period_s: Column<Option<f64>>,
-    max_gap_s: Column<Option<f64>>,
-    hz: Column<Rate>,
-    lifecycle: Column<Option<String>>,
+    state: JsonColumn<String>,
+    degree: JsonColumn<String>,
+    sent: JsonColumn<Option<u64>>,
+    count: JsonColumn<Option<u64>>,
+    bytes: JsonColumn<Option<u64>>,
+    median_period_s: JsonColumn<Option<f64>>,
+    max_gap_s: JsonColumn<Option<f64>>,
+    hz: JsonColumn<JsonRate>,
+    lifecycle: JsonColumn<Option<String>>,
 }
 
 /// The graphs of these windows.
@@ -96,7 +96,7 @@ impl RawColumns {
         let mut bytes = self.bytes.values(|bytes| *bytes);
         let mut medians = self.median_period_s.values(|value| Number::of(*value));
         let mut gaps = self.max_gap_s.values(|value| Number::of(*value));
-        let mut rates = self.hz.values(Rate::number);
+        let mut rates = self.hz.values(JsonRate::number);
         let mut next = 0;
         for (from, to) in &self.windows {
             for at in (*from).max(next)..(*to).saturating_add(1).min(many) {

@@ -7,7 +7,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::graphs_for_tests::graph;
 use crate::graph::{Edge, Elements, Graph, Node, Topic};
-use crate::mission::{Activity, Form, Json, Ledger, Mission, Window, read_json};
+use crate::mission::{Activity, Json, JsonForm, Ledger, Mission, Window, read_json};
 
 fn elements() -> Elements {
     let node = |name: &str| Node {
@@ -85,7 +85,7 @@ fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
     }
 }
 
-fn written(mission: &Mission, form: Form) -> String {
+fn written(mission: &Mission, form: JsonForm) -> String {
     let mut text = Vec::new();
     let json = Json {
         mission,
@@ -104,10 +104,10 @@ proptest! {
     #[test]
     fn runs_hold_what_windows_hold(list in proptest::collection::vec((graph(), 1..5_000_000_000_i64), 1..12)) {
         // What only one form can say (an element that is in no window) is gone after the first reading.
-        let first = read(&written(&mission(list), Form::Windows));
-        let second = read(&written(&first, Form::Runs));
+        let first = read(&written(&mission(list), JsonForm::Windows));
+        let second = read(&written(&first, JsonForm::Runs));
         prop_assert_eq!(&first, &second);
-        prop_assert_eq!(written(&first, Form::Windows), written(&second, Form::Windows));
+        prop_assert_eq!(written(&first, JsonForm::Windows), written(&second, JsonForm::Windows));
     }
 }
 

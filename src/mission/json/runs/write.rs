@@ -5,7 +5,7 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::super::rows::{EdgeOf, NodeOf, TopicOf};
 use super::super::write::List;
-use super::columns::{Column, Rate};
+use super::columns::{JsonColumn, JsonRate};
 use crate::graph::{Element, Graphs};
 use crate::mission::Mission;
 
@@ -16,22 +16,22 @@ pub(crate) fn elements<M: SerializeMap>(mission: &Mission, map: &mut M) -> Resul
         what,
         graphs: &mission.graphs,
     };
-    let nodes = (0..).zip(&all.nodes).map(|(id, node)| Whole {
+    let nodes = (0..).zip(&all.nodes).map(|(id, node)| WithColumns {
         element: NodeOf::new(node),
         seen: seen(Element::Node(id)),
     });
     map.serialize_entry("nodes", &List(nodes))?;
-    let topics = (0..).zip(&all.topics).map(|(id, topic)| Whole {
+    let topics = (0..).zip(&all.topics).map(|(id, topic)| WithColumns {
         element: TopicOf::new(topic),
         seen: seen(Element::Topic(id)),
     });
     map.serialize_entry("topics", &List(topics))?;
-    let publishes = (0..).zip(&all.publishes).map(|(id, edge)| Whole {
+    let publishes = (0..).zip(&all.publishes).map(|(id, edge)| WithColumns {
         element: EdgeOf::new(edge, all),
         seen: seen(Element::Publish(id)),
     });
     map.serialize_entry("publishes", &List(publishes))?;
-    let subscribes = (0..).zip(&all.subscribes).map(|(id, edge)| Whole {
+    let subscribes = (0..).zip(&all.subscribes).map(|(id, edge)| WithColumns {
         element: EdgeOf::new(edge, all),
         seen: seen(Element::Subscribe(id)),
     });
@@ -40,7 +40,7 @@ pub(crate) fn elements<M: SerializeMap>(mission: &Mission, map: &mut M) -> Resul
 
 /// An element, and what it says in which windows.
 #[derive(Serialize)]
-pub(crate) struct Whole<'a, E> {
+pub(crate) struct WithColumns<'a, E> {
     #[serde(flatten)]
     pub(crate) element: E,
     #[serde(rename = "in")]
@@ -62,26 +62,26 @@ impl Serialize for In<'_> {
 #[derive(Default, Serialize)]
 struct Columns<'a> {
     windows: Vec<(usize, usize)>,
-    state: Column<&'static str>,
-    degree: Column<&'static str>,
-    #[serde(skip_serializing_if = "Column::is_plain")]
-    sent: Column<Option<u64>>,
-    #[serde(skip_serializing_if = "Column::is_plain")]
-    count: Column<Option<u64>>,
-    #[serde(skip_serializing_if = "Column::is_plain")]
-    bytes: Column<Option<u64>>,
-    #[serde(skip_serializing_if = "Column::is_plain")]
-    median_period_s: Column<Option<f64>>,
-    #[serde(skip_serializing_if = "Column::is_plain")]
-    max_gap_s: Column<Option<f64>>,
+    state: JsonColumn<&'static str>,
+    degree: JsonColumn<&'static str>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    sent: JsonColumn<Option<u64>>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    count: JsonColumn<Option<u64>>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    bytes: JsonColumn<Option<u64>>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    median_period_s: JsonColumn<Option<f64>>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    max_gap_s: JsonColumn<Option<f64>>,
     #[serde(skip_serializing_if = "is_counted")]
-    hz: Column<Rate>,
-    #[serde(skip_serializing_if = "Column::is_plain")]
-    lifecycle: Column<Option<&'a str>>,
+    hz: JsonColumn<JsonRate>,
+    #[serde(skip_serializing_if = "JsonColumn::is_plain")]
+    lifecycle: JsonColumn<Option<&'a str>>,
 }
 
-fn is_counted(rates: &Column<Rate>) -> bool {
-    rates.0.iter().all(|(rate, _)| *rate == Rate::Counted)
+fn is_counted(rates: &JsonColumn<JsonRate>) -> bool {
+    rates.0.iter().all(|(rate, _)| *rate == JsonRate::Counted)
 }
 
 impl<'a> Columns<'a> {
@@ -101,7 +101,7 @@ impl<'a> Columns<'a> {
             all.bytes.push(row.bytes);
             all.median_period_s.push(row.median.value());
             all.max_gap_s.push(row.gap.value());
-            all.hz.push(Rate::of(&row));
+            all.hz.push(JsonRate::of(&row));
             all.lifecycle.push(graphs.lifecycle(&row));
         }
         all
