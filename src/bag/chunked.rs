@@ -187,6 +187,7 @@ impl<G: Grammar> Indexed<G> {
             connections: &plan.connections,
             wants,
             range,
+            tail: plan.body.end,
             grammar: PhantomData,
         }
     }

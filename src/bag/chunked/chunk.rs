@@ -26,7 +26,12 @@ impl<G: Grammar> Query<'_, G> {
             Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
         };
         if let Some((index, where_expected)) = index {
-            let body = || self.body(chunk).ok().flatten();
+            let body = || {
+                self.body(chunk)
+                    .ok()
+                    .flatten()
+                    .or_else(|| self.moved(chunk))
+            };
             self.tell(&index, body, sink);
             if !where_expected {
                 self.unnamed(chunk, sink);
@@ -36,10 +41,7 @@ impl<G: Grammar> Query<'_, G> {
         let text = "chunks were read whole, since their index is missing or wrong";
         sink.notice(Notice::new(NoticeKind::Downgraded, text));
         let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
-        if let Err(why) = self.walk(&mut stream, sink) {
-            let text = format!("a chunk is damaged inside: {why}");
-            sink.notice(Notice::new(NoticeKind::Damaged, text));
-        }
+        self.told(&mut stream, Share::Whole, sink);
         self.unnamed(chunk, sink);
     }
 
@@ -48,14 +50,22 @@ impl<G: Grammar> Query<'_, G> {
         let Ok(Some(body)) = self.body(chunk) else {
             return;
         };
-        let mut stream = ByteStream::of_file(self.source, body.range.end, chunk.end, FAR);
-        while next_chunk::<G>(&mut stream) {
+        let mut stream = ByteStream::of_file(self.source, body.range.end, self.tail, FAR);
+        while next_chunk::<G>(&mut stream) && stream.position() < chunk.end {
             let text = "chunks were read that the index does not name";
             sink.notice(Notice::new(NoticeKind::Downgraded, text));
-            if let Err(why) = self.walk(&mut stream, sink) {
-                let text = format!("a chunk is damaged inside: {why}");
-                sink.notice(Notice::new(NoticeKind::Damaged, text));
+            let here = Chunk {
+                start: stream.position(),
+                end: self.tail,
+                ..chunk.clone()
+            };
+            let body = self.body(&here).ok().flatten();
+            if chunk.end < self.tail && body.is_some_and(|body| body.range.end > chunk.end) {
+                // The next chunk of the tail, named at a wrong place: there its index is found, and here its messages.
+                let mut stream = ByteStream::of_file(self.source, here.start, here.end, FAR);
+                return self.told(&mut stream, Share::Payloads, sink);
             }
+            self.told(&mut stream, Share::Whole, sink);
         }
     }
 
@@ -102,13 +112,37 @@ impl<G: Grammar> Query<'_, G> {
         Ok(how.map(|how| ChunkBody { how, range }))
     }
 
-    /// Reads the chunk that `stream` stands at record by record.
-    fn walk(&self, stream: &mut ByteStream<'_>, sink: &mut dyn Sink) -> Result<(), String> {
+    /// The body of a chunk that the tail names too early.
+    fn moved(&self, chunk: &Chunk) -> Option<ChunkBody> {
+        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
+        let start = next_chunk::<G>(&mut stream).then(|| stream.position())?;
+        let here = Chunk {
+            start,
+            ..chunk.clone()
+        };
+        self.body(&here).ok().flatten()
+    }
+
+    /// Tells `sink` of the chunk that `stream` stands at record by record, and what is wrong with it.
+    fn told(&self, stream: &mut ByteStream<'_>, what: Share, sink: &mut dyn Sink) {
+        if let Err(why) = self.walk(stream, what, sink) {
+            let text = format!("a chunk is damaged inside: {why}");
+            sink.notice(Notice::new(NoticeKind::Damaged, text));
+        }
+    }
+
+    fn walk(
+        &self,
+        stream: &mut ByteStream<'_>,
+        what: Share,
+        sink: &mut dyn Sink,
+    ) -> Result<(), String> {
         let Ok(RecordHead::Chunk(head)) = G::next(stream) else {
             return Err("it has no readable head".to_owned());
         };
         let mut walk = ChunkWalk {
             query: self,
+            what,
             gather: Gather::default(),
             sink,
         };
@@ -122,9 +156,18 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
+/// What is told of a chunk.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Share {
+    Whole,
+    /// Only what is wanted of its messages: their stamps are told by an index elsewhere.
+    Payloads,
+}
+
 /// The messages of a chunk on their way to a sink.
 struct ChunkWalk<'a, 's, G> {
     query: &'a Query<'a, G>,
+    what: Share,
     gather: Gather,
     sink: &'s mut dyn Sink,
 }
@@ -141,7 +184,9 @@ impl<G: Grammar> Visitor<G> for ChunkWalk<'_, '_, G> {
         };
         let want: Want = self.query.wants[id.0 as usize];
         hand_over(stream, (id, time, size), want, self.sink)?;
-        self.gather.add(id, time, size, self.sink);
+        if self.what == Share::Whole {
+            self.gather.add(id, time, size, self.sink);
+        }
         Ok(())
     }
 }

@@ -100,6 +100,8 @@ pub(super) struct Query<'a, G> {
     /// What is wanted, by connection.
     pub(super) wants: &'a [Want],
     pub(super) range: Option<Span>,
+    /// Where the last chunk and its index end.
+    pub(super) tail: u64,
     pub(super) grammar: PhantomData<fn() -> G>,
 }
 
