@@ -178,7 +178,7 @@ fn flip_bits(name: &str, bytes: &[u8], step: usize) -> (usize, usize) {
     let path = dir.path().join(name);
     let (mut tried, mut harmless) = (0, 0);
     for bit in (0..bytes.len() * 8).step_by(step) {
-        if name.ends_with(".bag") && PADDING.contains(&(bit / 8)) {
+        if !name.contains("mcap") && PADDING.contains(&(bit / 8)) {
             continue;
         }
         let mut bytes = bytes.to_vec();
