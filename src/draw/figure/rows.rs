@@ -87,7 +87,9 @@ fn of_space(
     } else {
         folded
     };
-    let open = own.into_iter().filter(|at| !folded.contains(at));
+    let open = own
+        .into_iter()
+        .filter(|at| folded.binary_search(at).is_err());
     let open = in_order(tracks, whole, open.collect());
     if !folded.is_empty() {
         rows.push(FigureRow::Folded(folded, space.to_owned()));

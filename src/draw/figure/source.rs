@@ -19,6 +19,8 @@ pub(crate) struct FigureSource<'a> {
     pub(crate) roles: BTreeMap<Arc<str>, Vec<NodeId>>,
     /// Per topic, whether it is shown.
     topics: Vec<bool>,
+    /// Per node, what it publishes on shown topics.
+    published: Vec<Vec<EdgeId>>,
     /// The phases; none if there is only one.
     pub(crate) phases: &'a [Phase],
     /// Whether their names are the user's.
@@ -43,11 +45,19 @@ impl<'a> FigureSource<'a> {
             let name = t.name.as_str();
             !is_quiet(name) && topics.passes(name)
         });
+        let topics: Vec<bool> = shown.collect();
+        let mut published = vec![Vec::new(); mission.elements.nodes.len()];
+        for (id, edge) in (0..).zip(&mission.elements.publishes) {
+            if topics[edge.topic as usize] {
+                published[edge.node as usize].push(id);
+            }
+        }
         let phases = &mission.ledger.phases[..];
         Self {
             mission,
             roles,
-            topics: shown.collect(),
+            topics,
+            published,
             phases: if phases.len() > 1 { phases } else { &[] },
             is_named,
         }
@@ -98,9 +108,10 @@ impl<'a> FigureSource<'a> {
 
     /// The publications of some nodes on shown topics.
     pub(crate) fn publications(&self, nodes: &[NodeId]) -> Vec<EdgeId> {
-        let all = (0..).zip(&self.mission.elements.publishes);
-        let own = all.filter(|(_, e)| nodes.contains(&e.node) && self.shows(e.topic));
-        own.map(|(id, _)| id).collect()
+        let own = nodes.iter().flat_map(|id| &self.published[*id as usize]);
+        let mut own: Vec<EdgeId> = own.copied().collect();
+        own.sort_unstable();
+        own
     }
 
     /// When a publication carried messages. One that is ever latched stands for its node by its message, and is not

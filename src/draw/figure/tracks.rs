@@ -158,8 +158,10 @@ fn lives(source: &FigureSource<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<Tra
     let known: Vec<Option<Degree>> = cells
         .iter()
         .map(|cell| {
-            let own = cell.graph.nodes.iter().filter(|n| nodes.contains(&n.id));
-            own.map(|n| n.degree).min()
+            let states = &cell.graph.nodes;
+            let place = |id: &NodeId| states.binary_search_by_key(id, |n| n.id).ok();
+            let own = nodes.iter().filter_map(place);
+            own.map(|at| states[at].degree).min()
         })
         .collect();
     let elements = &source.mission.elements;
