@@ -81,12 +81,12 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Events(args) => log(&args, &given, &mut terminal),
         Command::Diff(args) => {
             failed = USAGE;
-            gate::diff(&args, &mut terminal)
+            gate::diff(&args, &given, &mut terminal)
         }
-        Command::Baseline(args) => gate::baseline(&args, &mut terminal),
+        Command::Baseline(args) => gate::baseline(&args, &given, &mut terminal),
         Command::Check(args) => {
             failed = USAGE;
-            gate::check(&args, &mut terminal)
+            gate::check(&args, &given, &mut terminal)
         }
         Command::Styles { name } => styles(name.as_deref(), &mut terminal),
         Command::Completions { shell } => {

@@ -119,7 +119,7 @@ fn text1(text: &str) -> Vec<u8> {
 }
 
 /// `rosgraph_msgs/Log`.
-fn log1(node: &str, text: &str, file: &str, topics: &[&str]) -> Vec<u8> {
+pub(crate) fn log1(node: &str, text: &str, file: &str, topics: &[&str]) -> Vec<u8> {
     let header = [vec![0; 12], text1("")].concat();
     let parts = [
         header,

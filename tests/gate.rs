@@ -10,7 +10,7 @@ use crate::support::{ORIGIN, Recording, shared};
 const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
 
-fn bagreel(folder: &Path, args: &[&str]) -> Output {
+pub(crate) fn bagreel(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_bagreel"))
         .current_dir(folder)
         .env_remove("GITHUB_STEP_SUMMARY")
@@ -197,6 +197,10 @@ fn other_recordings_of_one_mission_keep_its_expectation() {
             "data/bags/mission/killed_bz2.bag.active",
         ),
         ("data/mini/mini_lz4.bag", "data/mini/mini_bz2.bag"),
+        (
+            "data/bags/example/example.bag",
+            "data/bags/example/example-lz4.bag",
+        ),
     ];
     let dir = tempfile::tempdir().unwrap();
     for (one, other) in pairs {
@@ -454,7 +458,7 @@ fn every_exit_code_means_what_the_help_says() {
                 "error",
             ],
             1,
-            "unknown[",
+            "error[subscriber-missing]: cannot tell",
         ),
         (
             &["run.bag", "--expect", "blind.yaml"],
@@ -470,7 +474,7 @@ fn every_exit_code_means_what_the_help_says() {
                 "error",
             ],
             1,
-            "unknown[",
+            "error[node-lifecycle]: cannot tell",
         ),
         (
             &["run.bag", "--expect", "wrong.yaml"],
@@ -545,7 +549,8 @@ fn allowances_forgive_until_their_day_and_unused_ones_are_told() {
 }
 
 /// Names as nobody should give them.
-const HOSTILE: [&str; 7] = [
+const HOSTILE: [&str; 8] = [
+    "/]]>&amp;<![CDATA[x",
     "/@team",
     "/a\n::error file=x::forged",
     "/##[error]forged",
@@ -597,7 +602,7 @@ fn hostile_names_are_inert_in_every_format() {
             .iter()
             .filter(|l| l.starts_with("::error "))
             .count(),
-        9
+        10
     );
     assert!(
         !github.contains("##[") && !print("text").contains("##["),
@@ -745,4 +750,146 @@ fn a_difference_is_told_of_what_both_could_have_told() {
     );
     assert_eq!(run(here, &["diff", "gone.bag", "a.bag"]).0, 2);
     assert_eq!(run(here, &["diff", "a.bag"]).0, 2);
+}
+
+#[test]
+fn no_report_is_larger_than_its_reader_takes() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let mut robot = recording(HEALTHY, 0);
+    for n in 0..40 {
+        let own = robot.publisher(&format!("/new_{n}"), "/odom", "nav_msgs/Odometry");
+        robot.send(own, (1_000, 170_000), 60_000, &[2; 48]);
+    }
+    bag(here, "run.bag", &robot);
+    let gone: Vec<String> = (0..5100)
+        .map(|n| format!("  \"/gone_{n}_#[x|`@\": {{}}\n"))
+        .collect();
+    let gone = gone.concat();
+    let by: Vec<String> = (0..200)
+        .map(|n| format!("\"/lost_{n}_{}\"", "é#".repeat(40)))
+        .collect();
+    let text = format!(
+        "schema: bagreel.expect/1\npolicy: {{unexpected_nodes: warn}}\nnodes:\n{gone}topics:\n  /scan: {{by: [{}]}}\n",
+        by.join(", ")
+    );
+    fs::write(here.join("g.yaml"), text).unwrap();
+    let outputs = ["-o", "c.md", "-o", "c.sarif", "-o", "c.xml", "-o", "c.json"];
+    let args = [
+        "check", "run.bag", "--expect", "g.yaml", "--format", "github",
+    ];
+    let output = bagreel(here, &[&args[..], &outputs].concat());
+    let github = said(&output);
+    let json: serde_json::Value =
+        serde_json::from_slice(&fs::read(here.join("c.json")).unwrap()).unwrap();
+    let count = |key: &str| json[key].as_u64().unwrap();
+    assert!(count("errors") > 5300 && count("warnings") > 40 && count("unknown") == 0);
+    // 10 of each kind in a step; more are dropped without a word.
+    for (command, key) in [("::error ", "errors"), ("::warning ", "warnings")] {
+        let own: Vec<&str> = github.lines().filter(|l| l.starts_with(command)).collect();
+        assert_eq!(own.len(), 10, "{command}");
+        let rest = format!("and {} more in the log", count(key) - 10);
+        assert!(own[9].contains(&rest), "{}", own[9]);
+    }
+    let read = |name: &str| fs::read_to_string(here.join(name)).unwrap();
+    let markdown = read("c.md");
+    assert!(
+        (100_000..256 << 10).contains(&markdown.len()),
+        "{}",
+        markdown.len()
+    );
+    let seen = markdown.split("<details>").next().unwrap();
+    assert_eq!(
+        seen.lines().filter(|l| l.starts_with("| ❌")).count(),
+        12,
+        "{seen}"
+    );
+    assert!(markdown.contains(" left out."), "{seen}");
+    let chart = markdown.split("```mermaid\n").nth(1).unwrap();
+    let chart = chart.split("```").next().unwrap();
+    let edges = chart.lines().filter(|l| l.contains("->")).count();
+    assert!(
+        edges <= 60 && chart.len() <= 50_000,
+        "{edges} edges, {} bytes",
+        chart.len()
+    );
+    assert!(
+        chart.lines().filter(|l| l.contains("([\"")).count() > 50,
+        "{chart}"
+    );
+    let sarif: serde_json::Value = serde_json::from_str(&read("c.sarif")).unwrap();
+    let run = &sarif["runs"][0];
+    assert_eq!(run["results"].as_array().unwrap().len(), 5000);
+    let note = &run["invocations"][0]["toolExecutionNotifications"][0]["message"]["text"];
+    let rest = count("errors") + count("warnings") - 5000;
+    assert_eq!(note, &format!("{rest} more findings left out"));
+    roxmltree::Document::parse(&read("c.xml")).unwrap();
+}
+
+#[test]
+fn an_expectation_that_unfolds_without_end_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "run.bag", &recording(HEALTHY, 0));
+    let mut bomb = String::from("schema: bagreel.expect/1\nfrom: x\nnodes: &a0 {/a: {}}\n");
+    for n in 1..30 {
+        bomb += &format!("l{n}: &a{n} [*a{}, *a{}]\n", n - 1, n - 1);
+    }
+    let deep = format!("schema: bagreel.expect/1\nnodes: {}", "[".repeat(100_000));
+    for text in [bomb, deep] {
+        fs::write(here.join("g.yaml"), text).unwrap();
+        let (code, said) = run(here, &["check", "run.bag", "--expect", "g.yaml"]);
+        assert_eq!(code, 2, "{said}");
+        assert!(
+            said.starts_with("error: `g.yaml`") && said.contains("line "),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn a_silence_across_the_edge_of_a_window_is_told_to_the_millisecond() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let mut robot = Recording::default();
+    let scan = robot.publisher("/lidar", "/scan", "sensor_msgs/LaserScan");
+    // Windows of 10 s; silent from 19.2 s to 21 s.
+    robot.send(scan, (0, 19_250), 50, &[1; 48]);
+    robot.send(scan, (21_000, 60_000), 50, &[1; 48]);
+    bag(here, "run.bag", &robot);
+    let check = |rule: &str| {
+        let text = format!("schema: bagreel.expect/1\nperiod: 10s\n{rule}\n");
+        fs::write(here.join("g.yaml"), text).unwrap();
+        run(here, &["check", "run.bag", "--expect", "g.yaml"])
+    };
+    let (code, said) = check("topics:\n  /scan: {max_gap: 1.7s}");
+    assert_eq!(code, 1, "{said}");
+    assert!(
+        said.contains("/scan was silent for 1.8 s") && said.contains("within 00:19–00:21"),
+        "{said}"
+    );
+    assert_eq!(check("topics:\n  /scan: {max_gap: 1.9s}").0, 0);
+    // Only the part in the stretch that a rule means counts.
+    let (code, said) = check("rules:\n  - {id: r, topic: /scan, max_gap: 0.5s, during: 20.2..}");
+    assert!(code == 1 && said.contains("silent for 800 ms"), "{said}");
+    assert_eq!(
+        check("rules:\n  - {id: r, topic: /scan, max_gap: 0.5s, during: ..19}").0,
+        0
+    );
+    // What is accepted holds.
+    fs::write(
+        here.join("g.yaml"),
+        "schema: bagreel.expect/1\ntopics:\n  /scan: {max_gap: 0.2s}\n",
+    )
+    .unwrap();
+    assert_eq!(
+        run(here, &["baseline", "run.bag", "--update", "g.yaml"]).0,
+        0
+    );
+    assert!(
+        fs::read_to_string(here.join("g.yaml"))
+            .unwrap()
+            .contains("max_gap: 1.8s")
+    );
+    assert_eq!(run(here, &["check", "run.bag", "--expect", "g.yaml"]).0, 0);
 }

@@ -25,6 +25,7 @@ mod info;
 mod layout;
 mod options;
 mod pages;
+mod pairs;
 mod phases;
 mod pictures;
 mod properties;

@@ -15,6 +15,13 @@ pub(crate) const SPAN_DAYS: i64 = 36_525;
 /// The longest style, topology or file of captions, in bytes: a hundred times the largest we know.
 pub(crate) const USER_TEXT: u64 = 16 << 20;
 
+/// The longest topology, in bytes: twenty times the largest graph that anybody saved from `rqt_graph`. Taken apart it needs
+/// eighty times as much memory at worst.
+pub(crate) const TOPOLOGY: u64 = 4 << 20;
+
+/// The most nodes and edges that a table may name: more than that are not told of a mission.
+pub(crate) const TOPOLOGY_ENTRIES: usize = 1 << 17;
+
 /// How much may be done for one launch file, in about as many bytes of memory and of text gone through: two hundred times
 /// the largest launch system seen (all of Autoware's), and a second or two of work.
 pub(crate) const LAUNCH_WORK: usize = 64 << 20;

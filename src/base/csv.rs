@@ -177,22 +177,28 @@ pub(crate) type CsvRow = (usize, Vec<String>);
 ///
 /// # Errors
 /// The line, and what is wrong there.
-pub(crate) fn records(text: &str) -> Result<Vec<CsvRow>, (usize, String)> {
-    let mut reader = ReaderBuilder::new()
+pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
+    each_record(text).collect()
+}
+
+/// The same, record by record.
+pub(crate) fn each_record(
+    text: &str,
+) -> impl Iterator<Item = Result<Record, (usize, String)>> + use<'_> {
+    let reader = ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
     let line = |position: Option<&csv::Position>| {
         position.map_or(0, |p| usize::try_from(p.line()).unwrap_or(usize::MAX))
     };
-    let rows = reader.records().map(|row| match row {
+    reader.into_records().map(move |row| match row {
         Ok(row) => Ok((
             line(row.position()),
             row.iter().map(ToOwned::to_owned).collect(),
         )),
         Err(error) => Err((line(error.position()), error.to_string())),
-    });
-    rows.collect()
+    })
 }
 
 #[cfg(test)]

@@ -22,10 +22,14 @@ pub fn rate_change(from_hz: f64, to_hz: f64) -> String {
     }
 }
 
-/// A range of rates: `13.5..16.5 Hz`, `5.. Hz`.
+/// A range of rates: `13.5–16.5 Hz`, `at least 5 Hz`.
 pub fn rate_range(from_hz: Option<f64>, to_hz: Option<f64>) -> String {
-    let end = |hz: Option<f64>| hz.map_or_else(String::new, |hz| hz.to_string());
-    format!("{}..{} Hz", end(from_hz), end(to_hz))
+    match (from_hz, to_hz) {
+        (Some(from), Some(to)) => format!("{from}–{to} Hz"),
+        (Some(from), None) => format!("at least {from} Hz"),
+        (None, Some(to)) => format!("at most {to} Hz"),
+        (None, None) => "any rate".to_owned(),
+    }
 }
 
 /// The rate of `count` messages in `seconds`, with no more digits than so few messages can tell: `1 msg` for a single
@@ -297,7 +301,8 @@ mod tests {
             (rate(48_000.0), "48 kHz"),
             (rate_change(15.0, 7.4), "15 → 7.4 Hz"),
             (rate_change(900.0, 1200.0), "900 Hz → 1.2 kHz"),
-            (rate_range(Some(13.5), None), "13.5.. Hz"),
+            (rate_range(Some(13.5), Some(16.0)), "13.5–16 Hz"),
+            (rate_range(Some(13.5), None), "at least 13.5 Hz"),
             (rate_of(0, 10.0), "0 Hz"),
             (rate_of(1, 300.0), "1 msg"),
             (rate_of(3, 10.0), "0.3 Hz"),

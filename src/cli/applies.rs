@@ -261,3 +261,81 @@ pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
         "`--{option}` is about windows; {what} tells lives in continuous time and is the same for all"
     ))
 }
+
+/// Refuses the options of `diff` that say nothing where one of the two is an expectation.
+pub(super) fn check_against(given: &Given) -> Result<()> {
+    match given.any(&["style", "size", "rate-change"]) {
+        None => Ok(()),
+        Some(option) => {
+            let what =
+                format!("`--{option}` says nothing where a mission is held against an expectation");
+            Err(Error::usage(what, "give two missions, or leave it out"))
+        }
+    }
+}
+
+/// Refuses the options of `diff` that only pictures show, where there is none.
+pub(super) fn check_diff(given: &Given, infer: &[String], has_picture: bool) -> Result<()> {
+    check_guesses(infer)?;
+    if has_picture {
+        return Ok(());
+    }
+    if let Some(option) = given.any(&["style", "size"]) {
+        let what = format!("`--{option}` says nothing without a picture");
+        return Err(Error::usage(
+            what,
+            "pictures take it: `-o d.svg`, `-o d.html`",
+        ));
+    }
+    match given.any(&["source", "infer"]) {
+        None => Ok(()),
+        Some(option) => {
+            let what = format!(
+                "`--{option}` says nothing without a picture: what is measured or stated is compared"
+            );
+            Err(Error::usage(what, "a picture shows the rest: `-o d.svg`"))
+        }
+    }
+}
+
+/// Refuses the options of `baseline` that add what it never writes.
+pub(super) fn check_baseline(given: &Given) -> Result<()> {
+    match given.any(&["source", "infer"]) {
+        None => Ok(()),
+        Some(option) => {
+            let what = format!(
+                "`--{option}` says nothing to a baseline, which holds what was measured or stated"
+            );
+            Err(Error::usage(
+                what,
+                "give it to `check`, which asks for less proof",
+            ))
+        }
+    }
+}
+
+/// Refuses the options of `check` that say nothing to these formats.
+pub(super) fn check_check(given: &Given, infer: &[String], formats: &[&str]) -> Result<()> {
+    check_guesses(infer)?;
+    if given.any(&["link"]).is_some() && !formats.contains(&"markdown") {
+        let what = "`--link` says nothing to these formats";
+        return Err(Error::usage(
+            what,
+            "Markdown takes it: `--format markdown`, `-o check.md`",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses to judge by nodes that nothing in the bag names.
+fn check_guesses(infer: &[String]) -> Result<()> {
+    if infer.iter().any(|word| word == "source") {
+        let what =
+            "`--infer source` adds nodes that the bag does not name, and they are never judged";
+        return Err(Error::usage(
+            what,
+            "`render` draws them; `--source DIR` alone adds what is sure",
+        ));
+    }
+    Ok(())
+}

@@ -3,12 +3,14 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use super::applies::{self, Given};
 use super::args::gate::{BaselineArgs, CheckArgs, DiffArgs, GateTime, Undecidable};
 use super::args::{ChangeArgs, GraphArgs, Inputs, TimeArgs};
 use super::terminal::Terminal;
 use super::{DONE, FAILED, SKIPPED, USAGE, code, look, reading, summary};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
+use crate::base::words;
 use crate::export::Output;
 use crate::export::target::Target;
 use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Severity, explain};
@@ -16,12 +18,17 @@ use crate::pipeline::gate::{self, Baseline, Check, Diff, Report};
 use crate::pipeline::{Drawing, Reading};
 
 /// Tells what differs between two missions, or between one and an expectation.
-pub(super) fn diff(args: &DiffArgs, terminal: &mut Terminal) -> Result<u8> {
+pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let paths = [&args.first, &args.second];
     if let Some(at) = paths.iter().position(|path| is_expectation(path)) {
-        return against(args, paths[1 - at], paths[at], terminal);
+        applies::check_against(given)?;
+        return against(args, given, (paths[1 - at], paths[at]), terminal);
     }
     let job = diff_job(args)?;
+    applies::check_diff(given, &args.graph.infer, !job.pictures.is_empty())?;
+    for reading in &job.readings {
+        applies::check_inputs(given, reading)?;
+    }
     let done = gate::diff(&job, terminal)?;
     terminal.results(&(args.format.write)(&job.subject, &done.differences))?;
     for remark in &done.remarks {
@@ -88,7 +95,12 @@ fn is_expectation(path: &Path) -> bool {
 }
 
 /// The difference between a mission and an expectation is what a check finds.
-fn against(args: &DiffArgs, bag: &Path, expect: &Path, terminal: &mut Terminal) -> Result<u8> {
+fn against(
+    args: &DiffArgs,
+    given: &Given,
+    (bag, expect): (&Path, &Path),
+    terminal: &mut Terminal,
+) -> Result<u8> {
     let format = Format::from_word(args.format.word);
     let check = CheckArgs {
         bags: vec![bag.to_owned()],
@@ -101,11 +113,12 @@ fn against(args: &DiffArgs, bag: &Path, expect: &Path, terminal: &mut Terminal) 
         time: args.time(),
         graph: args.graph.clone(),
     };
-    self::check(&check, terminal)
+    self::check(&check, given, terminal)
 }
 
 /// Writes down what healthy runs have in common.
-pub(super) fn baseline(args: &BaselineArgs, terminal: &mut Terminal) -> Result<u8> {
+pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
+    applies::check_baseline(given)?;
     let runs = args.bags.iter().map(|bag| {
         let inputs = Inputs {
             bags: vec![bag.clone()],
@@ -119,6 +132,9 @@ pub(super) fn baseline(args: &BaselineArgs, terminal: &mut Terminal) -> Result<u
         only: args.only.clone(),
         output: Target::parse(&args.output),
     };
+    for run in &job.runs {
+        applies::check_inputs(given, run)?;
+    }
     let done = gate::baseline(&job, terminal)?;
     for mission in &done.missions {
         terminal.notices(&mission.notices);
@@ -126,17 +142,20 @@ pub(super) fn baseline(args: &BaselineArgs, terminal: &mut Terminal) -> Result<u
     if let Some(path) = &args.update {
         let left = match done.left {
             0 => String::new(),
-            n => format!("; {n} findings of rules are left, which only you can resolve"),
+            n => {
+                let left = words::count(n, "finding");
+                format!("; {left} of rules left, which only you can resolve")
+            }
         };
-        let n = done.changed;
-        terminal.say(&format!("{}: {n} facts written anew{left}", path.display()));
+        let changed = words::count(done.changed, "fact");
+        terminal.say(&format!("{}: {changed} written anew{left}", path.display()));
     }
     let codes = done.missions.iter().map(code);
     Ok(codes.max().unwrap_or(DONE))
 }
 
 /// Holds a mission against an expectation.
-pub(super) fn check(args: &CheckArgs, terminal: &mut Terminal) -> Result<u8> {
+pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     if let Some(word) = &args.explain {
         let Some(text) = explain(word) else {
             return Err(unknown_kind(word));
@@ -157,17 +176,20 @@ pub(super) fn check(args: &CheckArgs, terminal: &mut Terminal) -> Result<u8> {
             .collect::<Result<_>>()?,
         bags: typed(&args.bags),
         links: args.link.clone(),
+        is_strict: args.undecidable == Undecidable::Error,
         append_to: summary(),
     };
+    let formats = job.reports.iter().map(|report| report.format.word);
+    let formats: Vec<&str> = formats.chain([args.format.word]).collect();
+    applies::check_check(given, &args.graph.infer, &formats)?;
+    applies::check_inputs(given, &job.reading)?;
     let done = gate::check(&job, terminal)?;
     let subject = job.subject(&done.mission);
     terminal.results(&(args.format.write)(&subject, &done.verdict))?;
     terminal.notices(&done.mission.notices);
     let verdict = &done.verdict;
-    let is_strict = args.undecidable == Undecidable::Error;
-    let unknown = verdict.count(Severity::Unknown) > 0;
     Ok(match code(&done.mission) {
-        _ if verdict.count(Severity::Error) > 0 || is_strict && unknown => FAILED,
+        _ if verdict.count(Severity::Error) > 0 => FAILED,
         _ if verdict.is_blind() => USAGE,
         SKIPPED => SKIPPED,
         _ => DONE,

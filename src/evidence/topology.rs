@@ -13,7 +13,7 @@ mod yaml;
 
 use std::path::Path;
 
-use crate::base::budget::USER_TEXT;
+use crate::base::budget::TOPOLOGY;
 use crate::base::error::{Error, Result};
 use crate::base::file;
 use crate::base::notice::{Notice, NoticeKind};
@@ -102,7 +102,7 @@ pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
 
 /// The text of a file that is not too long.
 fn text(path: &Path) -> Result<String> {
-    let bytes = file::read(path, USER_TEXT)?;
+    let bytes = file::read(path, TOPOLOGY)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 

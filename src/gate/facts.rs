@@ -1,9 +1,10 @@
 //! What a mission answers when it is asked by name: who is there, when, how often, and whether the bag can tell at all.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+mod cause;
+mod tempo;
 
-use super::finding::Cause;
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::pattern::Pattern;
 use crate::base::name::is_quiet;
 use crate::base::notice::NoticeKind;
@@ -11,15 +12,15 @@ use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::lives::Bound;
-use crate::graph::{Edge, Element, Graph, NodeId, State, TopicId, TopicState};
+use crate::graph::{Edge, Element, NodeId, State, TopicId};
+use crate::mission::Mission;
 use crate::mission::activity::is_hidden_node;
 use crate::mission::ledger::{Entry, Kind};
-use crate::mission::{Mission, Window};
+
+pub(crate) use tempo::{Rate, Silence};
 
 /// Robots are shut down before their recorder is: what ends so shortly before the mission does, stays.
 pub(crate) const SHUTDOWN_NS: i64 = 5_000_000_000;
-/// A recorder has found the topics that are there when it starts after so long.
-const FOUND_NS: i64 = 2_500_000_000;
 
 /// A mission, with what is asked often worked out once.
 pub(crate) struct Facts<'a> {
@@ -31,8 +32,11 @@ pub(crate) struct Facts<'a> {
     is_rewritten: bool,
     /// Nodes that are there, by role.
     roles: BTreeMap<&'a str, Vec<NodeId>>,
-    /// The graph of each window, all at hand: rules look at them in any order.
-    graphs: Vec<Graph>,
+    /// The role of each of them.
+    names: BTreeMap<&'a str, &'a str>,
+    topics: BTreeMap<&'a str, TopicId>,
+    /// The publications and the subscriptions of each topic.
+    edges: [Vec<Vec<u32>>; 2],
 }
 
 /// How well each element is known at its best.
@@ -42,45 +46,22 @@ struct Degrees {
     subscribes: Vec<Degree>,
 }
 
-/// How often a topic was sent in a window.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rate {
-    /// The window's place.
-    pub(crate) window: usize,
-    /// The part of it that counts.
-    pub(crate) span: Span,
-    pub(crate) count: u64,
-}
-
-impl Rate {
-    fn seconds(&self) -> f64 {
-        self.span.nanos().max(1) as f64 / 1e9
-    }
-
-    /// Messages per second.
-    pub(crate) fn hz(&self) -> f64 {
-        self.count as f64 / self.seconds()
-    }
-
-    /// The same with a message more, which may have come a moment too late for this window.
-    pub(crate) fn at_most(&self) -> f64 {
-        (self.count + 1) as f64 / self.seconds()
-    }
-
-    /// The same with a message less.
-    pub(crate) fn at_least(&self) -> f64 {
-        self.count.saturating_sub(1) as f64 / self.seconds()
-    }
-}
-
-/// Evidence that says what should be, not what was.
-const DECLARING: [&str; 4] = ["source", "source_only", "launch", "topology"];
+/// Evidence that says what should be, not what was. A file of the user's says what was.
+const DECLARING: [&str; 2] = ["source", "launch"];
+/// Evidence that names every node of ROS 1 that sends something recorded.
+const NAMING: [&str; 5] = [
+    "connection",
+    "statistics",
+    "rosgraph",
+    "discovery",
+    "topology",
+];
 /// Evidence that lists all subscribers of a topic.
 const LISTING: [&str; 4] = ["rosgraph", "discovery", "statistics", "topic_statistics"];
 
 /// Whether something was seen, not only declared.
 fn is_seen(evidence: Evidence) -> bool {
-    evidence.words().any(|word| !DECLARING.contains(&word))
+    !evidence.is_guess() && evidence.words().any(|word| !DECLARING.contains(&word))
 }
 
 fn has(evidence: Evidence, words: &[&str]) -> bool {
@@ -91,32 +72,15 @@ impl<'a> Facts<'a> {
     /// The facts of a mission.
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let elements = &mission.elements;
-        let mut degrees = Degrees {
-            nodes: vec![Degree::Declared; elements.nodes.len()],
-            publishes: vec![Degree::Declared; elements.publishes.len()],
-            subscribes: vec![Degree::Declared; elements.subscribes.len()],
-        };
-        let mut messages = vec![0; elements.topics.len()];
-        let graphs: Vec<Graph> = mission.graphs.iter().collect();
-        for graph in &graphs {
-            raise(
-                &mut degrees.nodes,
-                graph.nodes.iter().map(|s| (s.id, s.degree)),
-            );
-            let edges = graph.publishes.iter().map(|s| (s.id, s.degree));
-            raise(&mut degrees.publishes, edges);
-            let edges = graph.subscribes.iter().map(|s| (s.id, s.degree));
-            raise(&mut degrees.subscribes, edges);
-            for topic in &graph.topics {
-                if let Some(sum) = messages.get_mut(topic.id as usize) {
-                    *sum += topic.count;
-                }
-            }
-        }
+        let (degrees, messages) = summed(mission);
         let mut roles: BTreeMap<&str, Vec<NodeId>> = BTreeMap::new();
+        let mut names = BTreeMap::new();
         for (id, node) in (0..).zip(&elements.nodes) {
-            if is_seen(node.evidence) {
+            // What never was in a window lies outside the part that is judged.
+            let is_there = degrees.nodes[id as usize] < Degree::Declared;
+            if is_there && is_seen(node.evidence) {
                 roles.entry(&node.role).or_default().push(id);
+                names.insert(node.name.as_str(), &*node.role);
             }
         }
         Self {
@@ -128,7 +92,13 @@ impl<'a> Facts<'a> {
                 .iter()
                 .any(|n| n.kind == NoticeKind::Rewritten),
             roles,
-            graphs,
+            names,
+            topics: (0..)
+                .zip(&elements.topics)
+                .map(|(id, topic)| (topic.name.as_str(), id))
+                .collect(),
+            edges: [&elements.publishes, &elements.subscribes]
+                .map(|edges| by_topic(edges, elements.topics.len())),
         }
     }
 
@@ -141,6 +111,20 @@ impl<'a> Facts<'a> {
 
     /// The roles that a pattern stands for; a name that has a role stands for it too.
     pub(crate) fn nodes(&self, pattern: &Pattern) -> Vec<(&'a str, &[NodeId])> {
+        if pattern.is_name() {
+            let name = pattern.as_str();
+            let own = self.roles.get_key_value(name).map(|(role, _)| *role);
+            let roles: BTreeSet<&str> = own
+                .into_iter()
+                .chain(self.names.get(name).copied())
+                .collect();
+            let found = roles
+                .into_iter()
+                .filter_map(|role| self.roles.get_key_value(role));
+            return found
+                .map(|(role, nodes)| (*role, nodes.as_slice()))
+                .collect();
+        }
         let own = |nodes: &[NodeId]| {
             let names = nodes.iter().map(|id| self.node(*id));
             names.into_iter().any(|name| pattern.matches(name))
@@ -157,6 +141,10 @@ impl<'a> Facts<'a> {
 
     /// The topics that are there and that a pattern stands for.
     pub(crate) fn topics(&self, pattern: &Pattern) -> Vec<TopicId> {
+        if pattern.is_name() {
+            let own = self.topics.get(pattern.as_str()).copied();
+            return own.into_iter().filter(|id| self.is_there(*id)).collect();
+        }
         let topics = (0..).zip(&self.mission.elements.topics);
         topics
             .filter(|(id, topic)| pattern.matches(topic.name.as_str()) && self.is_there(*id))
@@ -166,18 +154,15 @@ impl<'a> Facts<'a> {
 
     /// Whether a topic has messages, or somebody who could send some.
     pub(crate) fn is_there(&self, topic: TopicId) -> bool {
-        let own = &self.mission.elements.topics[topic as usize];
-        let is_heard = || {
-            edges(&self.mission.elements.subscribes, topic)
-                .next()
-                .is_some()
+        let elements = &self.mission.elements;
+        let any = |of: usize, edges: &[Edge]| {
+            let mut own = self.edges[of][topic as usize].iter();
+            own.any(|id| is_seen(edges[*id as usize].evidence))
         };
-        is_seen(own.evidence)
+        is_seen(elements.topics[topic as usize].evidence)
             && (self.messages[topic as usize] > 0
-                || edges(&self.mission.elements.publishes, topic)
-                    .next()
-                    .is_some()
-                || !is_heard())
+                || any(0, &elements.publishes)
+                || !any(1, &elements.subscribes))
     }
 
     /// Messages of a topic.
@@ -214,20 +199,26 @@ impl<'a> Facts<'a> {
         nodes.iter().any(sure)
     }
 
-    /// Who publishes a topic, with how well that is known.
+    /// Who publishes a topic, with how well that is known; what only code and launch files say is declared.
     pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
-        let edges = edges(&self.mission.elements.publishes, topic);
-        edges
-            .map(|(id, edge)| (edge.node, id, self.degrees.publishes[id as usize]))
-            .collect()
+        let own = self.edges[0][topic as usize].iter();
+        own.map(|id| {
+            let place = *id as usize;
+            let edge = &self.mission.elements.publishes[place];
+            (edge.node, *id, self.degrees.publishes[place])
+        })
+        .collect()
     }
 
-    /// Who subscribes a topic, with how well that is known.
+    /// Who subscribes a topic, the same way.
     pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
-        let edges = edges(&self.mission.elements.subscribes, topic);
-        edges
-            .map(|(id, edge)| (edge.node, id, self.degrees.subscribes[id as usize]))
-            .collect()
+        let own = self.edges[1][topic as usize].iter();
+        own.map(|id| {
+            let place = *id as usize;
+            let edge = &self.mission.elements.subscribes[place];
+            (edge.node, *id, self.degrees.subscribes[place])
+        })
+        .collect()
     }
 
     /// Whether a tool rewrote the bag: senders that it merged cannot be told apart.
@@ -235,10 +226,23 @@ impl<'a> Facts<'a> {
         self.is_rewritten
     }
 
-    /// Whether the bag names nodes, so that one that it does not name is not there: not where a tool merged senders.
+    /// Whether the bag names nodes, so that one that it does not name is not there: not where a tool merged senders. A
+    /// ROS 1 bag names them in its connections; where a tool dropped these names, a log that most nodes never write to
+    /// is all that is left.
     pub(crate) fn names_nodes(&self) -> bool {
-        let is_named = |nodes: &[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
+        let is_ros1 = self.is_ros1();
+        let is_named = |nodes: &[NodeId]| {
+            let says = |id: &NodeId| self.mission.elements.nodes[*id as usize].evidence;
+            let is_told = |id: &NodeId| !is_ros1 || has(says(id), &NAMING);
+            self.is_sure(nodes) && !self.is_tool(nodes) && nodes.iter().any(is_told)
+        };
         !self.is_rewritten && self.roles().any(|(_, nodes)| is_named(nodes))
+    }
+
+    /// Whether nodes of ROS 1 were recorded, by what they log.
+    fn is_ros1(&self) -> bool {
+        let mut types = self.mission.elements.topics.iter().flat_map(|t| &t.types);
+        types.any(|word| &**word == "rosgraph_msgs/Log")
     }
 
     /// Whether the bag tells all publishers of a topic.
@@ -294,97 +298,15 @@ impl<'a> Facts<'a> {
     }
 
     /// The lifecycle state that a role was last seen in.
-    pub(crate) fn lifecycle(&self, nodes: &[NodeId]) -> Option<Arc<str>> {
-        let states = |graph: &Graph| {
-            let states = graph.nodes.iter().filter(|s| nodes.contains(&s.id));
-            states.filter_map(|s| s.lifecycle.clone()).next_back()
+    pub(crate) fn lifecycle(&self, nodes: &[NodeId]) -> Option<&'a str> {
+        let graphs = &self.mission.graphs;
+        let last = |node: &NodeId| {
+            let rows = graphs.rows(Element::Node(*node));
+            let named = rows.filter_map(|(at, row)| Some((at, *node, graphs.lifecycle(&row)?)));
+            named.last()
         };
-        self.graphs.iter().rev().find_map(states)
-    }
-
-    /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
-    pub(crate) fn heard(&self, topic: TopicId) -> Option<Span> {
-        if let Some(stretches) = self.mission.activity.sending.topics.get(topic as usize)
-            && let (Some(first), Some(last)) = (stretches.first(), stretches.last())
-        {
-            return Some(Span {
-                start: first.start,
-                end: last.end,
-            });
-        }
-        let mut windows = self
-            .mission
-            .windows
-            .iter()
-            .filter(|w| self.count(w.index, topic) > 0);
-        let first = windows.next()?.span;
-        Some(Span {
-            start: first.start,
-            end: windows.next_back().map_or(first, |w| w.span).end,
-        })
-    }
-
-    /// The rates by which a topic is judged: of every whole window from its first message to the mission's end, or to
-    /// its last message if it `may_end`.
-    pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
-        let Some(heard) = self.heard(topic) else {
-            return Vec::new();
-        };
-        let whole = self.mission.span;
-        let windows = self.mission.windows.iter().filter(|w| !w.partial);
-        let inside = windows.filter(|w| during.start <= w.span.start && w.span.end <= during.end);
-        let rate = |w: &Window| {
-            let mut span = w.span;
-            if heard.start > span.start {
-                // What is there when the recorder starts is heard a moment later; all else is not whole.
-                let found = span.start == whole.start && heard.start.since(whole.start) <= FOUND_NS;
-                span.start = found.then_some(heard.start)?;
-            }
-            if heard.end < span.end {
-                let is_over = whole.end.since(heard.end) <= SHUTDOWN_NS;
-                match (is_over, may_end) {
-                    (true, _) => span.end = heard.end,
-                    (false, true) => return None,
-                    (false, false) => {}
-                }
-            }
-            (span.nanos() >= w.span.nanos() / 2).then(|| Rate {
-                window: w.index,
-                span,
-                count: self.count(w.index, topic),
-            })
-        };
-        inside.filter_map(rate).collect()
-    }
-
-    /// Whether a topic's messages come at even times, by the median in each of these windows.
-    pub(crate) fn is_even(&self, topic: TopicId, rates: &[Rate]) -> bool {
-        let median =
-            |rate: &Rate| Some(self.state(rate.window, topic)?.median_period_s? * rate.hz());
-        let mut shares = rates.iter().filter_map(median).peekable();
-        shares.peek().is_some() && shares.all(|share| (0.8..=1.25).contains(&share))
-    }
-
-    /// The longest silences of a topic, each with when: within windows, and of 4 s or more across them.
-    pub(crate) fn gaps(&self, topic: TopicId, during: Span) -> Vec<(Span, i64)> {
-        let inside = |span: &Span| during.start <= span.start && span.end <= during.end;
-        let mut all = Vec::new();
-        for window in self.mission.windows.iter().filter(|w| inside(&w.span)) {
-            if let Some(gap) = self.state(window.index, topic).and_then(|s| s.max_gap_s) {
-                all.push((window.span, nanos(gap)));
-            }
-        }
-        let stretches = self.mission.activity.sending.topics.get(topic as usize);
-        for pair in stretches.map_or(&[][..], Vec::as_slice).windows(2) {
-            let span = Span {
-                start: pair[0].end,
-                end: pair[1].start,
-            };
-            if inside(&span) {
-                all.push((span, span.nanos()));
-            }
-        }
-        all
+        let last = nodes.iter().filter_map(last).max();
+        last.map(|(.., state)| state)
     }
 
     /// Whether a topic's last message stands for it; `None` where the bag does not tell.
@@ -420,53 +342,6 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// What the ledger tells about why a topic changed around a time: its publishers, and those who feed them.
-    pub(crate) fn cause_for_topic(&self, topic: TopicId, around: Span) -> Option<Cause> {
-        let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.0).collect();
-        let fed: BTreeSet<TopicId> = {
-            let edges = self.mission.elements.subscribes.iter();
-            let own = edges.filter(|e| direct.contains(&e.node) && e.topic != topic);
-            own.map(|e| e.topic).collect()
-        };
-        let feeders: BTreeSet<NodeId> = fed
-            .iter()
-            .flat_map(|topic| self.publishers(*topic))
-            .map(|p| p.0)
-            .filter(|node| !direct.contains(node))
-            .collect();
-        self.cause(&direct, around)
-            .or_else(|| self.cause(&feeders, around))
-    }
-
-    /// The first thing that the ledger tells of one of these nodes in a stretch of time.
-    pub(crate) fn cause(&self, nodes: &BTreeSet<NodeId>, around: Span) -> Option<Cause> {
-        let wanted = [Kind::Stopped, Kind::Restarted, Kind::Silent];
-        let entries = self.mission.ledger.inside(around).map(|(_, entry)| entry);
-        let mut entries = entries.filter(|e| wanted.contains(&e.kind));
-        let entry = entries.find(|e| matches!(e.what, Element::Node(id) if nodes.contains(&id)))?;
-        self.mission.elements.ends(entry.what).0.map(|node| Cause {
-            time: Some(entry.time),
-            text: format!(
-                "{} {} at {}",
-                self.role(node),
-                entry.kind.word(),
-                self.clock(entry.time)
-            ),
-        })
-    }
-
-    /// A topic in the window at a place.
-    fn state(&self, window: usize, topic: TopicId) -> Option<&TopicState> {
-        let states = &self.graphs.get(window)?.topics;
-        let place = states.binary_search_by_key(&topic, |s| s.id).ok()?;
-        states.get(place)
-    }
-
-    /// Messages of a topic in the window at a place.
-    pub(crate) fn count(&self, window: usize, topic: TopicId) -> u64 {
-        self.state(window, topic).map_or(0, |s| s.count)
-    }
-
     /// A moment of the mission, for people.
     pub(crate) fn clock(&self, at: Stamp) -> String {
         words::offset_seconds(self.mission.offset(at))
@@ -478,10 +353,40 @@ impl<'a> Facts<'a> {
     }
 }
 
-/// The edges of a topic that were seen.
-fn edges(edges: &[Edge], topic: TopicId) -> impl Iterator<Item = (u32, &Edge)> {
-    let own = (0..).zip(edges);
-    own.filter(move |(_, edge)| edge.topic == topic && is_seen(edge.evidence))
+/// How well each element is known at its best, and how many messages each topic has.
+fn summed(mission: &Mission) -> (Degrees, Vec<u64>) {
+    let elements = &mission.elements;
+    let mut degrees = Degrees {
+        nodes: vec![Degree::Declared; elements.nodes.len()],
+        publishes: vec![Degree::Declared; elements.publishes.len()],
+        subscribes: vec![Degree::Declared; elements.subscribes.len()],
+    };
+    let mut messages = vec![0; elements.topics.len()];
+    for graph in &mission.graphs {
+        let nodes = graph.nodes.iter().map(|s| (s.id, s.degree));
+        raise(&mut degrees.nodes, nodes);
+        let edges = graph.publishes.iter().map(|s| (s.id, s.degree));
+        raise(&mut degrees.publishes, edges);
+        let edges = graph.subscribes.iter().map(|s| (s.id, s.degree));
+        raise(&mut degrees.subscribes, edges);
+        for topic in &graph.topics {
+            if let Some(sum) = messages.get_mut(topic.id as usize) {
+                *sum += topic.count;
+            }
+        }
+    }
+    (degrees, messages)
+}
+
+/// The edges of each topic, but for those of nodes that nothing names.
+fn by_topic(edges: &[Edge], topics: usize) -> Vec<Vec<u32>> {
+    let mut all = vec![Vec::new(); topics];
+    for (id, edge) in (0..).zip(edges) {
+        if let (false, Some(own)) = (edge.evidence.is_guess(), all.get_mut(edge.topic as usize)) {
+            own.push(id);
+        }
+    }
+    all
 }
 
 /// Keeps the best degree of each element.
@@ -491,11 +396,4 @@ fn raise(best: &mut [Degree], seen: impl Iterator<Item = (u32, Degree)>) {
             *own = degree.min(*own);
         }
     }
-}
-
-/// Seconds in nanoseconds, held within an `i64`.
-fn nanos(seconds: f64) -> i64 {
-    #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
-    let nanos = libm::round(seconds * 1e9) as i64;
-    nanos
 }

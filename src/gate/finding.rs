@@ -1,5 +1,6 @@
 //! What can be found wrong, each kind a row in [`KINDS`]; and one thing found.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::base::digest;
@@ -118,7 +119,8 @@ pub(crate) const KINDS: &[(Kind, &str, &str, &str)] = &[
         Kind::TopicGap,
         "topic-gap",
         "A topic was silent for longer than allowed.",
-        "`max_gap: 0.5s` holds between messages of one window; across windows for silences of 4 s and more.",
+        "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`. \
+         Of a mission in JSON only what lies within windows is known.",
     ),
     (
         Kind::PublisherMissing,
@@ -257,6 +259,8 @@ pub(crate) struct Finding {
     pub(crate) accept: Option<String>,
     /// Why it is forgiven.
     pub(crate) why: Option<String>,
+    /// How many before it in the file look the same to [`Self::fingerprint`].
+    pub(crate) nth: usize,
 }
 
 impl Finding {
@@ -276,6 +280,7 @@ impl Finding {
             help: Vec::new(),
             accept: None,
             why: None,
+            nth: 0,
         }
     }
 
@@ -326,8 +331,31 @@ impl Finding {
 
     /// Twelve hex digits that stay the same from run to run, and when lines of the file move.
     pub(crate) fn fingerprint(&self) -> String {
-        let text = format!("{}\n{}\n{}", self.kind.word(), self.name, self.expected);
-        digest::hex(&text, 12)
+        let look = self.look();
+        match self.nth {
+            0 => digest::hex(&look, 12),
+            nth => digest::hex(&format!("{look}\n{nth}"), 12),
+        }
+    }
+
+    /// What of it stays the same from run to run: who else publishes does, numbers do not.
+    fn look(&self) -> String {
+        let who = match self.kind {
+            Kind::PublisherUnexpected => self.seen.as_str(),
+            _ => "",
+        };
+        let (kind, name, expected) = (self.kind.word(), &self.name, &self.expected);
+        format!("{kind}\n{name}\n{expected}\n{who}")
+    }
+}
+
+/// Numbers findings that look the same, in the order of the file, so that no two have one fingerprint.
+pub(crate) fn number<'a>(findings: impl Iterator<Item = &'a mut Finding>) {
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    for finding in findings {
+        let count = seen.entry(finding.look()).or_default();
+        finding.nth = *count;
+        *count += 1;
     }
 }
 
@@ -353,5 +381,9 @@ mod tests {
         assert_eq!(one.fingerprint(), two.fingerprint());
         assert_ne!(one.fingerprint(), other.fingerprint());
         assert_eq!(one.fingerprint().len(), 12);
+        let mut twice = [one.clone(), two];
+        number(twice.iter_mut());
+        assert_eq!(twice[0].fingerprint(), one.fingerprint());
+        assert_ne!(twice[0].fingerprint(), twice[1].fingerprint());
     }
 }

@@ -8,9 +8,11 @@ mod rate;
 mod rule;
 mod topic;
 
-use super::expectation::{Closed, Expectation, YamlPlace};
+use std::cell::Cell;
+
+use super::expectation::{Closed, Expectation, Place};
 use super::facts::Facts;
-use super::finding::{Cause, Finding, Severity};
+use super::finding::{Cause, Finding, Severity, number};
 use super::pattern::Pattern;
 use crate::base::nearest::nearest;
 use crate::base::words::visible;
@@ -79,6 +81,14 @@ impl Verdict {
         all.filter(|c| c.judgement() == judgement).count()
     }
 
+    /// Makes errors of what cannot be decided.
+    pub(crate) fn decide(&mut self) {
+        let all = self.checks.iter_mut().flat_map(|c| &mut c.findings);
+        for finding in all.filter(|f| f.severity == Severity::Unknown) {
+            finding.severity = Severity::Error;
+        }
+    }
+
     /// Whether nothing at all could be decided.
     pub(crate) fn is_blind(&self) -> bool {
         self.facts(Judgement::Undecidable) > 0
@@ -93,6 +103,7 @@ pub(crate) fn judge(expectation: &Expectation, mission: &Mission) -> Verdict {
         facts: &facts,
         expectation,
         checks: Vec::new(),
+        told: Cell::new(0),
     };
     for named in &expectation.nodes {
         judge.node(named);
@@ -105,9 +116,9 @@ pub(crate) fn judge(expectation: &Expectation, mission: &Mission) -> Verdict {
     }
     judge.policy();
     judge.allow();
-    Verdict {
-        checks: judge.checks,
-    }
+    let mut checks = judge.checks;
+    number(checks.iter_mut().flat_map(|check| &mut check.findings));
+    Verdict { checks }
 }
 
 /// The work under way.
@@ -115,9 +126,21 @@ struct Judge<'a> {
     facts: &'a Facts<'a>,
     expectation: &'a Expectation,
     checks: Vec<Checked>,
+    /// How many names were looked for among those that are there.
+    told: Cell<usize>,
 }
 
+/// So many names that are not there are told the nearest one; with more the file is of another robot.
+const NEAR: usize = 50;
+
 impl Judge<'_> {
+    /// How to go on where a name is not there: the nearest one.
+    fn near<'k>(&self, pattern: &Pattern, known: impl Iterator<Item = &'k str>) -> Option<String> {
+        self.told.set(self.told.get() + 1);
+        let near = (self.told.get() <= NEAR).then(|| nearest(pattern.as_str(), known));
+        Some(format!("the nearest name in the bag is `{}`", near??))
+    }
+
     /// Notes what was found of one fact.
     fn note(&mut self, title: impl Into<String>, place: YamlPlace, findings: Vec<Finding>) {
         self.checks.push(Checked {
@@ -137,13 +160,6 @@ impl Judge<'_> {
             is_moot: true,
         });
     }
-}
-
-/// How to go on where a name is not there: the nearest one.
-fn near(pattern: &Pattern, known: impl Iterator<Item = String>) -> Option<String> {
-    let known: Vec<String> = known.collect();
-    let near = nearest(pattern.as_str(), known.iter().map(String::as_str))?;
-    Some(format!("the nearest name in the bag is `{near}`"))
 }
 
 /// That a node is not there, as a cause of findings.

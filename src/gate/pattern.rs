@@ -1,5 +1,6 @@
 //! Names with blanks: `*` stands for any characters but `/`, `**` for any at all, `?` for one that is not `/`.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 /// A name that may hold blanks.
@@ -83,6 +84,34 @@ impl Pattern {
     }
 }
 
+/// Many names and patterns, of which somebody asks whether a name is one of them.
+#[derive(Debug, Default)]
+pub(crate) struct Names<'a> {
+    exact: BTreeSet<&'a str>,
+    patterns: Vec<&'a Pattern>,
+}
+
+impl<'a> FromIterator<&'a Pattern> for Names<'a> {
+    fn from_iter<I: IntoIterator<Item = &'a Pattern>>(all: I) -> Self {
+        let mut names = Self::default();
+        for pattern in all {
+            if pattern.is_name() {
+                names.exact.insert(pattern.as_str());
+            } else {
+                names.patterns.push(pattern);
+            }
+        }
+        names
+    }
+}
+
+impl Names<'_> {
+    /// Whether one of them stands for this name.
+    pub(crate) fn hold(&self, name: &str) -> bool {
+        self.exact.contains(name) || self.patterns.iter().any(|p| p.matches(name))
+    }
+}
+
 impl fmt::Display for Pattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
@@ -92,6 +121,14 @@ impl fmt::Display for Pattern {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn many_names_hold_what_one_of_them_stands_for() {
+        let all = ["/a", "/cam_*", "/b"].map(Pattern::new);
+        let names: Names<'_> = all.iter().collect();
+        let held = ["/a", "/b", "/cam_1", "/c", "/cam_1/x"].map(|name| names.hold(name));
+        assert_eq!(held, [true, true, true, false, false]);
+    }
 
     #[test]
     fn blanks_stand_for_parts_of_names() {

@@ -9,6 +9,8 @@ mod mermaid;
 mod sarif;
 mod text;
 
+use std::collections::BTreeMap;
+
 use super::finding::{Finding, KINDS, Kind, Severity};
 use super::judge::Verdict;
 use crate::base::words::{self, visible};
@@ -134,15 +136,19 @@ impl Subject<'_> {
 }
 
 impl Verdict {
+    /// What is broken, in words: `2 errors, 1 warning`; empty where nothing is.
+    fn broken(&self) -> String {
+        let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
+        let counts = counts.map(|(severity, word)| (self.count(severity), word));
+        let some = counts.iter().filter(|(n, _)| *n > 0);
+        let words: Vec<String> = some.map(|(n, word)| words::count(*n, word)).collect();
+        words.join(", ")
+    }
+
     /// What was found, in words: `2 errors, 1 warning, 1 unknown`.
     fn summary(&self) -> String {
-        let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
-        let mut parts: Vec<String> = counts
-            .iter()
-            .map(|(severity, word)| (self.count(*severity), word))
-            .filter(|(n, _)| *n > 0)
-            .map(|(n, word)| words::count(n, word))
-            .collect();
+        let broken = self.broken();
+        let mut parts: Vec<String> = Some(broken).into_iter().filter(|b| !b.is_empty()).collect();
         for (severity, word) in [
             (Severity::Unknown, "unknown"),
             (Severity::Allowed, "allowed"),
@@ -201,12 +207,11 @@ fn wrapped(text: &str) -> String {
 /// Findings by what caused them, in the order of the worst of each; what stands alone has no cause of its own.
 fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Finding>)> {
     let mut groups: Vec<(Option<&str>, Vec<&Finding>)> = Vec::new();
+    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
     for finding in findings {
         let cause = finding.cause.as_ref().map(|c| c.text.as_str());
-        match groups
-            .iter_mut()
-            .find(|(own, _)| own.is_some() && *own == cause)
-        {
+        let place = cause.map(|cause| *places.entry(cause).or_insert(groups.len()));
+        match place.and_then(|place| groups.get_mut(place)) {
             Some((_, group)) => group.push(finding),
             None => groups.push((cause, vec![finding])),
         }

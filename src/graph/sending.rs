@@ -1,5 +1,8 @@
 //! When messages came: for every publication and topic the stretches without a long silence, in continuous time.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use crate::base::time::{Span, Stamp};
 
 /// The shortest silence that is one, whatever the rhythm.
@@ -8,6 +11,9 @@ const SILENCE_NS: i64 = 4_000_000_000;
 const SILENCE_SHARE: f64 = 0.012;
 /// Periods that make a silence.
 const PERIODS: i64 = 4;
+/// So many pauses are kept of each topic: a stretch of the mission of which somebody asks holds one of them, or none that
+/// is longer than those within windows.
+const PAUSES: usize = 32;
 
 /// Stretches of sending, sorted and disjoint, both ends at a message (the end 1 ns after it).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,6 +22,8 @@ pub struct Sending {
     pub publishes: Vec<Vec<Span>>,
     /// Per topic, by id.
     pub topics: Vec<Vec<Span>>,
+    /// Per topic, by id, its longest pauses, at most 32, in order: each from one message to the next.
+    pub pauses: Vec<Vec<Span>>,
 }
 
 /// The shortest silence in a mission of so many nanoseconds: 4 s, or 1.2 % of it.
@@ -85,6 +93,43 @@ impl SendingRuns {
     }
 }
 
+/// The longest pauses of one sequence of messages, as it is heard.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pauses {
+    last: Option<Stamp>,
+    /// By length; the shortest is the first to go.
+    longest: BinaryHeap<Reverse<(i64, Stamp)>>,
+}
+
+impl Pauses {
+    /// Takes the next message.
+    pub(crate) fn hear(&mut self, time: Stamp) {
+        let Some(last) = self.last.replace(time) else {
+            return;
+        };
+        let pause = time.since(last);
+        if self.longest.len() < PAUSES {
+            self.longest.push(Reverse((pause, last)));
+        } else if let Some(mut shortest) = self.longest.peek_mut()
+            && shortest.0.0 < pause
+        {
+            *shortest = Reverse((pause, last));
+        }
+    }
+
+    /// All of them in order.
+    pub(crate) fn spans(self) -> Vec<Span> {
+        let longest = self.longest.into_iter();
+        let span = |Reverse((pause, start)): Reverse<(i64, Stamp)>| Span {
+            start,
+            end: start.plus(pause),
+        };
+        let mut all: Vec<Span> = longest.map(span).collect();
+        all.sort_unstable_by_key(|span| span.start);
+        all
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,6 +152,22 @@ mod tests {
         assert_eq!(stretches(&[1, 2, 3, 4, 5, 12, 13, 14]), [(1, 5), (12, 14)]);
         assert_eq!(stretches(&[1, 2, 3, 6]), [(1, 6)]);
         assert_eq!(stretches(&[]), []);
+    }
+
+    #[test]
+    fn the_longest_pauses_are_kept_in_order() {
+        let mut pauses = Pauses::default();
+        let mut at = 0;
+        // 1 to 40 ns, the long ones early.
+        for pause in (1..=40).rev() {
+            pauses.hear(Stamp(at));
+            at += pause;
+        }
+        pauses.hear(Stamp(at));
+        let spans = pauses.spans();
+        let lengths: Vec<i64> = spans.iter().map(Span::nanos).collect();
+        assert_eq!(lengths, (9..=40).rev().collect::<Vec<_>>());
+        assert_eq!((spans[1].start, spans[1].end), (Stamp(40), Stamp(79)));
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub(crate) struct Check {
     /// The bags as they were typed.
     pub(crate) bags: Vec<String>,
     pub(crate) links: Vec<(String, String)>,
+    /// Whether what cannot be decided is an error.
+    pub(crate) is_strict: bool,
     /// A file that Markdown is written behind, not over.
     pub(crate) append_to: Option<PathBuf>,
 }
@@ -70,7 +72,10 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
         reading.division.length = Length::Fixed(period);
     }
     let mission = read(&reading, watch)?;
-    let verdict = judge(&expectation, &mission);
+    let mut verdict = judge(&expectation, &mission);
+    if job.is_strict {
+        verdict.decide();
+    }
     let subject = job.subject(&mission);
     for report in &job.reports {
         let text = (report.format.write)(&subject, &verdict);

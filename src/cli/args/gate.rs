@@ -104,7 +104,10 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_enum, default_value_t)]
     pub(crate) undecidable: Undecidable,
     /// Explain a kind of finding, such as `topic-rate-low`.
-    #[arg(long, value_name = "ID", exclusive = true)]
+    #[arg(long, value_name = "ID", conflicts_with_all = [
+        "bags", "expect", "format", "outputs", "link", "undecidable", "period", "start", "end", "roles", "topology", "source",
+        "infer",
+    ])]
     pub(crate) explain: Option<String>,
     #[command(flatten)]
     pub(crate) time: GateTime,

@@ -20,6 +20,8 @@ use crate::evidence::topology::launch::join;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum NotDrawn {
     SeveralPlaces,
+    /// What else its node would do is another's as likely, so that it may not have run.
+    Disputed,
     KnownPublisher,
     OtherLaunchFile,
     FewTopics,
@@ -32,6 +34,7 @@ impl NotDrawn {
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::SeveralPlaces => "several places can be meant",
+            Self::Disputed => "what its node publishes may come from elsewhere",
             Self::KnownPublisher => "its publishers are known",
             Self::OtherLaunchFile => "another launch file fits better",
             Self::FewTopics => "most of its node's topics are not in the bag",
@@ -79,14 +82,28 @@ pub(super) fn conclude(
             .or_default()
             .push(candidate);
     }
+    let judged: Vec<_> = by_edge
+        .into_iter()
+        .map(|(edge, candidates)| {
+            let reason = reason(&candidates, known, bag, (&places[&edge], &launches));
+            (edge.0, reason, candidates)
+        })
+        .collect();
+    let disputed: BTreeSet<&str> = judged
+        .iter()
+        .filter(|(role, reason, _)| {
+            *role == Role::Publishes && *reason == Some(Reason::SeveralPlaces)
+        })
+        .flat_map(|(.., candidates)| candidates.iter().map(|c| c.node.as_str()))
+        .collect();
     let (mut edges, mut undrawn) = (0, Vec::new());
-    for (edge, candidates) in by_edge {
-        let reason = reason(&candidates, known, bag, (&places[&edge], &launches));
+    for (_, reason, candidates) in &judged {
         let best = candidates
             .iter()
             .find(|c| is_launched_by(c.found.instance, &launches))
             .unwrap_or(&candidates[0]);
-        match reason {
+        let is_disputed = reason.is_none() && disputed.contains(best.node.as_str());
+        match reason.or(is_disputed.then_some(Reason::Disputed)) {
             None if code.infers => {
                 draw(code, known, best);
                 edges += 1;

@@ -49,6 +49,10 @@ struct Contract {
     /// Whether nobody else publishes this type.
     owns: bool,
     package: String,
+    /// Where the row stands in the table, 1...
+    line: usize,
+    /// The address of the code that says so.
+    says: String,
 }
 
 /// The rows of the table; what is no row is left out.
@@ -56,12 +60,12 @@ fn contracts() -> Vec<Contract> {
     let rows = csv::records(TABLE).unwrap_or_default();
     rows.into_iter()
         .skip(1)
-        .filter_map(|(_, row)| contract(&row))
+        .filter_map(|(line, row)| contract(line, &row))
         .collect()
 }
 
-fn contract(row: &[String]) -> Option<Contract> {
-    let [node, files, ros, role, topic, kind, owns, package, _source] = row else {
+fn contract(line: usize, row: &[String]) -> Option<Contract> {
+    let [node, files, ros, role, topic, kind, owns, package, says] = row else {
         return None;
     };
     Some(Contract {
@@ -73,6 +77,8 @@ fn contract(row: &[String]) -> Option<Contract> {
         kind: kind.clone(),
         owns: owns == "yes",
         package: package.clone(),
+        line,
+        says: says.clone(),
     })
 }
 
@@ -132,10 +138,12 @@ fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
         "subscribes"
     };
     format!(
-        "{} is taken for the one of package {}, which {verb} {}",
+        "{} is taken for the one of package {}, which {verb} {} (contracts.csv line {}: {})",
         known.text(node),
         contract.package,
-        contract.topic
+        contract.topic,
+        contract.line,
+        contract.says.trim_start_matches("https://")
     )
 }
 
@@ -200,7 +208,8 @@ mod tests {
         let rows = csv::records(TABLE).unwrap();
         assert!(rows.len() > 60);
         for (line, row) in rows.iter().skip(1) {
-            let contract = contract(row).unwrap_or_else(|| panic!("line {line} has other columns"));
+            let contract =
+                contract(*line, row).unwrap_or_else(|| panic!("line {line} has other columns"));
             let has_source = row[8].starts_with("https://github.com/") && row[8].contains("/blob/");
             assert!(has_source, "line {line} names no file");
             assert!(
@@ -229,7 +238,7 @@ mod tests {
             "amcl",
             "https://x",
         ];
-        let contract = contract(&row.map(str::to_owned)).unwrap();
+        let contract = contract(2, &row.map(str::to_owned)).unwrap();
         let files = |file: &str| BTreeSet::from([Arc::from(file)]);
         assert!(is_meant(&contract, "/r1/amcl", None));
         assert!(is_meant(

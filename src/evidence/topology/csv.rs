@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
+use super::{Element, Entry, Topology, bad, place, resolved};
+use crate::base::budget::TOPOLOGY_ENTRIES;
 use crate::base::csv;
 use crate::base::error::Result;
 
@@ -13,9 +14,8 @@ const HINT: &str =
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     let wrong = |line, reason| bad(path, line, reason, HINT);
-    let rows = csv::records(text).map_err(|(line, reason)| wrong(line, reason))?;
-    let mut rows = rows.into_iter();
-    let (_, head) = rows.next().unwrap_or_default();
+    let mut rows = csv::each_record(text).map(|row| row.map_err(|(line, why)| wrong(line, why)));
+    let (_, head) = rows.next().transpose()?.unwrap_or_default();
     let column = |name: &str| {
         head.iter()
             .position(|h| h.trim().eq_ignore_ascii_case(name))
@@ -25,7 +25,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
         return Err(wrong(1, "there is no column `Name`".to_owned()));
     }
     let mut topology = Topology::default();
-    for (line, row) in rows {
+    for row in rows {
+        let (line, row) = row?;
+        if topology.entries.len() > TOPOLOGY_ENTRIES {
+            let reason = format!("more than {TOPOLOGY_ENTRIES} nodes and edges");
+            return Err(bad(path, line, reason, "leave out what is not in the bag"));
+        }
         let [name, publish, subscribe, start, end] =
             columns.map(|at| at.and_then(|at| row.get(at)).map_or("", |cell| cell.trim()));
         if name.is_empty() {
@@ -128,6 +133,20 @@ mod tests {
             (Some(10_000_000_000), Some(20_500_000_000))
         );
         assert_eq!(entries[3].place, "robot.csv line 2");
+    }
+
+    #[test]
+    fn a_table_without_end_is_refused_while_it_is_read() {
+        let rows: Vec<String> = (0..TOPOLOGY_ENTRIES + 10)
+            .map(|n| format!("n{n},,,,\n"))
+            .collect();
+        let rows = rows.concat();
+        let text = format!("Name,Publish,Subscribe,Node-start,Node-end\n{rows}");
+        let error = parse(&text).unwrap_err().to_string();
+        assert!(
+            error.contains("line 131075") && error.contains("more than 131072"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -135,7 +135,7 @@ fn node(facts: &Facts<'_>, nodes: &[NodeId]) -> NodeLine {
         optional: false,
         may_end: end.is_some_and(|end| whole.since(end) > SHUTDOWN_NS),
         restarts: facts.entries(nodes, Kind::Restarted).len(),
-        lifecycle: facts.lifecycle(nodes).map(|state| (*state).to_owned()),
+        lifecycle: facts.lifecycle(nodes).map(str::to_owned),
     }
 }
 
@@ -180,10 +180,7 @@ fn topic(seen: &[Seen<'_>]) -> TopicLine {
     let judged = |s: &Seen<'_>| s.facts.rates(s.id, may_end, s.facts.mission.span);
     let rates: Vec<Vec<Rate>> = seen.iter().map(judged).collect();
     let is_rated = rates.iter().all(|own| !own.is_empty());
-    let is_even = seen
-        .iter()
-        .zip(&rates)
-        .all(|(s, own)| s.facts.is_even(s.id, own));
+    let is_even = rates.iter().all(|own| Rate::are_even(own));
     TopicLine {
         optional: false,
         may_end,
@@ -291,6 +288,7 @@ mod tests {
                 end: Stamp(10_000_000_000),
             },
             count: *count,
+            median_s: None,
         };
         counts.iter().enumerate().map(rate).collect()
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::edit::Text;
 use super::{Draft, NodeLine, TopicLine, length, list, scalar};
 use crate::base::error::{Error, Result};
+use crate::base::nearest::nearest;
 use crate::base::yaml::BadYaml;
 use crate::gate::facts::Facts;
 use crate::gate::finding::{Finding, Kind, Severity};
@@ -31,8 +32,12 @@ pub(crate) struct Update {
 pub(crate) fn update(text: &str, path: &Path, runs: &[Mission], only: &[String]) -> Result<Update> {
     let expectation = read(text, path)?;
     let draft = Draft::of(runs);
+    for name in only {
+        known(name, &expectation, &draft)?;
+    }
     let mut work = Work {
         text: Text(text.to_owned()),
+        expectation: &expectation,
         draft: &draft,
         runs,
     };
@@ -58,6 +63,26 @@ pub(crate) fn update(text: &str, path: &Path, runs: &[Mission], only: &[String])
         changed: done.len(),
         left,
     })
+}
+
+/// Refuses a name that is neither in the file nor in the bags.
+fn known(name: &str, expectation: &Expectation, draft: &Draft) -> Result<()> {
+    let nodes = expectation.nodes.iter().map(|n| n.name.as_str());
+    let topics = expectation.topics.iter().map(|t| t.name.as_str());
+    let seen = draft.nodes.keys().chain(draft.topics.keys());
+    let all: BTreeSet<&str> = nodes
+        .chain(topics)
+        .chain(seen.map(String::as_str))
+        .collect();
+    if all.contains(name) {
+        return Ok(());
+    }
+    let near = nearest(name, all.into_iter());
+    let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
+    Err(Error::usage(
+        format!("`--only {name}` is neither in the file nor in the bag{near}"),
+        "name a node or topic as it stands there",
+    ))
 }
 
 fn unchanged(path: &Path, bad: &BadYaml) -> Error {
@@ -102,6 +127,7 @@ fn fact(kind: Kind) -> &'static str {
 /// The work under way.
 struct Work<'a> {
     text: Text,
+    expectation: &'a Expectation,
     draft: &'a Draft,
     runs: &'a [Mission],
 }
@@ -232,12 +258,30 @@ impl Work<'_> {
         for run in self.runs {
             let facts = Facts::new(run);
             for topic in facts.topics(pattern) {
-                let gaps = facts.gaps(topic, run.span);
-                longest = gaps.iter().map(|(_, nanos)| *nanos).fold(longest, i64::max);
+                let silences = facts.silences(topic, self.may_end(pattern), run.span);
+                longest = silences.iter().map(|s| s.nanos).fold(longest, i64::max);
             }
         }
-        (longest > 0).then(|| length(whole(longest)))
+        (longest > 0).then(|| length(two_digits(longest)))
     }
+
+    /// Whether the file lets a topic end.
+    fn may_end(&self, pattern: &Pattern) -> bool {
+        let mut topics = self.expectation.topics.iter();
+        topics.any(|own| own.name == *pattern && own.facts.may_end)
+    }
+}
+
+/// Rounded up to two digits.
+fn two_digits(nanos: i64) -> i64 {
+    let mut step = 1;
+    while nanos / step >= 100 {
+        step *= 10;
+    }
+    nanos
+        .div_euclid(step)
+        .saturating_add(i64::from(nanos % step > 0))
+        .saturating_mul(step)
 }
 
 /// Rounded up to a second.

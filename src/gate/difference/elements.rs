@@ -19,6 +19,11 @@ const SIGMAS: f64 = 3.0;
 pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>, rate_change: f64) -> Vec<Difference> {
     let (ours, theirs) = (nodes(a), nodes(b));
     let mut all: Vec<Difference> = presence("node", &keys(&ours), &keys(&theirs)).collect();
+    for one in &mut all {
+        // Whether the mission that lacks the node would name it.
+        let lacking = if one.side == Where::First { b } else { a };
+        one.is_known = lacking.names_nodes();
+    }
     let (sent, heard) = (topics(a), topics(b));
     all.extend(presence("topic", &keys(&sent), &keys(&heard)));
     for (name, first) in &ours {
@@ -97,7 +102,7 @@ fn node(
     if let (Some(one), Some(other)) = (&one, &other)
         && one != other
     {
-        all.push(Difference::changed("lifecycle", name, &**one, &**other));
+        all.push(Difference::changed("lifecycle", name, *one, *other));
     }
     let (one, other) = (end(a, first), end(b, second));
     if one.is_some() != other.is_some() {
@@ -205,7 +210,7 @@ fn rates(
             (
                 count as f64,
                 seconds,
-                facts.is_even(id, &rates),
+                Rate::are_even(&rates),
                 spread(&rates),
             )
         })

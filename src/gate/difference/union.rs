@@ -131,11 +131,20 @@ pub(crate) fn union(
         start: windows.first().map_or(at, |w| w.span.start),
         end: Stamp(2 * SECOND),
     };
+    let nodes = (0..)
+        .zip(&elements.nodes)
+        .map(|(id, n)| (n.name.as_str(), id));
+    let topics = (0..)
+        .zip(&elements.topics)
+        .map(|(id, t)| (t.name.as_str(), id));
     let entries = Told {
         a: &a,
         b: &b,
         elements: &elements,
         differing,
+        turned: turned(differing),
+        nodes: nodes.collect(),
+        topics: topics.collect(),
         at,
         entries: Vec::new(),
     };
@@ -163,8 +172,10 @@ pub(crate) fn union(
 fn elements(a: &Seen, b: &Seen) -> Elements {
     let nodes: BTreeMap<&String, Evidence> = both(&a.nodes, &b.nodes);
     let topics: BTreeSet<&String> = a.topics.keys().chain(b.topics.keys()).collect();
-    let place = |name: &String| u32::try_from(nodes.keys().position(|n| *n == name)?).ok();
-    let topic_place = |name: &String| u32::try_from(topics.iter().position(|t| *t == name)?).ok();
+    let node_places: BTreeMap<&String, u32> = nodes.keys().copied().zip(0..).collect();
+    let topic_places: BTreeMap<&String, u32> = topics.iter().copied().zip(0..).collect();
+    let place = |name: &String| node_places.get(name).copied();
+    let topic_place = |name: &String| topic_places.get(name).copied();
     let edge = |node: &String, topic: &String, evidence: Evidence| {
         Some(Edge {
             node: place(node)?,
@@ -288,8 +299,24 @@ struct Told<'a> {
     b: &'a Seen,
     elements: &'a Elements,
     differing: &'a [Difference],
+    turned: Turned<'a>,
+    nodes: BTreeMap<&'a str, u32>,
+    topics: BTreeMap<&'a str, u32>,
     at: Stamp,
     entries: Vec<Entry>,
+}
+
+/// What came (true) or went, by kind and name.
+type Turned<'a> = BTreeMap<(&'static str, &'a str), bool>;
+
+/// What is in one mission only, as far as the other would tell.
+fn turned(differing: &[Difference]) -> Turned<'_> {
+    let known = differing
+        .iter()
+        .filter(|d| d.is_known && d.side != Where::Both);
+    known
+        .map(|d| ((d.kind, d.name.as_str()), d.side == Where::Second))
+        .collect()
 }
 
 impl Told<'_> {
@@ -319,14 +346,8 @@ impl Told<'_> {
     }
 
     /// Whether a difference says that something came (true) or went.
-    fn turned(&self, kind: &str, name: &str) -> Option<bool> {
-        let own = |d: &&Difference| d.is_known && d.kind == kind && d.name == name;
-        let own = self.differing.iter().find(own)?;
-        match own.side {
-            Where::First => Some(false),
-            Where::Second => Some(true),
-            Where::Both => None,
-        }
+    fn turned(&self, kind: &'static str, name: &str) -> Option<bool> {
+        self.turned.get(&(kind, name)).copied()
     }
 
     /// Edges come and go with their nodes, or by themselves.
@@ -372,17 +393,8 @@ impl Told<'_> {
         if difference.side != Where::Both {
             return;
         }
-        let node = self
-            .elements
-            .nodes
-            .iter()
-            .position(|n| n.name.as_str() == difference.name);
-        let topic = self
-            .elements
-            .topics
-            .iter()
-            .position(|t| t.name.as_str() == difference.name);
-        let id = |place: usize| u32::try_from(place).unwrap_or(u32::MAX);
+        let node = self.nodes.get(difference.name.as_str()).copied();
+        let topic = self.topics.get(difference.name.as_str()).copied();
         let values = || Detail::Values {
             from: difference.first.as_str().into(),
             to: difference.second.as_str().into(),
@@ -392,17 +404,17 @@ impl Told<'_> {
                 let hz = |seen: &Seen| seen.topics.get(&difference.name).and_then(|t| t.hz);
                 if let (Some(from_hz), Some(to_hz)) = (hz(self.a), hz(self.b)) {
                     let rates = Detail::Rates { from_hz, to_hz };
-                    self.add(Kind::Rate, Element::Topic(id(topic)), rates, None);
+                    self.add(Kind::Rate, Element::Topic(topic), rates, None);
                 }
             }
             ("type", _, Some(topic)) => {
-                self.add(Kind::Type, Element::Topic(id(topic)), values(), None);
+                self.add(Kind::Type, Element::Topic(topic), values(), None);
             }
             ("qos", _, Some(topic)) => {
-                self.add(Kind::Qos, Element::Topic(id(topic)), values(), None);
+                self.add(Kind::Qos, Element::Topic(topic), values(), None);
             }
             ("lifecycle" | "end" | "restarts", Some(node), _) => {
-                self.add(Kind::Lifecycle, Element::Node(id(node)), values(), None);
+                self.add(Kind::Lifecycle, Element::Node(node), values(), None);
             }
             _ => {}
         }

@@ -1,6 +1,6 @@
 //! What is expected of nodes: to be there, to stay, to come in time, not to restart, to end in a state.
 
-use super::{Judge, absence, near};
+use super::{Judge, absence};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{Named, NodeFacts, YamlPlace};
@@ -61,6 +61,9 @@ impl Judge<'_> {
 
     pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
         let roles = self.facts.nodes(pattern);
+        if roles.is_empty() && !self.facts.names_nodes() {
+            return vec![self.unnamed(Kind::NodeForbidden, pattern.as_str(), at)];
+        }
         let found = roles.into_iter().map(|(role, nodes)| {
             let lives = self.facts.lives(nodes);
             let finding = Finding::new(
@@ -93,7 +96,7 @@ impl Judge<'_> {
             return match (facts.optional, self.facts.names_nodes()) {
                 (true, _) => Vec::new(),
                 (false, true) => vec![self.missing(pattern, at)],
-                (false, false) => vec![self.unnamed(name, at)],
+                (false, false) => vec![self.unnamed(Kind::NodeMissing, name, at)],
             };
         }
         if facts.may_end {
@@ -106,11 +109,20 @@ impl Judge<'_> {
     }
 
     /// That the bag does not tell whether a node is there.
-    fn unnamed(&self, name: &str, at: YamlPlace) -> Finding {
+    fn unnamed(&self, kind: Kind, name: &str, at: Place) -> Finding {
         let (why, hint) = if self.facts.is_rewritten() {
             (
                 "a tool merged the senders of this bag",
-                "check the bag that was recorded",
+                "check the bag as it was recorded",
+            )
+        } else if self
+            .facts
+            .roles()
+            .any(|(_, nodes)| self.facts.is_sure(nodes))
+        {
+            (
+                "the connections of this bag name no senders",
+                "check the bag as it was recorded",
             )
         } else {
             (
@@ -119,12 +131,12 @@ impl Judge<'_> {
             )
         };
         let says = format!("cannot tell whether {name} is there: {why}");
-        Finding::unknown(Kind::NodeMissing, name, at, says).hint(hint)
+        Finding::unknown(kind, name, at, says).hint(hint)
     }
 
     fn missing(&self, pattern: &Pattern, at: YamlPlace) -> Finding {
         let name = pattern.as_str();
-        let roles = self.facts.roles().map(|(role, _)| role.to_owned());
+        let roles = self.facts.roles().map(|(role, _)| role);
         let mut finding = Finding::new(
             Kind::NodeMissing,
             name,
@@ -133,7 +145,7 @@ impl Judge<'_> {
         )
         .saw("absent", "present");
         finding.cause = Some(absence(name));
-        match near(pattern, roles) {
+        match self.near(pattern, roles) {
             Some(near) => finding.hint(near),
             None => finding,
         }

@@ -3,7 +3,8 @@
 use super::Judge;
 use crate::gate::expectation::Demand;
 use crate::gate::finding::{Finding, Kind};
-use crate::gate::pattern::Pattern;
+use crate::gate::pattern::{Names, Pattern};
+use crate::graph::NodeId;
 
 impl Judge<'_> {
     /// Judges what is not named.
@@ -23,9 +24,8 @@ impl Judge<'_> {
         let known = self.named_nodes();
         let mut found = Vec::new();
         for (role, nodes) in self.facts.roles() {
-            let is_named = known
-                .iter()
-                .any(|p| nodes.iter().any(|id| self.facts.fits(p, *id)));
+            let own = |id: &NodeId| known.hold(self.facts.node(*id));
+            let is_named = known.hold(role) || nodes.iter().any(own);
             if is_named || self.facts.is_tool(nodes) || !self.facts.is_sure(nodes) {
                 continue;
             }
@@ -48,7 +48,7 @@ impl Judge<'_> {
     }
 
     /// Every name of a node that stands anywhere in the file.
-    fn named_nodes(&self) -> Vec<&Pattern> {
+    fn named_nodes(&self) -> Names<'_> {
         let mut all: Vec<&Pattern> = self.expectation.nodes.iter().map(|n| &n.name).collect();
         for topic in &self.expectation.topics {
             let lists = topic.facts.by.iter().chain(&topic.facts.to);
@@ -59,17 +59,19 @@ impl Judge<'_> {
                 all.extend(names.iter().map(|name| &name.value));
             }
         }
-        all
+        all.into_iter().collect()
     }
 
     fn strange_topics(&self) -> Vec<Finding> {
-        let known: Vec<&Pattern> = self.expectation.topics.iter().map(|t| &t.name).collect();
+        let known: Names<'_> = self.expectation.topics.iter().map(|t| &t.name).collect();
         let policy = self.expectation.policy;
         let mut found = Vec::new();
         for topic in self.facts.topics(&Pattern::new("**")) {
             let name = self.facts.topic(topic);
-            let is_named = known.iter().any(|p| p.matches(name));
-            if is_named || self.facts.is_housekeeping(topic) || self.facts.messages(topic) == 0 {
+            if known.hold(name)
+                || self.facts.is_housekeeping(topic)
+                || self.facts.messages(topic) == 0
+            {
                 continue;
             }
             let says = format!("{name} is not in {}", self.expectation.file.display());

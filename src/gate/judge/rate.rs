@@ -3,8 +3,8 @@
 use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{TopicFacts, While, YamlPlace};
-use crate::gate::facts::{Rate, SHUTDOWN_NS};
+use crate::gate::expectation::{Place, TopicFacts, While};
+use crate::gate::facts::{Rate, Silence};
 use crate::gate::finding::{Finding, Kind};
 use crate::gate::range::Range;
 use crate::graph::TopicId;
@@ -56,29 +56,38 @@ impl Judge<'_> {
         let during = facts.during.map_or(whole, |d| d.on(whole));
         let mut rates = self.facts.rates(topic, facts.may_end, during);
         if let Some(whilst) = &facts.whilst {
-            rates.retain(|rate| self.is_while(whilst, rate.window));
+            let holds = self.holds(whilst);
+            rates.retain(|rate| holds.get(rate.window) == Some(&true));
         }
         rates
     }
 
-    fn is_while(&self, whilst: &While, window: usize) -> bool {
-        let Some(window) = self.facts.mission.windows.get(window) else {
-            return false;
-        };
-        let seconds = window.span.nanos().max(1) as f64 / 1e9;
+    /// In which windows a condition holds.
+    fn holds(&self, whilst: &While) -> Vec<bool> {
+        let windows = &self.facts.mission.windows;
+        let mut holds = vec![false; windows.len()];
         match whilst {
             While::Rate(pattern, range) => {
-                self.facts.topics(pattern).iter().any(|topic| {
-                    range.holds(self.facts.count(window.index, *topic) as f64 / seconds)
-                })
+                for topic in self.facts.topics(pattern) {
+                    let counts = self.facts.counts(topic).into_iter().zip(windows);
+                    for (own, (count, window)) in holds.iter_mut().zip(counts) {
+                        let seconds = window.span.nanos().max(1) as f64 / 1e9;
+                        *own |= range.holds(count as f64 / seconds);
+                    }
+                }
             }
-            While::Node(pattern) => self.facts.nodes(pattern).iter().any(|(_, nodes)| {
-                let lives = self.facts.lives(nodes);
-                lives
-                    .iter()
-                    .any(|l| l.start <= window.span.start && window.span.end <= l.end)
-            }),
+            While::Node(pattern) => {
+                for (_, nodes) in self.facts.nodes(pattern) {
+                    let lives = self.facts.lives(nodes);
+                    for (own, window) in holds.iter_mut().zip(windows) {
+                        let span = window.span;
+                        let is_in = |l: &Span| l.start <= span.start && span.end <= l.end;
+                        *own |= lives.iter().any(is_in);
+                    }
+                }
+            }
         }
+        holds
     }
 
     /// The finding for the windows in which a rate was off.
@@ -135,26 +144,16 @@ impl Judge<'_> {
         };
         let whole = self.facts.mission.span;
         let during = facts.during.map_or(whole, |d| d.on(whole));
-        let mut gaps = self.facts.gaps(topic, during);
-        if let (Some(heard), false) = (self.facts.heard(topic), facts.may_end) {
-            let span = Span {
-                start: heard.end,
-                end: whole.end,
-            };
-            // Up to the end, where it does not end with the robot.
-            if span.nanos() > SHUTDOWN_NS && during.end == whole.end {
-                gaps.push((span, span.nanos()));
-            }
-        }
-        gaps.retain(|(_, nanos)| *nanos > most);
-        let Some((span, longest)) = gaps.iter().max_by_key(|(_, nanos)| *nanos) else {
+        let silences = self.facts.silences(topic, facts.may_end, during);
+        let longest = silences.iter().max_by_key(|silence| silence.nanos);
+        let Some(Silence { span, nanos }) = longest.filter(|s| s.nanos > most) else {
             return Vec::new();
         };
         let name = self.facts.topic(topic);
-        let (seen, expected) = (words::duration(*longest), words::duration(most));
+        let (seen, expected) = (words::duration(*nanos), words::duration(most));
         let says = format!("{name} was silent for {seen}, expected at most {expected}");
         let mut finding = Finding::new(Kind::TopicGap, name, at, says)
-            .saw(seen, format!("..{expected}"))
+            .saw(seen, format!("at most {expected}"))
             .at(*span)
             .detail(format!("within {}", self.facts.stretch(*span)));
         finding.cause = self.facts.cause_for_topic(topic, *span);

@@ -1,6 +1,6 @@
 //! What is expected of topics: to be there, of which type, from whom, to whom, and of which quality.
 
-use super::{Judge, absence, near};
+use super::{Judge, absence};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::Degree;
@@ -90,8 +90,8 @@ impl Judge<'_> {
         }
         let name = pattern.as_str();
         let topics = self.facts.mission.elements.topics.iter();
-        let names = topics.map(|t| t.name.to_string()).filter(|n| n != name);
-        let near = near(pattern, names);
+        let names = topics.map(|t| t.name.as_str()).filter(|n| *n != name);
+        let near = self.near(pattern, names);
         let says = format!("{name} is not in the bag");
         let mut finding = Finding::new(Kind::TopicMissing, name, at, says).saw("absent", "present");
         // Where its publisher is missing too, that is why.

@@ -2,16 +2,20 @@
 
 use std::fmt::Write as _;
 
-use super::{Subject, mermaid};
+use super::{Subject, grouped, mermaid};
 use crate::base::words;
 use crate::export::report::escape::{address, code, plain};
 use crate::gate::facts::Facts;
-use crate::gate::finding::{Finding, Severity};
+use crate::gate::finding::{Finding, Kind, Severity};
 use crate::gate::judge::{Judgement, Verdict};
 
-/// The most bytes of each part; together they stay below 256 KiB, a quarter of what a job's summary may hold.
-const MOST_ROWS: usize = 128 << 10;
-const MOST_UNKNOWN: usize = 32 << 10;
+/// The most bytes of each part; together with a chart they stay below 256 KiB, a quarter of what a job's summary may hold.
+const MOST_ROWS: usize = 96 << 10;
+const MOST_LISTED: usize = 24 << 10;
+/// So many findings are seen at a glance; the rest unfolds.
+const SHOWN: usize = 12;
+/// So many causes are told.
+const CAUSES: usize = 3;
 
 /// The report; ends in a new line.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
@@ -23,9 +27,8 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     };
     let broken = told(&[Severity::Error, Severity::Warning]);
     let mut out = headline(subject, verdict) + "\n\n";
-    if !broken.is_empty() {
-        table(&facts, &broken, &mut out);
-    }
+    causes(&broken, &mut out);
+    table(&facts, &broken, &mut out);
     links(subject, &mut out);
     if let Some(chart) = mermaid::chart(&facts, &broken) {
         let open = "<details><summary>Graph around the changes</summary>";
@@ -63,7 +66,7 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
         "✅"
     };
     let said = if any(Severity::Error) || any(Severity::Warning) {
-        verdict.summary()
+        verdict.broken()
     } else {
         let kept = words::count(verdict.facts(Judgement::Kept), "rule");
         match verdict.count(Severity::Unknown) {
@@ -72,26 +75,49 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
         }
     };
     format!(
-        "### {sign} Graph check: {said} · {} · {} · {} × {}",
+        "### {sign} Graph check: {said} · {} · {} in windows of {}",
         code(&subject.name()),
-        words::offset_seconds(mission.span.nanos()),
-        mission.windows.len(),
+        words::duration(mission.span.nanos()),
         words::period(mission.period.nanos())
     )
 }
 
-fn table(facts: &Facts<'_>, findings: &[&Finding], out: &mut String) {
-    out.push_str("| | what | when | seen | expected |\n|---|---|---|---|---|\n");
-    let start = out.len();
-    for (at, finding) in findings.iter().enumerate() {
-        let row = row(facts, finding);
-        if out.len() - start + row.len() > MOST_ROWS {
-            let _ = writeln!(out, "\n{} more left out.", findings.len() - at);
-            break;
-        }
-        out.push_str(&row);
+/// What several findings follow from.
+fn causes(findings: &[&Finding], out: &mut String) {
+    let groups = grouped(findings).into_iter();
+    let several = groups.filter_map(|(cause, group)| Some((cause?, group.len())));
+    let mut is_any = false;
+    for (cause, many) in several.filter(|(_, many)| *many > 1).take(CAUSES) {
+        let many = words::count(many, "finding");
+        let _ = writeln!(out, "- **{}**: {many}", plain(cause));
+        is_any = true;
     }
-    out.push('\n');
+    if is_any {
+        out.push('\n');
+    }
+}
+
+fn table(facts: &Facts<'_>, findings: &[&Finding], out: &mut String) {
+    let mut rows = findings.iter().map(|f| row(facts, f)).collect::<Vec<_>>();
+    let mut room = MOST_ROWS;
+    let fitting = rows.iter().take_while(|row| {
+        room = room.saturating_sub(row.len());
+        room > 0
+    });
+    rows.truncate(fitting.count());
+    let left_out = findings.len() - rows.len();
+    let (shown, rest) = rows.split_at(rows.len().min(SHOWN));
+    let head = "| | what | when | seen | expected |\n|---|---|---|---|---|\n";
+    if !shown.is_empty() {
+        let _ = writeln!(out, "{head}{}", shown.concat());
+    }
+    if !rest.is_empty() {
+        let open = format!("<details><summary>{} more</summary>", rest.len() + left_out);
+        let _ = writeln!(out, "{open}\n\n{head}{}\n</details>\n", rest.concat());
+    }
+    if left_out > 0 {
+        let _ = writeln!(out, "{left_out} left out.\n");
+    }
 }
 
 fn row(facts: &Facts<'_>, finding: &Finding) -> String {
@@ -100,9 +126,11 @@ fn row(facts: &Facts<'_>, finding: &Finding) -> String {
     } else {
         "⚠️"
     };
-    let when = finding
-        .when
-        .map_or_else(|| "–".to_owned(), |span| facts.stretch(span));
+    let when = match finding.when {
+        Some(span) => facts.stretch(span),
+        None if finding.kind == Kind::NodeLifecycle => "at the end".to_owned(),
+        None => "–".to_owned(),
+    };
     let cell = |text: &str| {
         if text.is_empty() {
             "–".to_owned()
@@ -157,7 +185,7 @@ fn list(findings: &[&Finding], title: &str, out: &mut String) {
             .as_ref()
             .map_or_else(String::new, |why| format!(": {}", plain(why)));
         let line = format!("- {}{why}\n", plain(&finding.says));
-        if out.len() - start + line.len() > MOST_UNKNOWN {
+        if out.len() - start + line.len() > MOST_LISTED {
             let _ = writeln!(out, "- {} more left out", findings.len() - at);
             break;
         }

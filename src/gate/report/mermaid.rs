@@ -12,6 +12,8 @@ use crate::graph::Edge;
 const MOST_EDGES: usize = 60;
 /// The most boxes that are drawn.
 const MOST_ITEMS: usize = 80;
+/// Mermaid draws no chart of more than 50,000 characters; what boxes and edges take of them.
+const MOST_BOXES: usize = 36 << 10;
 /// A name of more characters is cut.
 const LONGEST: usize = 80;
 
@@ -111,7 +113,8 @@ fn edges<'a>(
     };
     let touches = |(node, topic): &(Item<'_>, Item<'_>), edge: &Edge| {
         let own = marked.contains_key(node) || marked.contains_key(topic);
-        own && !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic)
+        let is_named = !edge.evidence.is_guess();
+        own && is_named && !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic)
     };
     for edge in &elements.publishes {
         let (node, topic) = ends(edge);
@@ -136,11 +139,16 @@ fn written(
     marked: &BTreeMap<Item<'_>, (Class, &str)>,
     edges: &[(Item<'_>, Item<'_>, bool)],
 ) -> String {
-    let place: BTreeMap<&Item<'_>, usize> = items.iter().zip(0..).collect();
+    let mut place: BTreeMap<&Item<'_>, usize> = BTreeMap::new();
     let mut out = String::from("flowchart LR\n");
-    for (item, at) in &place {
+    // What is marked before what it touches.
+    let (mut order, rest): (Vec<&Item<'_>>, Vec<&Item<'_>>) =
+        items.iter().partition(|i| marked.contains_key(i));
+    order.extend(rest);
+    for item in order {
+        let at = place.len();
         let (open, close) = if item.0 { ("[", "]") } else { ("([", "])") };
-        let mark = marked.get(*item);
+        let mark = marked.get(item);
         let name = crate::base::words::shorten(item.1, LONGEST);
         let more = mark.map_or("", |(_, label)| *label);
         let text = escaped(format!("{name} {more}").trim_end());
@@ -150,12 +158,17 @@ fn written(
             Some((Class::Changed, _)) => ":::changed",
             None => "",
         };
-        // Writing into a string does not fail.
-        let _ = writeln!(out, "  i{at}{open}\"{text}\"{close}{class}");
+        let line = format!("  i{at}{open}\"{text}\"{close}{class}\n");
+        if out.len() + line.len() > MOST_BOXES {
+            break;
+        }
+        out.push_str(&line);
+        place.insert(item, at);
     }
     for (from, to, is_missing) in edges {
         let line = if *is_missing { "-.->" } else { "-->" };
         if let (Some(from), Some(to)) = (place.get(from), place.get(to)) {
+            // Writing into a string does not fail.
             let _ = writeln!(out, "  i{from} {line} i{to}");
         }
     }

@@ -5,8 +5,12 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::{Subject, kinds};
+use crate::base::words;
 use crate::gate::finding::{Finding, KINDS, Severity};
 use crate::gate::judge::Verdict;
+
+/// GitHub shows so many results of a run, and rejects a file with more than five times as many.
+const MOST: usize = 5000;
 
 /// The report; ends in a new line. What cannot be decided is a note; what is forgiven is suppressed.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
@@ -23,7 +27,15 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
             })
         })
         .collect();
-    let results: Vec<Value> = findings.iter().map(|f| result(subject, f)).collect();
+    let told = findings.iter().take(MOST);
+    let results: Vec<Value> = told.map(|f| result(subject, f)).collect();
+    let notes: Vec<Value> = match findings.len() - results.len() {
+        0 => Vec::new(),
+        rest => {
+            let text = format!("{} left out", words::count(rest, "more finding"));
+            vec![json!({"level": "note", "message": {"text": text}})]
+        }
+    };
     let report = json!({
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
         "version": "2.1.0",
@@ -33,6 +45,10 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
                 "version": env!("CARGO_PKG_VERSION"),
                 "rules": rules,
             }},
+            "invocations": [{
+                "executionSuccessful": true,
+                "toolExecutionNotifications": notes,
+            }],
             "results": results,
         }],
     });

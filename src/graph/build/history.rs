@@ -236,8 +236,10 @@ impl Assembly<'_> {
             runs: spans(track),
             unknown_publishers,
         });
-        let sending = traffic.map(|of| of.sending.clone());
-        all.sending.topics.push(sending.unwrap_or_default());
+        let sending = traffic.map(|of| (of.sending.clone(), of.pauses.clone()));
+        let (sending, pauses) = sending.unwrap_or_default();
+        all.sending.topics.push(sending);
+        all.sending.pauses.push(pauses);
         all.lives.topics.push(known(track, self.findings.mission));
         all.topics.push(ElementHistory::new(track, silent));
     }

@@ -10,7 +10,7 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{Reliability, Stream};
 use crate::graph::lives::Stretch;
-use crate::graph::sending::{SendingRuns, shortest_silence};
+use crate::graph::sending::{Pauses, Runs, shortest_silence};
 
 /// What happened on each topic.
 pub(crate) type Traffic = BTreeMap<Name, Senders>;
@@ -28,6 +28,8 @@ pub(crate) struct Senders {
     pub(crate) of: Vec<usize>,
     /// When anybody sent.
     pub(crate) sending: Vec<Span>,
+    /// The longest times in which nobody did.
+    pub(crate) pauses: Vec<Span>,
 }
 
 /// What one sender sent on one topic, over all its streams: a split recording has one per part.
@@ -65,7 +67,7 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
     let least = shortest_silence(recorded.span.map_or(0, |span| span.nanos()));
     let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
     let (of, mut heard) = places(&of_topic);
-    let mut all = SendingRuns::default();
+    let (mut all, mut pauses) = (Runs::default(), Pauses::default());
     recorded.messages.merge(&ids, |timed| {
         if !recorded.believes(timed.time) {
             return;
@@ -73,6 +75,7 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
         let trace = &mut traces[timed.series];
         *trace = Some((trace.map_or(timed.time, |t| t.0), timed.time));
         all.hear(timed.time, least);
+        pauses.hear(timed.time);
         heard[of[timed.series]].hear(timed.time, least);
     })?;
     Ok(Senders {
@@ -81,6 +84,7 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
         list: heard.into_iter().map(SenderTimes::into_sender).collect(),
         of,
         sending: all.stretches(),
+        pauses: pauses.spans(),
     })
 }
 

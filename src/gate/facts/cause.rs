@@ -1,0 +1,46 @@
+//! Why something is as it is, as far as the ledger tells.
+
+use std::collections::BTreeSet;
+
+use super::Facts;
+use crate::base::time::Span;
+use crate::gate::finding::Cause;
+use crate::graph::{Element, NodeId, TopicId};
+use crate::mission::ledger::Kind;
+
+impl Facts<'_> {
+    /// What the ledger tells about why a topic changed around a time: its publishers, and those who feed them.
+    pub(crate) fn cause_for_topic(&self, topic: TopicId, around: Span) -> Option<Cause> {
+        let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.0).collect();
+        let fed: BTreeSet<TopicId> = {
+            let edges = self.mission.elements.subscribes.iter();
+            let own = edges.filter(|e| direct.contains(&e.node) && e.topic != topic);
+            own.map(|e| e.topic).collect()
+        };
+        let feeders: BTreeSet<NodeId> = fed
+            .iter()
+            .flat_map(|topic| self.publishers(*topic))
+            .map(|p| p.0)
+            .filter(|node| !direct.contains(node))
+            .collect();
+        self.cause(&direct, around)
+            .or_else(|| self.cause(&feeders, around))
+    }
+
+    /// The first thing that the ledger tells of one of these nodes in a stretch of time.
+    pub(crate) fn cause(&self, nodes: &BTreeSet<NodeId>, around: Span) -> Option<Cause> {
+        let wanted = [Kind::Stopped, Kind::Restarted, Kind::Silent];
+        let entries = self.mission.ledger.inside(around).map(|(_, entry)| entry);
+        let mut entries = entries.filter(|e| wanted.contains(&e.kind));
+        let entry = entries.find(|e| matches!(e.what, Element::Node(id) if nodes.contains(&id)))?;
+        self.mission.elements.ends(entry.what).0.map(|node| Cause {
+            time: Some(entry.time),
+            text: format!(
+                "{} {} at {}",
+                self.role(node),
+                entry.kind.word(),
+                self.clock(entry.time)
+            ),
+        })
+    }
+}

@@ -1,0 +1,213 @@
+//! How often topics come, window by window, and for how long they are silent.
+
+use super::{Facts, SHUTDOWN_NS};
+use crate::base::time::{Span, Stamp};
+use crate::graph::{Element, Row, TopicId};
+use crate::mission::Window;
+
+/// A recorder has found the topics that are there when it starts after so long.
+const FOUND_NS: i64 = 2_500_000_000;
+
+/// How often a topic was sent in a window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rate {
+    /// The window's place.
+    pub(crate) window: usize,
+    /// The part of it that counts.
+    pub(crate) span: Span,
+    pub(crate) count: u64,
+    /// The median time between its messages in seconds.
+    pub(crate) median_s: Option<f64>,
+}
+
+impl Rate {
+    fn seconds(&self) -> f64 {
+        self.span.nanos().max(1) as f64 / 1e9
+    }
+
+    /// Messages per second.
+    pub(crate) fn hz(&self) -> f64 {
+        self.count as f64 / self.seconds()
+    }
+
+    /// The same with a message more, which may have come a moment too late for this window.
+    pub(crate) fn at_most(&self) -> f64 {
+        (self.count + 1) as f64 / self.seconds()
+    }
+
+    /// The same with a message less.
+    pub(crate) fn at_least(&self) -> f64 {
+        self.count.saturating_sub(1) as f64 / self.seconds()
+    }
+
+    /// Whether messages come at even times, by the median in each of these windows.
+    pub(crate) fn are_even(rates: &[Self]) -> bool {
+        let share = |rate: &Self| Some(rate.median_s? * rate.hz());
+        let mut shares = rates.iter().filter_map(share).peekable();
+        shares.peek().is_some() && shares.all(|share| (0.8..=1.25).contains(&share))
+    }
+}
+
+impl<'a> Facts<'a> {
+    /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
+    pub(crate) fn heard(&self, topic: TopicId) -> Option<Span> {
+        let sending = &self.mission.activity.sending.topics;
+        if let Some(stretches) = sending.get(topic as usize)
+            && let (Some(first), Some(last)) = (stretches.first(), stretches.last())
+        {
+            return Some(Span {
+                start: first.start,
+                end: last.end,
+            });
+        }
+        let mut rows = self.rows(topic).filter(|(_, row)| count(row) > 0);
+        let first = rows.next()?.0.span;
+        let last = rows.last().map_or(first, |(window, _)| window.span);
+        Some(Span {
+            start: first.start,
+            end: last.end,
+        })
+    }
+
+    /// The windows in which a topic is, each with what it does there.
+    fn rows(&self, topic: TopicId) -> impl Iterator<Item = (&'a Window, Row)> + use<'a> {
+        let windows = &self.mission.windows;
+        let rows = self.mission.graphs.rows(Element::Topic(topic));
+        rows.filter_map(|(at, row)| Some((windows.get(at)?, row)))
+    }
+
+    /// Messages of a topic in each window.
+    pub(crate) fn counts(&self, topic: TopicId) -> Vec<u64> {
+        let mut all = vec![0; self.mission.windows.len()];
+        for (at, row) in self.mission.graphs.rows(Element::Topic(topic)) {
+            if let Some(own) = all.get_mut(at) {
+                *own = count(&row);
+            }
+        }
+        all
+    }
+
+    /// The rates by which a topic is judged: of every whole window from its first message to the mission's end, or to
+    /// its last message if it `may_end`.
+    pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
+        let Some(heard) = self.heard(topic) else {
+            return Vec::new();
+        };
+        let mut rows = self.rows(topic).peekable();
+        let (mut all, mut first) = (Vec::new(), None);
+        for window in &self.mission.windows {
+            let row = rows.next_if(|(own, _)| own.index == window.index);
+            let inside = during.start <= window.span.start && window.span.end <= during.end;
+            if window.partial || !inside {
+                continue;
+            }
+            let rate = |span| Rate {
+                window: window.index,
+                span,
+                count: row.as_ref().map_or(0, |(_, row)| count(row)),
+                median_s: row.as_ref().and_then(|(_, row)| row.median.value()),
+            };
+            if let Some(span) = self.counted(window.span, heard, may_end) {
+                all.push(rate(span));
+            } else if first.is_none() && heard.end >= window.span.end {
+                first = begun(window.span, heard.start).map(rate);
+            }
+        }
+        // A topic that lives for little more than a window seldom fills one: better a part than nothing.
+        if all.is_empty() {
+            first.into_iter().collect()
+        } else {
+            all
+        }
+    }
+
+    /// The part of a window in which a topic that was heard from one time to another counts; `None` if it is too short.
+    fn counted(&self, window: Span, heard: Span, may_end: bool) -> Option<Span> {
+        let whole = self.mission.span;
+        let mut span = window;
+        if heard.start > span.start {
+            // What is there when the recorder starts is heard a moment later; all else is not whole.
+            let found = span.start == whole.start && heard.start.since(whole.start) <= FOUND_NS;
+            span.start = found.then_some(heard.start)?;
+        }
+        if heard.end < span.end {
+            let is_over = whole.end.since(heard.end) <= SHUTDOWN_NS;
+            match (is_over, may_end) {
+                (true, _) => span.end = heard.end,
+                (false, true) => return None,
+                (false, false) => {}
+            }
+        }
+        (span.nanos() >= window.nanos() / 2).then_some(span)
+    }
+
+    /// The longest silences of a topic inside `during`: those of the whole mission, to the nanosecond where the times of
+    /// messages are known; the longest of each window; and, unless it `may_end`, from its last message to the mission's
+    /// end.
+    pub(crate) fn silences(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Silence> {
+        let mut all = Vec::new();
+        for (window, row) in self.rows(topic) {
+            let inside = during.start <= window.span.start && window.span.end <= during.end;
+            if let (true, Some(gap)) = (inside, row.gap.value()) {
+                all.push(Silence {
+                    span: window.span,
+                    nanos: nanos(gap),
+                });
+            }
+        }
+        let pauses = self.mission.activity.sending.pauses.get(topic as usize);
+        let pauses = pauses.into_iter().flatten();
+        all.extend(pauses.filter_map(|gap| clipped(*gap, during)));
+        let whole = self.mission.span;
+        if let (Some(heard), false) = (self.heard(topic), may_end) {
+            let span = Span {
+                start: heard.end.plus(-1),
+                end: whole.end,
+            };
+            // Where it does not end with the robot.
+            if span.nanos() > SHUTDOWN_NS {
+                all.extend(clipped(span, during));
+            }
+        }
+        all
+    }
+}
+
+/// The part of a window from a topic's first message on; `None` if that is less than half of it.
+fn begun(window: Span, first: Stamp) -> Option<Span> {
+    let span = Span {
+        start: first.max(window.start),
+        end: window.end,
+    };
+    (span.nanos() >= window.nanos() / 2).then_some(span)
+}
+
+/// A time without messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Silence {
+    /// When it was, or the window that it is in.
+    pub(crate) span: Span,
+    /// How long it lasted.
+    pub(crate) nanos: i64,
+}
+
+/// The part of a silence that lies in a stretch of time.
+fn clipped(gap: Span, during: Span) -> Option<Silence> {
+    let span = Span {
+        start: gap.start.max(during.start),
+        end: gap.end.min(during.end),
+    };
+    let nanos = span.end.since(span.start);
+    (nanos > 0).then_some(Silence { span, nanos })
+}
+
+fn count(row: &Row) -> u64 {
+    row.count.unwrap_or(0)
+}
+
+/// Seconds in nanoseconds, held within an `i64`.
+fn nanos(seconds: f64) -> i64 {
+    #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
+    let nanos = libm::round(seconds * 1e9) as i64;
+    nanos
+}
