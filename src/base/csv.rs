@@ -177,14 +177,14 @@ pub(crate) type CsvRow = (usize, Vec<String>);
 ///
 /// # Errors
 /// The line, and what is wrong there.
-pub(crate) fn records(text: &str) -> Result<Vec<Record>, (usize, String)> {
+pub(crate) fn records(text: &str) -> Result<Vec<CsvRow>, (usize, String)> {
     each_record(text).collect()
 }
 
 /// The same, record by record.
 pub(crate) fn each_record(
     text: &str,
-) -> impl Iterator<Item = Result<Record, (usize, String)>> + use<'_> {
+) -> impl Iterator<Item = Result<CsvRow, (usize, String)>> + use<'_> {
     let reader = ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)

@@ -10,7 +10,7 @@ mod topic;
 
 use std::cell::Cell;
 
-use super::expectation::{Closed, Expectation, Place};
+use super::expectation::{Closed, Expectation, YamlPlace};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, Severity, number};
 use super::pattern::Pattern;

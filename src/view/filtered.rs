@@ -177,6 +177,7 @@ impl Keep {
             sending: Sending {
                 publishes: kept(&all.sending.publishes, &self.publishes),
                 topics: kept(&all.sending.topics, &self.topics),
+                pauses: kept(&all.sending.pauses, &self.topics),
             },
         }
     }

@@ -92,7 +92,7 @@ pub(super) fn conclude(
     let disputed: BTreeSet<&str> = judged
         .iter()
         .filter(|(role, reason, _)| {
-            *role == Role::Publishes && *reason == Some(Reason::SeveralPlaces)
+            *role == Role::Publishes && *reason == Some(NotDrawn::SeveralPlaces)
         })
         .flat_map(|(.., candidates)| candidates.iter().map(|c| c.node.as_str()))
         .collect();
@@ -103,7 +103,7 @@ pub(super) fn conclude(
             .find(|c| is_launched_by(c.found.instance, &launches))
             .unwrap_or(&candidates[0]);
         let is_disputed = reason.is_none() && disputed.contains(best.node.as_str());
-        match reason.or(is_disputed.then_some(Reason::Disputed)) {
+        match reason.or(is_disputed.then_some(NotDrawn::Disputed)) {
             None if code.infers => {
                 draw(code, known, best);
                 edges += 1;

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::{Element, Entry, Topology, bad, place, resolved};
+use super::{NamedElement, Topology, TopologyEntry, bad, place, resolved};
 use crate::base::budget::TOPOLOGY_ENTRIES;
 use crate::base::csv;
 use crate::base::error::Result;

@@ -109,7 +109,7 @@ impl Judge<'_> {
     }
 
     /// That the bag does not tell whether a node is there.
-    fn unnamed(&self, kind: Kind, name: &str, at: Place) -> Finding {
+    fn unnamed(&self, kind: Kind, name: &str, at: YamlPlace) -> Finding {
         let (why, hint) = if self.facts.is_rewritten() {
             (
                 "a tool merged the senders of this bag",

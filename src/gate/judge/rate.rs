@@ -3,7 +3,7 @@
 use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{Place, TopicFacts, While};
+use crate::gate::expectation::{TopicFacts, While, YamlPlace};
 use crate::gate::facts::{Rate, Silence};
 use crate::gate::finding::{Finding, Kind};
 use crate::gate::range::Range;

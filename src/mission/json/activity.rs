@@ -6,7 +6,8 @@
 //! ```
 //!
 //! `bounds_ns` are the starts of the cells and the end of the last. `sending` are the stretches of sending, first
-//! message to last plus 1 ns; it is there where messages were heard one by one. `in` is what an element says in the
+//! message to last plus 1 ns, and `pauses` the longest
+//! pauses, from message to message; they are there where messages were heard one by one. `in` is what an element says in the
 //! cells, in the columns of the form `runs`: its `windows` are cells.
 
 use serde::Serialize;
@@ -53,6 +54,8 @@ struct ElementSending<'a> {
     name: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     sending: Option<RunRows<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pauses: Option<RunRows<'a>>,
 }
 
 #[derive(Serialize)]
@@ -90,16 +93,19 @@ impl Serialize for ActivityOf<'_> {
             let named = ElementSending {
                 name: node.name.as_str(),
                 sending: None,
+                pauses: None,
             };
             self.seen(Element::Node(id), named)
         });
         map.serialize_entry("nodes", &List(nodes))?;
         let topics = (0..).zip(&elements.topics).map(|(id, topic)| {
             let spans = sending.topics.get(id as usize);
-            let sending = spans.map(|spans| RunRows(spans));
+            let pauses = sending.pauses.get(id as usize);
+            let told = spans.map(|spans| RunRows(spans));
             let named = ElementSending {
                 name: topic.name.as_str(),
-                sending,
+                sending: told,
+                pauses: pauses.map(|spans| RunRows(spans)),
             };
             self.seen(Element::Topic(id), named)
         });
@@ -166,8 +172,9 @@ fn sending(raw: &RawElements, ids: &Ids) -> Result<Sending, String> {
         .iter()
         .map(|e| (ids.of_publish(&e.element), &e.element.rest));
     Ok(Sending {
-        topics: stretches(topics, ids.topics())?,
-        publishes: stretches(publishes, ids.publishes())?,
+        topics: stretches(topics.clone(), ids.topics(), RawState::sending)?,
+        pauses: stretches(topics, ids.topics(), RawState::pauses)?,
+        publishes: stretches(publishes, ids.publishes(), RawState::sending)?,
     })
 }
 
@@ -175,8 +182,9 @@ fn sending(raw: &RawElements, ids: &Ids) -> Result<Sending, String> {
 fn stretches<'a>(
     raw: impl Iterator<Item = (u32, &'a RawState)>,
     many: usize,
+    spans: impl Fn(&RawState) -> Option<Vec<Span>>,
 ) -> Result<Vec<Vec<Span>>, String> {
-    let told = raw.filter_map(|(id, state)| Some((id, state.sending()?)));
+    let told = raw.filter_map(|(id, state)| Some((id, spans(state)?)));
     let mut all = Vec::new();
     for (id, spans) in told {
         let disjoint = |pair: &[Span]| pair[0].end <= pair[1].start;

@@ -125,6 +125,7 @@ pub(crate) struct RawState {
     #[serde(default)]
     pub(crate) runs: Vec<[i64; 2]>,
     pub(crate) sending: Option<Vec<[i64; 2]>>,
+    pub(crate) pauses: Option<Vec<[i64; 2]>>,
     pub(crate) count: Option<u64>,
     pub(crate) hz: Option<f64>,
 }
@@ -185,6 +186,10 @@ impl RawState {
 
     pub(crate) fn sending(&self) -> Option<Vec<Span>> {
         self.sending.as_deref().map(spans)
+    }
+
+    pub(crate) fn pauses(&self) -> Option<Vec<Span>> {
+        self.pauses.as_deref().map(spans)
     }
 
     pub(crate) fn edge(&self, id: u32) -> EdgeState {
