@@ -27,7 +27,8 @@ pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{head, place};
 pub use model::{
-    Connection, ConnectionId, Encoding, Message, OpenOptions, Reader, Report, Sink, Tier, Want,
+    Connection, ConnectionId, Encoding, Lumps, Message, OpenOptions, Reader, Report, Sink, Tier,
+    Want,
 };
 use unknown::explain;
 
@@ -82,7 +83,7 @@ pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     }
     let path = match input {
         Input::Path(path) => path.clone(),
-        Input::Stdin => PathBuf::from(input.name()),
+        Input::Url(_) | Input::Stdin => PathBuf::from(input.name()),
     };
     let folder = matches!(place, BagPlace::Folder(_));
     Err(explain(&path, &head, folder))

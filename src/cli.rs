@@ -6,6 +6,8 @@ mod extract;
 mod gate;
 mod look;
 mod stop;
+#[cfg(feature = "parquet")]
+mod tables;
 pub(crate) mod terminal;
 
 use std::ffi::{OsStr, OsString};
@@ -78,6 +80,8 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Render(args) => render(&args, &given, &mut terminal),
         Command::Info(args) => info(&args, &given, &mut terminal),
         Command::Extract(args) => extract(&args, &mut terminal),
+        #[cfg(feature = "parquet")]
+        Command::Tables(args) => tables::tables(&args, &mut terminal),
         Command::Events(args) => log(&args, &given, &mut terminal),
         Command::Diff(args) => {
             failed = USAGE;
@@ -209,11 +213,7 @@ fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
 }
 
 fn input(path: &Path) -> Input {
-    if path == Path::new("-") {
-        Input::Stdin
-    } else {
-        Input::Path(path.to_owned())
-    }
+    Input::parse(path)
 }
 
 /// The exit code of a mission that was read.
@@ -301,7 +301,7 @@ fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
         .iter()
         .map(|w| w.path.display().to_string())
         .collect();
-    let changes: usize = mission.windows.iter().map(|w| w.changes.len()).sum();
+    let changes = mission.ledger.headlines(mission.span).count();
     let seconds = terminal.seconds();
     terminal.say(&format!(
         "wrote {}: {}, {}, in {seconds:.1} s",

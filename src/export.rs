@@ -14,7 +14,7 @@ pub(crate) mod mermaid;
 pub mod options;
 pub(crate) mod palette;
 #[cfg(feature = "parquet")]
-mod parquet;
+pub(crate) mod parquet;
 #[cfg(feature = "pdf")]
 mod pdf;
 mod png;
@@ -125,12 +125,14 @@ pub const FORMATS: &[OutputFormat] = &[
         word: "html",
         what: "one page that plays the mission, with everything in it",
         start: html::encoder::start,
+        is_unfolded: true,
         ..PICTURE
     },
     OutputFormat {
         word: "md",
         what: "a report for a pull request or a job summary",
         start: report::encoder::start,
+        is_unfolded: true,
         ..PICTURE
     },
     OutputFormat {

@@ -28,7 +28,9 @@ pub mod mission {
 
 /// See `src/view.rs`.
 pub mod view {
-    pub use crate::view::{Counts, Frame, Headline, Mark, Shown, View, ViewOptions, view};
+    pub use crate::view::{
+        Counts, Frame, Headline, Mark, SeenWindow, Showing, Shown, View, ViewOptions, view,
+    };
 }
 
 /// See `src/layout.rs`.

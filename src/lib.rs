@@ -23,6 +23,8 @@
 //! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
+//! What happened in the mission, whatever its windows, is its [`Ledger`]; `examples/story.rs` prints it.
+//!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
 //!
 //! | station | takes | gives |
@@ -95,7 +97,7 @@ pub use draw::style::Style;
 pub use export::Output;
 pub use graph::Graph;
 pub use graph::diff::Change;
-pub use mission::{Ledger, Mission, Window};
+pub use mission::{Ledger, Mission, Window, write_json};
 pub use pipeline::{Reading, Render, Rendered};
 
 pub mod values {
@@ -107,7 +109,7 @@ pub mod values {
     pub use crate::base::time::{Period, Span, Stamp};
     pub use crate::evidence::conclude;
     pub use crate::evidence::{Degree, Evidence};
-    pub use crate::graph::window::{Cut, Division, Length};
+    pub use crate::graph::window::{Align, Cut, Division, Length};
     pub use crate::graph::{
         Edge, EdgeId, EdgeState, Element, Elements, Graphs, GraphsIter, Node, NodeId, NodeState,
         State, Topic, TopicId, TopicState,
@@ -116,6 +118,8 @@ pub mod values {
     pub use crate::pipeline::{Drawing, Phases, Stage, Unwatched, Watch};
     pub use crate::view::{Grouping, Hide, Mode, ViewOptions};
 }
+
+pub use pipeline::fleet;
 
 pub mod commands {
     //! What the commands beside `render` do: the summary, the log, the table of messages, the survey of a folder.

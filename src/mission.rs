@@ -7,6 +7,8 @@ pub mod ledger;
 pub mod phases;
 
 mod json;
+pub(crate) use json::raw;
+pub(crate) use json::read::mission_of;
 pub use json::read::read_json;
 pub(crate) use json::write::Json;
 pub use json::write::{JsonForm, write_json};

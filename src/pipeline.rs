@@ -5,11 +5,13 @@ mod draw;
 mod export;
 mod extract;
 mod figure;
+pub mod fleet;
 pub(crate) mod gate;
 mod phases;
 mod purpose;
 mod read;
 mod survey;
+mod unfolded;
 mod verify;
 
 pub(crate) use draw::Body;

@@ -20,6 +20,7 @@ mod roles;
 pub(crate) mod runs;
 mod select;
 mod settle;
+pub(crate) mod showing;
 mod state;
 pub(crate) mod union;
 
@@ -37,22 +38,24 @@ pub(crate) use filter::NameFilter;
 pub(crate) use filtered::filtered;
 pub(crate) use nothing::nothing;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
+pub use showing::Showing;
 
 /// What the picture shows of a mission, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let viewed = items::Viewed::new(&mission.elements, options);
     let notices = hidden::notes(&mission.elements, &viewed, options);
     let frames = frames::frames(mission, options, &viewed);
-    (stage(viewed, options, frames), notices)
+    (staged(viewed, options, frames), notices)
 }
 
 /// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
 pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     let viewed = items::Viewed::new(&mission.elements, options);
-    stage(viewed, options, Vec::new())
+    staged(viewed, options, frames::Frames::default())
 }
 
-fn stage(viewed: items::Viewed, options: &ViewOptions, mut frames: Vec<Frame>) -> View {
+fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
+    let (mut list, shown) = (frames.list, (frames.items, frames.arrows));
     let mut items = viewed.items;
     let mut namespaces = cluster::clusters(&mut items, options.group.namespaces);
     let mut drawn = Vec::new();
@@ -63,7 +66,7 @@ fn stage(viewed: items::Viewed, options: &ViewOptions, mut frames: Vec<Frame>) -
             drawn.push(at);
         }
     }
-    for frame in &mut frames {
+    for frame in &mut list {
         let roll = |at: &usize| frame.rolls.get(*at).cloned().unwrap_or_default();
         frame.rolls = drawn.iter().map(roll).collect();
     }
@@ -71,7 +74,9 @@ fn stage(viewed: items::Viewed, options: &ViewOptions, mut frames: Vec<Frame>) -
         items,
         arrows: viewed.arrows,
         namespaces,
-        frames,
+        frames: list,
+        items_shown: shown.0,
+        arrows_shown: shown.1,
     }
 }
 
@@ -340,7 +345,16 @@ impl Headline {
     }
 }
 
-/// One window of the picture.
+/// The items and arrows of a window, ghosts included, each list sorted by id.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SeenWindow {
+    /// Items.
+    pub items: Vec<Shown>,
+    /// Arrows.
+    pub arrows: Vec<Shown>,
+}
+
+/// One window of the picture; what is seen in it is in [`View::seen`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// The window's index, 0...
@@ -351,10 +365,6 @@ pub struct Frame {
     pub partial: bool,
     /// All messages of the bag in the window, hidden topics included.
     pub messages: u64,
-    /// Items in the window, ghosts included, sorted by id.
-    pub items: Vec<Shown>,
-    /// Arrows in the window, ghosts included, sorted by id.
-    pub arrows: Vec<Shown>,
     /// For each namespace that stands for several, in the order of [`View::namespaces`], which of them are there.
     pub rolls: Vec<Vec<Attendance>>,
     /// What happened in it, in the order of the ledger. Chips, caption, marks and timeline all tell this.
@@ -373,8 +383,6 @@ impl Frame {
             span,
             partial: false,
             messages: 0,
-            items: Vec::new(),
-            arrows: Vec::new(),
             rolls: Vec::new(),
             headlines: Vec::new(),
             counts: Counts::default(),
@@ -412,9 +420,24 @@ pub struct View {
     pub namespaces: Vec<Namespace>,
     /// The windows.
     pub frames: Vec<Frame>,
+    /// What is shown of each item, window by window.
+    pub items_shown: Vec<Showing>,
+    /// What is shown of each arrow.
+    pub arrows_shown: Vec<Showing>,
 }
 
 impl View {
+    /// Where window `k` begins, as a part of the time from the first window's start to the last's end, 0..=1; 1 after
+    /// the last.
+    pub(crate) fn place_in_time(&self, k: usize) -> f64 {
+        let (Some(first), Some(last)) = (self.frames.first(), self.frames.last()) else {
+            return 0.0;
+        };
+        let whole = last.span.end.since(first.span.start).max(1) as f64;
+        let at = self.frames.get(k).map_or(last.span.end, |f| f.span.start);
+        at.since(first.span.start) as f64 / whole
+    }
+
     /// Whether window `k` shows a change.
     pub fn is_changed(&self, k: usize) -> bool {
         self.frames
@@ -422,17 +445,81 @@ impl View {
             .is_some_and(|frame| !frame.headlines.is_empty())
     }
 
+    /// What is seen in the window at place `k`; nothing past the last one.
+    pub fn seen(&self, k: usize) -> SeenWindow {
+        let of = |all: &[Showing]| {
+            let there = all.iter().filter_map(|one| one.at(k));
+            there.cloned().collect()
+        };
+        SeenWindow {
+            items: of(&self.items_shown),
+            arrows: of(&self.arrows_shown),
+        }
+    }
+
+    /// The same windows, in which this is seen.
+    #[must_use]
+    pub fn showing(self, seen: &[SeenWindow]) -> Self {
+        let shown = |count: usize, list: fn(&SeenWindow) -> &[Shown]| {
+            let find =
+                |all: &'_ SeenWindow, id: usize| list(all).iter().position(|s| s.id as usize == id);
+            let one = |id| {
+                Showing::of(
+                    seen.iter()
+                        .map(|all| find(all, id).map(|at| &list(all)[at])),
+                )
+            };
+            (0..count).map(one).collect()
+        };
+        Self {
+            items_shown: shown(self.items.len(), |s| &s.items),
+            arrows_shown: shown(self.arrows.len(), |s| &s.arrows),
+            ..self
+        }
+    }
+
+    /// Everything that is ever shown of any item or arrow, in no order.
+    pub fn looks(&self) -> impl Iterator<Item = &Shown> {
+        let all = self.items_shown.iter().chain(&self.arrows_shown);
+        all.flat_map(Showing::looks)
+    }
+
+    /// The place of the window with most headlines, the first of several; [`View::busiest`] where there are none.
+    pub(crate) fn busiest_change(&self) -> usize {
+        let mut best = (self.busiest(), 0);
+        for (at, frame) in self.frames.iter().enumerate() {
+            if frame.headlines.len() > best.1 {
+                best = (at, frame.headlines.len());
+            }
+        }
+        best.0
+    }
+
+    /// Whether something of it stands for several that could be drawn one by one: a namespace, a fleet, a bundle.
+    pub(crate) fn is_folded(&self) -> bool {
+        let is_one = |i: &Item| i.kind == ItemKind::Namespace || i.is_replica;
+        let is_bundle = |a: &Arrow| a.kind == ArrowKind::Bundle;
+        self.items.iter().any(is_one) || self.arrows.iter().any(is_bundle)
+    }
+
     /// The place of the window that shows most; the first of several.
     pub fn busiest(&self) -> usize {
-        let is_there = |s: &&Shown| s.mark != Some(Mark::Removed);
-        let mut best = (0, 0);
-        for (at, frame) in self.frames.iter().enumerate() {
-            let there = frame
-                .items
-                .iter()
-                .chain(&frame.arrows)
-                .filter(is_there)
-                .count();
+        let is_there = |s: &Shown| s.mark != Some(Mark::Removed);
+        // By how many more are there than in the window before.
+        let mut more = vec![0_i64; self.frames.len()];
+        for showing in self.items_shown.iter().chain(&self.arrows_shown) {
+            let mut was = false;
+            for (window, shown) in showing.runs() {
+                let is = shown.is_some_and(is_there);
+                if let Some(more) = more.get_mut(window as usize) {
+                    *more += i64::from(is) - i64::from(was);
+                }
+                was = is;
+            }
+        }
+        let (mut best, mut there) = ((0, 0), 0);
+        for (at, more) in more.into_iter().enumerate() {
+            there += more;
             if there > best.1 {
                 best = (at, there);
             }

@@ -41,7 +41,9 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("graph", &[&["graphs", "lives", "sending"], &["build", "diff", "window"]]),
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
-        &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "settle", "union"],
+        &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "showing"],
+        &["settle"],
+        &["union"],
         &["options"],
         &["group", "select"],
         &["items"],
@@ -68,12 +70,12 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ]),
     ("pipeline", &[
         &["collect", "draw", "phases", "purpose"],
-        &["figure", "verify"],
+        &["figure", "unfolded", "verify"],
         &["read"],
         &["export", "extract", "survey"],
-        &["gate"],
+        &["fleet", "gate"],
     ]),
-    ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract", "gate"]]),
+    ("cli", &[&["args", "stop"], &["applies", "look", "terminal"], &["extract", "gate", "tables"]]),
 ];
 
 /// Folders whose files do not know each other: kinds of evidence, engines' steps are listed in their parent instead.
@@ -108,6 +110,8 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
             "export/tables",
         ],
     ),
+    // Names are filtered as in `rqt_graph`; missions are named by a part of a path.
+    ("regex", &["pipeline/fleet/plan", "view/filter"]),
     // Times are read and spelled.
     ("jiff", &["base"]),
     // Plain functions on numbers, as the standard library's would be.

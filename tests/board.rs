@@ -72,7 +72,7 @@ fn a_mission_without_known_publishers_is_a_board_of_topics() {
     assert!(frames[0].contains("5 Hz"));
     assert!(text(&folder, "all.svg").contains("attributeName=\"x\" calcMode=\"discrete\""));
     let page = text(&folder, "all.html");
-    assert!(page.contains("id=\"head\" data-x=") && page.contains(">amcl_pose</text>"));
+    assert!(page.contains("id=\"boardhead\" data-x=") && page.contains(">amcl_pose</text>"));
 }
 
 #[test]

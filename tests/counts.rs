@@ -1,7 +1,7 @@
 //! Every frame counted by script against the data, as it lies in the files: chips, marks and timeline of SVG frames,
 //! the page, the report, and what a GIF is drawn from.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -50,7 +50,8 @@ fn groups<'a>(svg: &'a str, class: &'a str) -> impl Iterator<Item = Vec<u64>> + 
     })
 }
 
-fn rendered(bag: &str, period: &str, folder: &Path) {
+/// Renders an example; answers what the terminal says.
+fn rendered(bag: &str, period: &str, folder: &Path) -> String {
     let input = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
         .join(bag);
@@ -58,8 +59,8 @@ fn rendered(bag: &str, period: &str, folder: &Path) {
     command
         .arg("render")
         .arg(input)
-        .args(["-q", "--view", "graph", "--period", period]);
-    for name in ["x.json", "x{n}.svg", "x.html", "x.md"] {
+        .args(["--view", "graph", "--period", period]);
+    for name in ["x.json", "x{n}.svg", "x{n}.mmd", "x.html", "x.md"] {
         command.arg("-o").arg(folder.join(name));
     }
     let done = command.output().unwrap();
@@ -68,6 +69,7 @@ fn rendered(bag: &str, period: &str, folder: &Path) {
         "{}",
         String::from_utf8_lossy(&done.stderr)
     );
+    String::from_utf8(done.stderr).unwrap()
 }
 
 #[test]
@@ -80,7 +82,7 @@ fn every_frame_counts_what_the_data_says() {
     ];
     for (bag, period) in all {
         let folder = tempfile::tempdir().unwrap();
-        rendered(bag, period, folder.path());
+        let said = rendered(bag, period, folder.path());
         let text = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
         let mission: Value = serde_json::from_str(&text("x.json")).unwrap();
         let expected = headlines(&mission);
@@ -89,7 +91,11 @@ fn every_frame_counts_what_the_data_says() {
             let svg = text(&format!("x{index:0digits$}.svg"));
             let at = format!("{bag} by {period} s, window {index}");
             frame(&svg, told, &at);
+            chart(&text(&format!("x{index:0digits$}.mmd")), told, &at);
         }
+        settled(&folder.path().join("x"), &expected, &over(&mission), digits);
+        terminal(&said, &expected);
+        strip(bag, period, &expected, folder.path());
         timeline(
             &text(&format!("x{:0digits$}.svg", 0)),
             &expected,
@@ -138,7 +144,8 @@ fn page(html: &str, expected: &[BTreeSet<u64>], at: &str) {
     }
     let numbers: Vec<u64> = expected.iter().map(|told| told.len() as u64).collect();
     assert_eq!(told, numbers, "chips of the page of {at}");
-    let classes: Vec<&str> = data["classes"]
+    let graph = &data["graphs"][0];
+    let classes: Vec<&str> = graph["classes"]
         .as_array()
         .unwrap()
         .iter()
@@ -150,7 +157,7 @@ fn page(html: &str, expected: &[BTreeSet<u64>], at: &str) {
             .any(|mark| class.split(' ').any(|w| w == *mark))
     };
     let mut marked = vec![false; expected.len()];
-    for life in data["lives"].as_array().unwrap() {
+    for life in graph["lives"].as_array().unwrap() {
         let runs: Vec<usize> = life[0].as_array().unwrap().iter().map(place).collect();
         let mut window = 0;
         for run in runs.chunks(2) {
@@ -169,12 +176,146 @@ fn place(number: &Value) -> usize {
 /// The report's first line: its numbers add up to all headlines.
 fn report(markdown: &str, expected: &[BTreeSet<u64>], at: &str) {
     let all: usize = expected.iter().map(BTreeSet::len).sum();
-    let first = markdown.lines().next().unwrap();
-    let (_, told) = first.split_once("changes in ").unwrap();
-    let mut numbers = told
-        .split([' ', ':'])
+    let mut lines = markdown.lines().filter(|line| !line.is_empty());
+    let (first, second) = (lines.next().unwrap(), lines.next().unwrap());
+    let (_, told) = first.split_once("**: ").unwrap();
+    let numbers = told
+        .split(' ')
         .filter_map(|word| word.parse::<usize>().ok());
+    let (_, changed) = second.split_once(", of which ").unwrap();
+    let changed: usize = changed.split(' ').next().unwrap().parse().unwrap();
     let windows = expected.iter().filter(|told| !told.is_empty()).count();
-    assert_eq!(numbers.next(), Some(windows), "{at}: {first}");
+    assert_eq!(changed, windows, "{at}: {second}");
     assert_eq!(numbers.sum::<usize>(), all, "{at}: {first}");
+}
+
+/// A flow chart marks something exactly where there is a headline.
+fn chart(mermaid: &str, told: &BTreeSet<u64>, at: &str) {
+    let is_mark = |line: &&str| {
+        let mut words = line.split_whitespace();
+        matches!(words.next(), Some("class" | "linkStyle")) && words.last() != Some("space")
+    };
+    let marks = mermaid.lines().filter(is_mark).count();
+    assert_eq!(marks == 0, told.is_empty(), "flow chart of {at}");
+}
+
+/// The line at the end counts the headlines.
+fn terminal(said: &str, expected: &[BTreeSet<u64>]) {
+    let line = said
+        .lines()
+        .find(|line| line.starts_with("wrote "))
+        .unwrap();
+    let all: usize = expected.iter().map(BTreeSet::len).sum();
+    let word = if all == 1 { "change" } else { "changes" };
+    assert!(
+        line.contains(&format!(", {all} {word}, in ")),
+        "{line}: {all}"
+    );
+}
+
+/// A strip of changes shows at most so many windows.
+const MOST_PANELS: usize = 12;
+
+/// The strip shows the first window and those with headlines, or those of them with most.
+fn strip(bag: &str, period: &str, expected: &[BTreeSet<u64>], folder: &Path) {
+    let input = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples")
+        .join(bag);
+    let to = folder.join("strip.svg");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command
+        .arg("render")
+        .arg(input)
+        .args(["-q", "--view", "graph", "--period", period]);
+    let done = command
+        .args(["--strip", "changes", "-o"])
+        .arg(&to)
+        .output()
+        .unwrap();
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let svg = fs::read_to_string(to).unwrap();
+    let panels = svg.match_indices("id=\"panel-").map(|(at, found)| {
+        let rest = &svg[at + found.len()..];
+        rest[..rest.find('"').unwrap()].parse::<usize>().unwrap()
+    });
+    let panels: BTreeSet<usize> = panels.collect();
+    let has = |k: &usize| *k == 0 || !expected[*k].is_empty();
+    let wanted: BTreeSet<usize> = (0..expected.len()).filter(has).collect();
+    if wanted.len() <= MOST_PANELS {
+        assert_eq!(panels, wanted, "strip of {bag} by {period} s");
+    } else {
+        assert!(
+            panels.is_subset(&wanted),
+            "strip of {bag} by {period} s: {panels:?}"
+        );
+        assert_eq!(panels.len(), MOST_PANELS);
+    }
+}
+
+/// Every group of a frame by its id, but for the clock and what tells the time; numbers that people read are gone.
+fn drawn(svg: &str) -> BTreeMap<&str, String> {
+    let mut all = BTreeMap::new();
+    for line in svg.lines() {
+        let Some((_, rest)) = line.split_once(" id=\"") else {
+            continue;
+        };
+        let id = &rest[..rest.find('"').unwrap()];
+        // Labels of rates are numbers all over.
+        if ["window", "clock", "past", "playhead"].contains(&id) || id.ends_with("..over") {
+            continue;
+        }
+        all.insert(id, without_numbers(line));
+    }
+    all
+}
+
+/// A line of SVG whose texts have one sign for a rate or a count, and that has no tooltip.
+fn without_numbers(line: &str) -> String {
+    let (head, rest) = line.split_once("<title>").unwrap_or((line, ""));
+    let rest = rest.split_once("</title>").map_or("", |(_, rest)| rest);
+    let mut out = head.to_owned();
+    for (at, part) in rest.split('>').enumerate() {
+        let (text, tag) = part.split_once('<').unwrap_or(("", part));
+        let is_number = text.ends_with(" Hz") || text.ends_with(" msg");
+        out += if at > 0 { ">" } else { "" };
+        out += if is_number { "#" } else { text };
+        out += "<";
+        out += tag;
+    }
+    out
+}
+
+/// A window without a headline after another such is drawn as that one, but for its clock and its numbers.
+fn settled(stem: &Path, expected: &[BTreeSet<u64>], over: &BTreeSet<usize>, digits: usize) {
+    let read = |k: usize| {
+        let path = format!("{}{k:0digits$}.svg", stem.display());
+        fs::read_to_string(path).unwrap()
+    };
+    for k in 1..expected.len() {
+        if expected[k - 1].is_empty() && expected[k].is_empty() && !over.contains(&k) {
+            let (before, after) = (read(k - 1), read(k));
+            assert_eq!(drawn(&before), drawn(&after), "window {k}");
+        }
+    }
+}
+
+/// The windows in which something ends that lasted, such as a silence.
+fn over(mission: &Value) -> BTreeSet<usize> {
+    let entries = mission["ledger"].as_array().unwrap().iter();
+    let ends: Vec<i64> = entries
+        .filter_map(|entry| entry["until_ns"].as_i64())
+        .collect();
+    let windows = mission["windows"].as_array().unwrap().iter().enumerate();
+    let holds = |window: &Value| {
+        let span = window["start_ns"].as_i64().unwrap()..window["end_ns"].as_i64().unwrap();
+        ends.iter().any(|end| span.contains(end))
+    };
+    windows
+        .filter(|(_, window)| holds(window))
+        .map(|(k, _)| k)
+        .collect()
 }

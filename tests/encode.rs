@@ -69,8 +69,6 @@ fn mission(windows: usize) -> (Mission, View) {
         },
         partial: false,
         messages: 0,
-        items: Vec::new(),
-        arrows: Vec::new(),
         headlines: (index % 2 == 1)
             .then_some(Headline {
                 entry: 0,
@@ -120,6 +118,7 @@ fn run(
         notices: &mission.notices,
         view: &view,
         picture: &Discs,
+        unfolded: None,
         painter: &Painter::new(&fonts),
         fonts: &fonts,
         latex: None,

@@ -1,5 +1,6 @@
 //! Expectations: written from runs, held against them, and what each fault of a robot breaks.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -833,7 +834,8 @@ fn an_expectation_that_unfolds_without_end_is_refused() {
     bag(here, "run.bag", &recording(HEALTHY, 0));
     let mut bomb = String::from("schema: bagreel.expect/1\nfrom: x\nnodes: &a0 {/a: {}}\n");
     for n in 1..30 {
-        bomb += &format!("l{n}: &a{n} [*a{}, *a{}]\n", n - 1, n - 1);
+        let before = n - 1;
+        writeln!(bomb, "l{n}: &a{n} [*a{before}, *a{before}]").unwrap();
     }
     let deep = format!("schema: bagreel.expect/1\nnodes: {}", "[".repeat(100_000));
     for text in [bomb, deep] {

@@ -85,6 +85,13 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("extract", "r.bag -o out/x.csv", "--topic-filter /chat"),
     ("extract", "r.bag -o out/x.csv", "--start 20"),
     ("extract", "r.bag -o out/x.csv", "--end 20"),
+    ("tables", "r.bag", "--output out"),
+    ("tables", "r.bag -o out", "--manifest list.txt"),
+    ("tables", "r.bag -o out", "--period 7s"),
+    ("tables", "r.bag -o out", "--align bag"),
+    ("tables", "r.bag -o out", "--mission bag"),
+    ("tables", "r.bag -o out", "--tier chunks"),
+    ("tables", "bags -o out", "--shard 1/2"),
     ("events", "r.bag", "--format csv"),
     ("events", "r.bag", "--rate-change 5"),
     ("events", "r.bag", "--parts"),
@@ -146,6 +153,8 @@ const SAYS: &[(&str, &str, &str, &str)] = &[
     ("events", "r.bag", "--grace 2", "the same for all"),
     ("events", "r.bag", "--cut changes", "the same for all"),
     ("render", "r.bag --figure lives -o out/x.svg", "--period 7s", "the same for all"),
+    ("tables", "r.bag -o kept", "--skip-existing", "1 there already"),
+    ("tables", "gone.bag -o out", "--on-error fail", "error: cannot read `gone.bag`"),
 ];
 
 /// Command, its arguments, an option that says nothing to them, and the hint.
@@ -185,9 +194,6 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.json", "--width 88mm", "hint: pictures take it"),
     ("render", "r.bag -o out/x.json", "--title Hello", "hint: pictures, reports"),
     ("render", "r.bag -o out/x.html", "--bare", "hint: animations, pages, figures"),
-    ("render", "r.bag -o out/x.html", "--captions c.txt", "hint: animations, pages"),
-    ("render", "r.bag -o out/x.svg", "--captions c.txt", "hint: animations, pages"),
-    ("render", "r.bag -o out/x.md", "--captions c.txt", "hint: animations, pages"),
     ("render", "r.bag -o out/x.dot", "--captions c.txt", "hint: animations, pages"),
     ("render", "r.bag -o out/x.json", "--mode nodes", "hint: data holds the whole graph"),
     ("render", "r.bag -o out/x.gexf", "--hide none", "hint: data holds the whole graph"),
@@ -203,6 +209,8 @@ const REFUSED: &[(&str, &str, &str, &str)] = &[
     ("render", "r.bag -o out/x.gif", "--link a=https://b.c", "hint: reports take it"),
     ("render", "r.bag -o out/x.gif", "--phases p.txt", "hint: figures and data"),
     ("render", "r.bag -o out/x.gif", "--source-at HEAD", "--source <DIR>"),
+    ("tables", "r.bag -o out/t", "--jobs 0", "--jobs <N>"),
+    ("tables", "r.bag -o out/t", "--shard 0/3", "`1/8` to `8/8`"),
     ("diff", "r.bag s.mcap", "--style dark", "hint: pictures take it"),
     ("diff", "r.bag s.mcap", "--size 300x200", "hint: pictures take it"),
     ("diff", "r.bag s.mcap", "--source ws", "hint: a picture shows the rest"),
@@ -345,6 +353,7 @@ fn folder() -> TempDir {
         expects("  /in: {to: [/talker_late]}\n").as_bytes(),
     );
     put("c.txt", b"0|here it begins\n");
+    put("list.txt", b"bags/a.bag\n");
     put("p.txt", b"0:00 first\n0:05 second\n0:12 third\n");
     let topics = [("/out_late", source::STRING), ("/in", source::STRING)];
     put("s.mcap", &source::bag(&topics, &["/talker_late"]));
@@ -361,6 +370,8 @@ fn folder() -> TempDir {
     );
     let written = bagreel(folder.path(), "baseline", "r.bag -o all.yaml", "");
     assert_eq!(written.status.code(), Some(0), "{}", text(&written.stderr));
+    let kept = bagreel(folder.path(), "tables", "r.bag -o kept", "");
+    assert_eq!(kept.status.code(), Some(0), "{}", text(&kept.stderr));
     for (with, name) in [("", "old.json"), ("--orientation=LR", "wide.json")] {
         let args = format!("r.bag -p 20 -o {name} -o pic.svg {with}");
         let output = bagreel(folder.path(), "render", &args, "");
@@ -418,12 +429,21 @@ fn outcome(folder: &Path, command: &str, args: &str, with: &str) -> Option<Outco
         code => panic!("{command} {args} {with}: {code:?} {said}"),
     }
     let mut files = BTreeMap::new();
-    for entry in fs::read_dir(folder.join("out")).unwrap() {
-        let entry = entry.unwrap();
-        let name = text(entry.file_name().as_encoded_bytes());
-        files.insert(name, fs::read(entry.path()).unwrap());
-    }
+    written(&folder.join("out"), "", &mut files);
     Some((output.stdout, files))
+}
+
+/// Adds every file in a folder, and in those below it.
+fn written(folder: &Path, below: &str, files: &mut BTreeMap<String, Vec<u8>>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = format!("{below}{}", path.file_name().unwrap().to_string_lossy());
+        if path.is_dir() {
+            written(&path, &format!("{name}/"), files);
+        } else {
+            files.insert(name, fs::read(path).unwrap());
+        }
+    }
 }
 
 fn changes(command: &str) {
@@ -463,6 +483,11 @@ fn every_option_of_events_changes_something() {
 #[test]
 fn every_option_of_extract_changes_something() {
     changes("extract");
+}
+
+#[test]
+fn every_option_of_tables_changes_something() {
+    changes("tables");
 }
 
 #[test]

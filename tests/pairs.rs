@@ -64,7 +64,7 @@ fn again(run: &Recording, seed: u64) -> Recording {
         .map(|_| noise.next(SECOND / 3))
         .collect();
     let mut last: Vec<i64> = vec![0; run.publishers.len()];
-    let mut seen: Vec<u64> = vec![0; run.publishers.len()];
+    let mut counted: Vec<u64> = vec![0; run.publishers.len()];
     let mut messages = Vec::new();
     for (place, at, payload) in &run.messages {
         // Slow waves, no jumps: rates differ by 5 % at most.
@@ -75,8 +75,8 @@ fn again(run: &Recording, seed: u64) -> Recording {
         // One sender's messages stay in order.
         let moved = moved.max(last[*place] + 1000);
         last[*place] = moved;
-        seen[*place] += 1;
-        if noise.next(500) > 0 || seen[*place] == 1 {
+        counted[*place] += 1;
+        if noise.next(500) > 0 || counted[*place] == 1 {
             messages.push((*place, moved, payload.clone()));
         }
     }
@@ -252,7 +252,7 @@ fn each_fault_of_the_warehouse_breaks_what_it_should_and_nothing_else() {
                     run,
                     "/robot1/obstacle_detector",
                     "/robot1/obstacle_detectar",
-                )
+                );
             },
             &[
                 "node-missing /robot1/obstacle_detector",

@@ -3,8 +3,15 @@
 use bagreel::internals::evidence::Degree;
 use bagreel::internals::graph::diff::{apply, diff};
 use bagreel::internals::graph::{EdgeState, Graph, NodeState, State, TopicState};
+use std::collections::BTreeSet;
+
+use bagreel::values::{Element, Kind, Length, Period};
+use bagreel::{Change, Mission, Reading, read};
 use proptest::collection::btree_map;
 use proptest::prelude::*;
+
+use crate::support::Recording;
+use crate::support::rosbag1::{self, Pack};
 
 fn state() -> impl Strategy<Value = State> {
     prop::sample::select(State::ALL.to_vec())
@@ -73,5 +80,106 @@ proptest! {
         let diff = diff(&before, &after);
         prop_assert_eq!(diff.is_empty(), before == after);
         prop_assert_eq!(apply(&before, &diff), after);
+    }
+}
+
+/// Some nodes, each of which sends on a topic from one moment to another, and may come back.
+fn recording() -> impl Strategy<Value = Recording> {
+    let times = (0..90_000_i64, 500..60_000_i64);
+    let period = prop::sample::select(vec![50_i64, 200, 1000, 7000]);
+    let sender = (0..5_u8, 0..4_u8, times, period);
+    prop::collection::vec(sender, 1..9).prop_map(|senders| {
+        let mut bag = Recording::default();
+        for (node, topic, (start, length), period) in senders {
+            let (node, topic) = (format!("/n{node}"), format!("/t{topic}"));
+            let place = bag
+                .publishers
+                .iter()
+                .position(|p| p.node == node && p.topic == topic);
+            let place = place.unwrap_or_else(|| bag.publisher(&node, &topic, "std_msgs/Empty"));
+            bag.send(place, (start, start + length), period, &[]);
+        }
+        bag
+    })
+}
+
+/// The recording in windows of so many seconds.
+fn mission(bag: &std::path::Path, seconds: i64) -> Mission {
+    let mut reading = Reading::of([bag]);
+    let period = Period::from_nanos(seconds * 1_000_000_000).unwrap();
+    reading.division.length = Length::Fixed(period);
+    read(&reading).unwrap()
+}
+
+fn there(graph: &Graph) -> BTreeSet<Element> {
+    let nodes = graph.nodes.iter().map(|s| Element::Node(s.id));
+    let topics = graph.topics.iter().map(|s| Element::Topic(s.id));
+    let publishes = graph.publishes.iter().map(|s| Element::Publish(s.id));
+    let subscribes = graph.subscribes.iter().map(|s| Element::Subscribe(s.id));
+    nodes
+        .chain(topics)
+        .chain(publishes)
+        .chain(subscribes)
+        .collect()
+}
+
+/// Whether the changes of every window make its elements of those of the window before, each by an entry that says so.
+fn follows(mission: &Mission) -> Result<(), TestCaseError> {
+    let mut before: Option<BTreeSet<Element>> = None;
+    for (window, graph) in mission.each() {
+        let mut now = before.unwrap_or_else(|| there(&graph));
+        for (change, entry) in window.changes.iter().zip(&window.entries) {
+            let kind = mission.ledger.entries[*entry as usize].kind;
+            match change {
+                Change::Added { what, .. } => {
+                    prop_assert!(now.insert(*what), "{what:?} came twice");
+                    let begins = [Kind::Started, Kind::Appeared, Kind::Restarted];
+                    prop_assert!(begins.contains(&kind), "{kind:?}");
+                }
+                Change::Removed { what, .. } => {
+                    prop_assert!(now.remove(what), "{what:?} was not there");
+                    let ends = [Kind::Stopped, Kind::Vanished, Kind::Restarted];
+                    prop_assert!(ends.contains(&kind), "{kind:?}");
+                }
+                _ => {}
+            }
+        }
+        prop_assert_eq!(&now, &there(&graph), "window {}", window.index);
+        before = Some(now);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn changes_make_each_window_of_the_one_before_and_the_ledger_knows_no_period(bag in recording()) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.bag");
+        std::fs::write(&path, rosbag1::write(&bag, Pack::None, 4096)).unwrap();
+        let first = mission(&path, 1);
+        follows(&first)?;
+        for seconds in [10, 30, 60] {
+            let other = mission(&path, seconds);
+            follows(&other)?;
+            prop_assert_eq!(&first.ledger, &other.ledger, "{} s", seconds);
+        }
+    }
+}
+
+#[test]
+fn the_examples_follow_from_their_changes_and_their_ledger_knows_no_period() {
+    for bag in ["warehouse.bag", "courier.mcap"] {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("examples")
+            .join(bag);
+        let first = mission(&path, 1);
+        follows(&first).unwrap();
+        for seconds in [10, 30, 60] {
+            let other = mission(&path, seconds);
+            follows(&other).unwrap();
+            assert_eq!(first.ledger, other.ledger, "{bag} by {seconds} s");
+        }
     }
 }

@@ -144,7 +144,10 @@ fn the_second_reader_finds_the_same() {
     let recording = support::small();
     for (name, bytes) in everywhere(&recording) {
         let (_dir, path) = placed(&name, &bytes);
-        let options = OpenOptions { verify: true };
+        let options = OpenOptions {
+            verify: true,
+            ..OpenOptions::default()
+        };
         let (report, second) = read_as(&path, Want::Payload, None, &options).unwrap();
         let (_, first) = read(&path, Want::Payload).unwrap();
         assert_eq!(
@@ -553,7 +556,13 @@ fn no_damage_makes_a_reader_panic_hang_or_invent() {
         let rounds = if name.contains(".db3") { 15 } else { 60 };
         for round in 0..rounds {
             let (_dir, path) = placed(&name, &damage(&bytes, &mut dice));
-            for options in [OpenOptions::default(), OpenOptions { verify: true }] {
+            for options in [
+                OpenOptions::default(),
+                OpenOptions {
+                    verify: true,
+                    ..OpenOptions::default()
+                },
+            ] {
                 if let Ok((_, kept)) = read_as(&path, Want::Payload, None, &options) {
                     let most = recording.messages.len() * 3;
                     assert!(
@@ -596,7 +605,13 @@ fn numbers_that_lie_are_read_around_or_told() {
     }
     for bytes in cases {
         let (_dir, path) = placed("x.bag", &bytes);
-        for options in [OpenOptions::default(), OpenOptions { verify: true }] {
+        for options in [
+            OpenOptions::default(),
+            OpenOptions {
+                verify: true,
+                ..OpenOptions::default()
+            },
+        ] {
             let (report, kept) = read_as(&path, Want::Payload, None, &options).unwrap();
             let all = kept.stamps.len() == recording.messages.len();
             assert!(

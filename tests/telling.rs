@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
-use bagreel::internals::view::{Frame, Mark, Shown, View, ViewOptions, view};
+use bagreel::internals::view::{Mark, SeenWindow, Shown, View, ViewOptions, view};
 
 /// What an example shows in windows of this length, or of the usual one.
 fn example(name: &str, period: Option<&str>) -> View {
@@ -19,8 +19,8 @@ fn example(name: &str, period: Option<&str>) -> View {
     view(&mission, &ViewOptions::default()).0
 }
 
-fn all(frame: &Frame) -> impl Iterator<Item = &Shown> {
-    frame.items.iter().chain(&frame.arrows)
+fn all(seen: &SeenWindow) -> impl Iterator<Item = &Shown> {
+    seen.items.iter().chain(&seen.arrows)
 }
 
 #[test]
@@ -37,7 +37,8 @@ fn every_headline_is_counted_said_and_marked() {
             view.frames.iter().any(|f| !f.headlines.is_empty()),
             "{name}"
         );
-        for frame in &view.frames {
+        for (k, frame) in view.frames.iter().enumerate() {
+            let seen = view.seen(k);
             let at = format!("{name}, window {}", frame.index);
             let told: BTreeSet<u32> = frame.headlines.iter().map(|h| h.entry).collect();
             let said: usize = frame.caption.iter().map(|phrase| phrase.headlines).sum();
@@ -46,11 +47,11 @@ fn every_headline_is_counted_said_and_marked() {
                 (frame.counts.total(), said),
                 "{at}"
             );
-            let marked = all(frame).filter(|s| s.mark.is_some());
+            let marked = all(&seen).filter(|s| s.mark.is_some());
             let marked: BTreeSet<u32> = marked.flat_map(|s| s.entries.clone()).collect();
             assert_eq!(marked, told, "{at}");
             assert!(
-                all(frame).all(|s| s.mark.is_none() || !s.entries.is_empty()),
+                all(&seen).all(|s| s.mark.is_none() || !s.entries.is_empty()),
                 "{at}"
             );
         }
@@ -58,8 +59,8 @@ fn every_headline_is_counted_said_and_marked() {
 }
 
 /// What a window shows when its marks are gone, but for clock and numbers.
-fn settled(frame: &Frame) -> Vec<String> {
-    let stays = all(frame).filter(|s| s.mark != Some(Mark::Removed));
+fn settled(seen: &SeenWindow) -> Vec<String> {
+    let stays = all(seen).filter(|s| s.mark != Some(Mark::Removed));
     let look = |s: &Shown| format!("{} {:?} {:?} {:?}", s.id, s.state, s.degree, s.steady_hz);
     stays.map(look).collect()
 }
@@ -67,15 +68,11 @@ fn settled(frame: &Frame) -> Vec<String> {
 #[test]
 fn a_window_without_a_headline_looks_like_the_one_before() {
     let view = example("warehouse.bag", Some("10"));
-    for pair in view.frames.windows(2).filter(|p| p[1].headlines.is_empty()) {
-        let paused = |f: &Frame| all(f).any(|s| s.is_paused);
-        if !paused(&pair[0]) && !paused(&pair[1]) {
-            assert_eq!(
-                settled(&pair[0]),
-                settled(&pair[1]),
-                "window {}",
-                pair[1].index
-            );
+    let quiet = (1..view.frames.len()).filter(|k| view.frames[*k].headlines.is_empty());
+    for k in quiet {
+        let pair = [view.seen(k - 1), view.seen(k)];
+        if !pair.iter().any(|seen| all(seen).any(|s| s.is_paused)) {
+            assert_eq!(settled(&pair[0]), settled(&pair[1]), "window {k}");
         }
     }
 }
@@ -96,11 +93,11 @@ fn a_node_that_restarts_keeps_its_arrows() {
         u32::try_from(found).unwrap()
     };
     let (lidar, scan) = (item("/robot2/lidar_driver"), item("/robot2/scan"));
-    for frame in &view.frames[20..30] {
-        let drawn = frame.arrows.iter().any(|shown| {
+    for k in 20..30 {
+        let drawn = view.seen(k).arrows.iter().any(|shown| {
             let arrow = &view.arrows[shown.id as usize];
             (arrow.from, arrow.to) == (lidar, scan)
         });
-        assert!(drawn, "window {}", frame.index);
+        assert!(drawn, "window {k}");
     }
 }

@@ -19,6 +19,7 @@ mod edges;
 mod encode;
 mod evidence;
 mod figures;
+mod fleet;
 mod gate;
 mod hostile;
 mod info;

@@ -47,6 +47,11 @@ impl Sink for Clip<'_> {
         }
     }
 
+    /// A reader with a range lumps together only what lies inside.
+    fn lump(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
+        self.sink.lump(connection, window, count);
+    }
+
     fn message(&mut self, message: Message<'_>) {
         if self.range.is_none_or(|r| r.contains(message.time)) {
             self.sink.message(message);

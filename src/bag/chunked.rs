@@ -13,13 +13,14 @@ mod unpack;
 
 use std::collections::BTreeSet;
 use std::marker::PhantomData;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
 use crate::bag::adapters::{Clip, GROUP, in_order};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
-use crate::bag::model::{Connection, OpenOptions, Reader, Report, Sink, Tier, Want};
+use crate::bag::model::{Connection, Lumps, OpenOptions, Reader, Report, Sink, Tier, Want};
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
@@ -100,6 +101,7 @@ struct Indexed<G> {
     plan: Result<ChunkPlan, Unindexed>,
     facts: Vec<(String, String)>,
     verify: bool,
+    lumps: Option<Lumps>,
     grammar: PhantomData<fn() -> G>,
 }
 
@@ -131,6 +133,7 @@ pub(crate) fn open<G: Grammar>(place: BagPlace, options: &OpenOptions) -> Result
                 plan,
                 facts,
                 verify: options.verify,
+                lumps: options.lumps,
                 grammar,
             }))
         }
@@ -198,9 +201,12 @@ impl<G: Grammar> Indexed<G> {
         plan.notices.iter().for_each(|n| sink.notice(n.clone()));
         let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
         let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();
+        let (chunks, tier) = self.in_lumps(plan, chunks, range, sink);
         let query = self.query(plan, &wants, range);
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
+            // What cannot be had now is asked for again, and told then.
+            let _ = self.source.expect(&indexes(groups[at]));
             groups[at].iter().for_each(|chunk| query.read(chunk, sink));
         };
         let total = groups.len() as u64;
@@ -215,8 +221,34 @@ impl<G: Grammar> Indexed<G> {
             .collect();
         Report {
             complete: !sink.lost,
-            ..self.report(Tier::Index, &compression)
+            ..self.report(tier, &compression)
         }
+    }
+
+    /// Counts chunks as a whole where that is asked for and enough; answers the others, and how the bag is read then.
+    fn in_lumps<'p>(
+        &self,
+        plan: &ChunkPlan,
+        chunks: Vec<&'p Chunk>,
+        range: Option<Span>,
+        sink: &mut Clip<'_>,
+    ) -> (Vec<&'p Chunk>, Tier) {
+        let Some(lumps) = self.lumps.filter(|l| plan.chunks.len() > l.above) else {
+            return (chunks, Tier::Index);
+        };
+        let is_inside = |c: &Chunk| range.is_none_or(|r| r.contains(c.first) && r.contains(c.last));
+        let left = chunks.into_iter().filter(|chunk| {
+            let window = lumps.window(chunk.first);
+            let is_one = window == lumps.window(chunk.last) && is_inside(chunk);
+            let Some(counts) = is_one.then(|| plan.lump(chunk)).flatten() else {
+                return true;
+            };
+            for (connection, count) in counts {
+                sink.lump(connection, window, count);
+            }
+            false
+        });
+        (left.collect(), Tier::Chunks)
     }
 
     fn front_to_back(&self, reason: &Unindexed, sink: &mut dyn Sink) -> Report {
@@ -272,6 +304,13 @@ impl<G: Grammar> Indexed<G> {
     fn report(&self, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
         report::<G>(file_name(self.source.path()), tier, compression)
     }
+}
+
+/// Where the indexes of these chunks lie, as far as they are read whole.
+fn indexes(chunks: &[&Chunk]) -> Vec<Range<u64>> {
+    let ranges = chunks.iter().map(|chunk| chunk.index.clone());
+    let is_held = |r: &Range<u64>| r.end - r.start <= LONGEST_INDEX;
+    ranges.filter(is_held).collect()
 }
 
 /// What every report begins with.

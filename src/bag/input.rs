@@ -1,11 +1,13 @@
 //! Where a bag lies, and its first bytes, which tell its format.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::model::{OpenOptions, Reader};
 use super::source::{ByteStream, FileSource};
+use super::unknown::elsewhere;
 use crate::base::error::{Error, Result};
 
 /// One bag to read: a path, or standard input (`-`).
@@ -13,15 +15,34 @@ use crate::base::error::{Error, Result};
 pub enum Input {
     /// A file or a folder.
     Path(PathBuf),
+    /// An object in a store or on a web server, `s3://…`, `https://…`: told apart from paths, and not read.
+    Url(String),
     /// Standard input: ROS 1 or MCAP.
     Stdin,
 }
 
+/// How URLs begin that are no paths.
+const SCHEMES: &[&str] = &[
+    "s3://", "s3a://", "gs://", "az://", "abfs://", "abfss://", "azure://", "https://", "http://",
+];
+
 impl Input {
+    /// The input of this text: `-` is standard input, a URL an object, everything else a path.
+    pub fn parse(text: impl AsRef<OsStr>) -> Self {
+        let text = text.as_ref();
+        let is_url = |text: &&str| SCHEMES.iter().any(|scheme| text.starts_with(scheme));
+        match text.to_str() {
+            Some("-") => Self::Stdin,
+            Some(url) if is_url(&url) => Self::Url(url.to_owned()),
+            _ => Self::Path(text.into()),
+        }
+    }
+
     /// Whether it can be read only once: standard input, a named pipe, a device.
     pub fn is_pipe(&self) -> bool {
         match self {
             Self::Path(path) => path.exists() && !path.is_file() && !path.is_dir(),
+            Self::Url(_) => false,
             Self::Stdin => true,
         }
     }
@@ -30,6 +51,7 @@ impl Input {
     pub fn name(&self) -> String {
         match self {
             Self::Path(path) => file_name(path),
+            Self::Url(url) => file_name(Path::new(url)),
             Self::Stdin => "standard input".to_owned(),
         }
     }
@@ -94,11 +116,13 @@ pub(crate) const HEAD: usize = 512;
 
 /// Opens what lies there, without reading more than its kind.
 pub(crate) fn place(input: &Input) -> Result<BagPlace> {
-    let Input::Path(path) = input else {
-        return Ok(BagPlace::Pipe(
-            input.name(),
-            ByteStream::of_reader(io::stdin()),
-        ));
+    let path = match input {
+        Input::Path(path) => path,
+        Input::Url(url) => return Err(elsewhere(url)),
+        Input::Stdin => {
+            let stream = ByteStream::of_reader(io::stdin());
+            return Ok(BagPlace::Pipe(input.name(), stream));
+        }
     };
     let meta = path.metadata().map_err(Error::io("read", path))?;
     if meta.is_dir() {

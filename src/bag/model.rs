@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::base::error::Result;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::{Period, Span, Stamp};
 
 /// How a payload is written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,6 +86,10 @@ pub trait Sink {
     /// knows them (always if wanted); then it is as long as `stamps`.
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
 
+    /// Messages of one connection of which no more is known than that they lie in the window that begins at `window`:
+    /// instead of their stamps, and only where [`OpenOptions::lumps`] asks for it.
+    fn lump(&mut self, _connection: ConnectionId, _window: Stamp, _count: u64) {}
+
     /// A wanted message.
     fn message(&mut self, message: Message<'_>);
 
@@ -101,6 +105,8 @@ pub trait Sink {
 pub enum Tier {
     /// By its index: no payload is read that is not wanted.
     Index,
+    /// By its tail, which counts the messages of each chunk; by the index only where a chunk lies in several windows.
+    Chunks,
     /// Record by record from the front.
     Forward,
     /// Everything, a second time, by an independent reader.
@@ -112,6 +118,7 @@ impl Tier {
     pub fn word(self) -> &'static str {
         match self {
             Self::Index => "index",
+            Self::Chunks => "chunks",
             Self::Forward => "forward",
             Self::Verify => "verify",
         }
@@ -160,6 +167,28 @@ pub trait Reader: Send {
 pub struct OpenOptions {
     /// Read everything by the second, independent reader instead (tier `verify`).
     pub verify: bool,
+    /// Whether to count by chunks where that is enough.
+    pub lumps: Option<Lumps>,
+}
+
+/// How to count a chunk as a whole if all of it lies in one window: nothing of it is read then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lumps {
+    /// A moment at which a window begins.
+    pub origin: Stamp,
+    /// The length of all windows.
+    pub period: Period,
+    /// Only in bags of more chunks than this, 0...
+    pub above: usize,
+}
+
+impl Lumps {
+    /// When the window begins in which `at` lies; held at the ends of the range.
+    pub fn window(&self, at: Stamp) -> Stamp {
+        let (origin, period) = (i128::from(self.origin.0), i128::from(self.period.nanos()));
+        let start = (i128::from(at.0) - origin).div_euclid(period) * period + origin;
+        Stamp(i64::try_from(start).unwrap_or(i64::MIN))
+    }
 }
 
 /// The longest payload, or connection record, that is held in memory, in bytes.

@@ -1,18 +1,32 @@
-//! Where bytes come from: files read at any place, and streams that can be peeked into and skipped through.
+//! Where bytes come from: files and objects read at any place, and streams that can be peeked into and skipped through.
 
+use std::fmt::Debug;
 use std::fs::File;
 use std::io::{self, Read};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
-/// A regular file that several threads read at any place at once. Counts the bytes it hands out.
+/// What gives bytes at any place, to several threads at once.
+pub(crate) trait Ranges: Debug + Send + Sync {
+    /// Reads some of the bytes from `at` on; none only at the end.
+    fn read_once(&self, at: u64, into: &mut [u8]) -> io::Result<usize>;
+
+    /// These will be asked for next: what waits for each answer asks for all of them at once.
+    fn expect(&self, _ranges: &[Range<u64>]) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A regular file, or an object somewhere else, that several threads read at any place at once. Counts the bytes it
+/// hands out.
 #[derive(Debug)]
 pub(crate) struct FileSource {
     path: PathBuf,
-    file: File,
+    from: Box<dyn Ranges>,
     len: u64,
     read: AtomicU64,
 }
@@ -25,12 +39,25 @@ impl FileSource {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(Error::io("read", path))?;
         let len = file.metadata().map_err(Error::io("read", path))?.len();
-        Ok(Self {
+        Ok(Self::of(path, len, file))
+    }
+
+    /// The `len` bytes that `from` gives, called `path`.
+    pub(crate) fn of(path: &Path, len: u64, from: impl Ranges + 'static) -> Self {
+        Self {
             path: path.to_owned(),
-            file,
+            from: Box::new(from),
             len,
             read: AtomicU64::new(0),
-        })
+        }
+    }
+
+    /// As [`Ranges::expect`].
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub(crate) fn expect(&self, ranges: &[Range<u64>]) -> io::Result<()> {
+        self.from.expect(ranges)
     }
 
     /// Its path, as it was opened.
@@ -55,7 +82,8 @@ impl FileSource {
     pub(crate) fn read_at(&self, at: u64, into: &mut [u8]) -> io::Result<usize> {
         let mut filled = 0;
         while filled < into.len() {
-            match read_once(&self.file, at + filled as u64, &mut into[filled..]) {
+            let next = at + filled as u64;
+            match self.from.read_once(next, &mut into[filled..]) {
                 Ok(0) => break,
                 Ok(n) => filled += n,
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
@@ -64,6 +92,12 @@ impl FileSource {
         }
         self.read.fetch_add(filled as u64, Ordering::Relaxed);
         Ok(filled)
+    }
+}
+
+impl Ranges for File {
+    fn read_once(&self, at: u64, into: &mut [u8]) -> io::Result<usize> {
+        read_once(self, at, into)
     }
 }
 

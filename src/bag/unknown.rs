@@ -21,6 +21,15 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     }
 }
 
+/// The error for an object that is not on this machine.
+pub(crate) fn elsewhere(url: &str) -> Error {
+    Error::Unsupported {
+        path: url.into(),
+        what: "it is not on this machine".to_owned(),
+        hint: "download the bag, or mount its store".to_owned(),
+    }
+}
+
 fn guess(head: &[u8]) -> (&'static str, &'static str) {
     const KNOWN: &[(&[u8], &str, &str)] = &[
         (

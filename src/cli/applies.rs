@@ -114,10 +114,11 @@ const RULES: &[AppliesTo] = &[
     AppliesTo {
         options: &["captions"],
         takes: |asked, output| {
-            let is_told = ["json", "csv", "parquet"].contains(&output.format.word);
+            let tells = ["json", "csv", "parquet", "html", "svg", "md"];
+            let is_told = tells.contains(&output.format.word);
             asked.is_window(output) || is_told || is_figure(asked.args, output)
         },
-        what: "animations, pages, single windows, figures and data take them: `x.gif`, `x{n}.svg`, `x.json`",
+        what: "animations, pages, reports, figures and data take them: `x.gif`, `x.html`, `x.json`",
     },
     AppliesTo {
         options: &[

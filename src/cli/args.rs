@@ -1,6 +1,8 @@
 //! What can be typed: every command and flag with its help text.
 
 pub(super) mod gate;
+#[cfg(feature = "parquet")]
+pub(super) mod tables;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -37,6 +39,10 @@ pub(super) enum Command {
     /// Write the messages themselves as tables: a row per message, or a table per topic with every field.
     #[command(after_help = EXTRACT_HELP)]
     Extract(Box<ExtractArgs>),
+    /// Count what a fleet of bags holds: two tables, a row per bag and one per publisher and window, for any engine.
+    #[cfg(feature = "parquet")]
+    #[command(after_help = tables::HELP)]
+    Tables(Box<tables::TablesArgs>),
     /// Print the log: what started, stopped, restarted, changed rate or hands, and when; the same for every period.
     Events(Box<EventsArgs>),
     /// Tell what differs between two missions: who is there, who talks to whom, how often, what happened when.

@@ -48,7 +48,7 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
         .iter()
         .filter_map(|input| match input {
             Input::Path(path) => Some(path.clone()),
-            Input::Stdin => None,
+            Input::Url(_) | Input::Stdin => None,
         })
         .collect();
     if !args.fields {

@@ -196,6 +196,18 @@ fn link(text: &str) -> Result<(String, String)> {
             "write `--link player=https://…`",
         )
     })?;
+    // Whoever reads a report trusts its links: nothing that a click could run.
+    let scheme = url
+        .split_once(':')
+        .map(|(scheme, _)| scheme.to_ascii_lowercase());
+    let is_word = |c: char| c.is_ascii_alphanumeric() || matches!(c, '+' | '-' | '.');
+    let scheme = scheme.filter(|s| s.chars().all(is_word));
+    if scheme.is_some_and(|s| !matches!(s.as_str(), "http" | "https")) {
+        return Err(Error::usage(
+            format!("`--link {text}` leads to nothing that can be looked at"),
+            "write `--link player=https://…`, or a path",
+        ));
+    }
     Ok((name.to_owned(), url.to_owned()))
 }
 

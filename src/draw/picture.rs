@@ -7,6 +7,7 @@ mod chips;
 pub(crate) use chips::chips;
 mod course;
 mod legend;
+pub(crate) use legend::{LegendSign, signs};
 mod measured;
 mod options;
 pub(crate) mod page;
@@ -33,7 +34,7 @@ use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
-use crate::view::{Arrow, ArrowKind, Frame, Item, View};
+use crate::view::{Arrow, ArrowKind, Frame, Item, SeenWindow, View};
 
 /// What the user wishes of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -243,7 +244,7 @@ impl<'a> Picture<'a> {
         let Some(frame) = measured.view.frames.get(k) else {
             return scene;
         };
-        self.graph(frame, &mut scene.groups);
+        self.graph(frame, &measured.view.seen(k), &mut scene.groups);
         if !measured.options.bare {
             self.furniture(k, frame, &mut scene.groups);
         }
@@ -304,10 +305,10 @@ impl<'a> Picture<'a> {
         groups.extend(self.timeline.head(k, frame));
     }
 
-    fn graph(&self, frame: &Frame, groups: &mut Vec<Group>) {
+    fn graph(&self, frame: &Frame, seen: &SeenWindow, groups: &mut Vec<Group>) {
         let view = self.measured.view;
         let boxes = self.boxes();
-        let full = self.inhabited(frame);
+        let full = self.inhabited(seen);
         let spaces = self.measured.graph.spaces.iter().zip(&self.layout.clusters);
         let mut titles = Vec::new();
         let mut rolls = frame.rolls.iter();
@@ -328,11 +329,11 @@ impl<'a> Picture<'a> {
         // What changed lies on top.
         let (mut changed, mut over, mut changed_over) = (Vec::new(), Vec::new(), Vec::new());
         for &at in &self.order {
-            let Some(shown) = measured::find(&frame.arrows, at) else {
+            let Some(shown) = measured::find(&seen.arrows, at) else {
                 continue;
             };
             let arrow = &view.arrows[at];
-            let ends = [arrow.from, arrow.to].map(|id| measured::find(&frame.items, id as usize));
+            let ends = [arrow.from, arrow.to].map(|id| measured::find(&seen.items, id as usize));
             let (line, label) = arrows.parts(arrow, &self.tracks[at], shown, ends);
             let (lines, labels) = if shown.mark.is_some() {
                 (&mut changed, &mut changed_over)
@@ -349,7 +350,7 @@ impl<'a> Picture<'a> {
         for mut words in [titles, over, changed_over] {
             groups.append(&mut words);
         }
-        for shown in &frame.items {
+        for shown in &seen.items {
             let at = shown.id as usize;
             if let (Some(item), Some(card)) = (view.items.get(at), self.cards.get(at)) {
                 groups.push(boxes.item(item, card, shown));
@@ -358,10 +359,10 @@ impl<'a> Picture<'a> {
     }
 
     /// For each namespace with a box, whether anything inside it is there.
-    fn inhabited(&self, frame: &Frame) -> Vec<bool> {
+    fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
         let view = self.measured.view;
         let mut full = vec![false; view.namespaces.len()];
-        for shown in &frame.items {
+        for shown in &seen.items {
             let mut space = view.items.get(shown.id as usize).and_then(|i| i.cluster);
             // Parents come first in the list, so that this ends.
             while let Some(at) = space.filter(|at| full.get(*at) == Some(&false)) {

@@ -383,7 +383,7 @@ mod tests {
     use crate::evidence::Degree;
     use crate::graph::{Element, Elements, State};
     use crate::layout;
-    use crate::view::{Counts, Headline, Item, ItemKind, Mark, Phrase, Shown};
+    use crate::view::{Counts, Headline, Item, ItemKind, Mark, Phrase, SeenWindow, Shown};
 
     /// Four minutes in which a node is there and another comes and goes.
     fn two_nodes() -> (Mission, View) {
@@ -428,10 +428,6 @@ mod tests {
             },
             partial: false,
             messages: 0,
-            items: std::iter::once(shown(0, None))
-                .chain(mark.map(|m| shown(1, Some(m))))
-                .collect(),
-            arrows: Vec::new(),
             headlines: mark.map(|_| Headline::started()).into_iter().collect(),
             counts: Counts::default(),
             caption: mark
@@ -443,11 +439,19 @@ mod tests {
                 .collect(),
         };
         let marks = [None, Some(Mark::Added), None, Some(Mark::Removed)];
+        let seen = |mark: &Option<Mark>| SeenWindow {
+            items: std::iter::once(shown(0, None))
+                .chain(mark.map(|m| shown(1, Some(m))))
+                .collect(),
+            arrows: Vec::new(),
+        };
+        let seen: Vec<SeenWindow> = marks.iter().map(seen).collect();
         let view = View {
             items: (0..).zip(["/driver", "/planner"]).map(item).collect(),
             frames: marks.into_iter().enumerate().map(frame).collect(),
             ..View::default()
         };
+        let view = view.showing(&seen);
         (mission, view)
     }
 

@@ -59,6 +59,13 @@ impl Evidence {
         SOURCES.iter().map(|source| source.word)
     }
 
+    /// What each kind in it is, in a line of plain words, in the order of [`SOURCES`].
+    pub(crate) fn lines(self) -> impl Iterator<Item = String> {
+        let rows = SOURCES.iter().enumerate();
+        let rows = rows.filter(move |(at, _)| self.0 >> at & 1 == 1);
+        rows.map(|(_, source)| format!("{}: {}", source.word, source.about.replace('`', "")))
+    }
+
     /// The words in it, in the order of [`SOURCES`].
     pub fn words(self) -> impl Iterator<Item = &'static str> {
         SOURCES

@@ -9,8 +9,9 @@ use crate::export::sequence::{Overview, Sequence};
 use crate::export::target::Target;
 use crate::view::View;
 
-/// Above this many elements, browsers take most of a processor core to show it.
-const MANY: usize = 300;
+/// Above this many elements, browsers take a third of a processor core and more to show it, whether or not their user
+/// asked for less motion.
+const MANY: usize = 100;
 
 /// Begins the animation.
 ///
@@ -30,8 +31,8 @@ pub(crate) fn start<'a>(
         let frame_ms = sequence.options.frame_ms;
         let svg = animated::write(
             sequence.view,
-            &whole.union,
-            whole.style,
+            &sequence.mission.ledger.phases,
+            (&whole.union, whole.style),
             whole.title,
             frame_ms,
         );

@@ -40,7 +40,8 @@ pub(crate) fn start<'a>(
 impl Encoder for DotEncoder<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut written = Written::to(&self.target);
-        let frames = &self.sequence.view.frames;
+        let view = self.sequence.view;
+        let frames = &view.frames;
         let mut write = |target: &Target, text: &str| -> Result<()> {
             let mut sink = OutputSink::create(target, None)?;
             sink.write_all(text.as_bytes()).map_err(sink.error())?;
@@ -48,17 +49,18 @@ impl Encoder for DotEncoder<'_> {
             Ok(())
         };
         if self.target.is_numbered() {
-            for frame in frames {
+            for (k, frame) in frames.iter().enumerate() {
                 let target = self.target.numbered(frame.index, frames.len());
-                write(
-                    &target,
-                    &self.drawing.write(frame, &self.title(Some(frame.index))),
-                )?;
+                let title = self.title(Some(frame.index));
+                write(&target, &self.drawing.write(&view.seen(k), &title))?;
             }
-        } else if let [frame] = &frames[..] {
-            write(&self.target, &self.drawing.write(frame, &self.title(None)))?;
-        } else if let Some(frame) = union(self.sequence.view) {
-            write(&self.target, &self.drawing.write(&frame, &self.title(None)))?;
+        } else if frames.len() == 1 {
+            write(
+                &self.target,
+                &self.drawing.write(&view.seen(0), &self.title(None)),
+            )?;
+        } else if let Some(all) = union(view) {
+            write(&self.target, &self.drawing.write(&all, &self.title(None)))?;
         }
         Ok(written)
     }

@@ -216,6 +216,10 @@ pub enum OneDrawing {
 
 /// An output format.
 #[derive(Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "a row of a table: each answers a question of its own"
+)]
 pub struct OutputFormat {
     /// Its extension and its word for `--format`.
     pub word: &'static str,
@@ -225,6 +229,8 @@ pub struct OutputFormat {
     pub is_drawn: bool,
     /// Whether it shows the view; the others write the whole mission.
     pub is_viewed: bool,
+    /// Whether it holds all of the view one by one, whatever the picture draws as one.
+    pub is_unfolded: bool,
     /// Whether `--max-bytes` binds it.
     pub is_limited: bool,
     /// Whether one drawing of the whole may stand in it.
@@ -241,6 +247,7 @@ pub(crate) const PICTURE: OutputFormat = OutputFormat {
     what: "",
     is_drawn: true,
     is_viewed: true,
+    is_unfolded: false,
     is_limited: false,
     whole: OneDrawing::Never,
     check: None,

@@ -1,13 +1,18 @@
 //! The mission as one self-contained page: the graph drawn once, its history as runs, and the player that shows them.
+//!
+//! `player/` holds what the page is made of as it is written by people: its template, its look, and its script in
+//! parts, which are joined in order. [`data`] says what the script is given.
 
 mod data;
 pub(crate) mod encoder;
+mod signs;
 mod table;
 
 use std::fmt::Write as _;
 
 use crate::base::digest;
 use crate::base::geometry::Rect;
+use crate::base::notice::NoticeKind;
 use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::board::Overview;
@@ -17,23 +22,33 @@ use crate::draw::paint::xml::Xml;
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
 use crate::draw::text;
-use crate::mission::Mission;
+use crate::export::sequence::Sequence;
+use crate::view::View;
 use crate::view::runs::{ElementRuns, Runs, at};
-use crate::view::{Frame, View};
 
-const PAGE: &str = include_str!("../../styles/player.html");
-const SCRIPT: &str = include_str!("../../styles/player.js");
-const LOOK: &str = include_str!("../../styles/player.css");
+const PAGE: &str = include_str!("html/player/page.html");
+const LOOK: &str = include_str!("html/player/page.css");
+/// The script, in the order in which its parts build on each other.
+const SCRIPT: [&str; 9] = [
+    include_str!("html/player/data.js"),
+    include_str!("html/player/picture.js"),
+    include_str!("html/player/zoom.js"),
+    include_str!("html/player/lists.js"),
+    include_str!("html/player/timeline.js"),
+    include_str!("html/player/select.js"),
+    include_str!("html/player/table.js"),
+    include_str!("html/player/save.js"),
+    include_str!("html/player/keys.js"),
+];
 
 /// What a page is made of.
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct HtmlPage<'a> {
     /// The whole sequence.
-    pub mission: &'a Mission,
-    /// What is shown of it.
-    pub view: &'a View,
-    /// The graph, drawn once.
-    pub union: &'a Union,
+    pub sequence: &'a Sequence<'a>,
+    /// Everything one by one.
+    pub whole: PageGraph<'a>,
+    /// The picture, where that draws several as one.
+    pub folded: Option<PageGraph<'a>>,
     /// How it looks.
     pub style: &'a Style,
     /// How it looks where the reader prefers dark pages; `None` for always the same.
@@ -44,15 +59,40 @@ pub(crate) struct HtmlPage<'a> {
     pub overview: Option<&'a Overview>,
 }
 
+/// A graph, drawn once, with the history of its elements.
+pub(crate) struct PageGraph<'a> {
+    pub view: &'a View,
+    pub union: Union,
+    pub runs: Runs,
+    /// The arrows in the order in which they are painted: places in the view.
+    pub order: Vec<usize>,
+}
+
+impl<'a> PageGraph<'a> {
+    /// The graph of a view whose union is `union`; nothing is drawn if that is empty.
+    pub(crate) fn new(view: &'a View, union: Union) -> Self {
+        let order = if union.order.is_empty() {
+            (0..view.arrows.len()).collect()
+        } else {
+            union.order.clone()
+        };
+        Self {
+            runs: Runs::of(view, rate_label),
+            view,
+            union,
+            order,
+        }
+    }
+}
+
 impl HtmlPage<'_> {
     /// The page: UTF-8, without a single request, its scripts and styles named by digest in its policy.
     pub(crate) fn write(&self) -> String {
-        let runs = Runs::of(self.view, rate_label);
-        let still = self.view.busiest();
+        let still = self.whole.view.busiest_change();
         let fonts = fonts();
-        let look = self.look(&runs);
-        let script = squeezed(SCRIPT);
-        let (data, data_type) = data::packed(&data::json(self, &runs));
+        let look = self.look();
+        let script = SCRIPT.map(squeezed).join("\n");
+        let (data, data_type) = data::packed(&data::json(self, still));
         let policy = format!(
             "default-src 'none';script-src {};style-src {} {};font-src data:;img-src data:;base-uri 'none';form-action 'none'",
             digest::policy(&script),
@@ -64,28 +104,25 @@ impl HtmlPage<'_> {
         } else {
             "normal"
         };
+        let view = self.whole.view;
         let mut title = Xml::default();
         title.text(&visible(self.title));
         let title = title.finish();
-        let mut bars = Xml::default();
-        classes::bars(&mut bars, &runs);
-        let bars = bars.finish();
         fill(PAGE, |key| match key {
             "policy" => policy.clone(),
             "schemes" => schemes.to_owned(),
             "title" => title.clone(),
             "fonts" => fonts.clone(),
             "css" => look.clone(),
-            "graph" => self
-                .overview
-                .map_or_else(|| self.graph(&runs, still), board),
+            "signs" => self.signs(),
+            "graph" => self.graphs(still),
             "where" => self.place(still),
-            "ticks" => self.ticks(),
-            "summary" => table::summary(self.view),
-            "count" => self.view.frames.len().to_string(),
-            "last" => self.view.frames.len().saturating_sub(1).to_string(),
-            "bars" => bars.clone(),
-            "rows" => table::rows(self.view),
+            "when" => self.when(),
+            "summary" => table::summary(view),
+            "last" => view.frames.len().saturating_sub(1).to_string(),
+            "rows" => table::rows(view),
+            "legend" => self.legend(),
+            "notes" => self.notes(),
             "data_type" => data_type.to_owned(),
             "data" => data.clone(),
             "script" => script.clone(),
@@ -93,10 +130,17 @@ impl HtmlPage<'_> {
         })
     }
 
-    fn look(&self, runs: &Runs) -> String {
-        let mut words = runs.words();
-        // For the legend.
-        words.extend(["added", "removed", "changed", "silent"]);
+    fn drawn(&self) -> impl Iterator<Item = &PageGraph<'_>> {
+        std::iter::once(&self.whole).chain(&self.folded)
+    }
+
+    fn look(&self) -> String {
+        let mut words: std::collections::BTreeSet<&str> =
+            self.drawn().flat_map(|d| d.runs.words()).collect();
+        // For what is compared, and for the legend.
+        words.extend([
+            "added", "removed", "changed", "faster", "slower", "silent", "w2", "w5",
+        ]);
         let mut out = classes::variables(self.style) + &classes::rules(self.style, &words);
         if let Some(dark) = self.dark {
             // Paper is white.
@@ -109,60 +153,113 @@ impl HtmlPage<'_> {
         out + &squeezed(LOOK)
     }
 
-    /// The graph as it is in the window at place `still`, which is what a reader without scripts sees.
-    fn graph(&self, runs: &Runs, still: usize) -> String {
-        let detail = ClassDetail {
-            is_fine: true,
-            has_names: true,
-        };
-        let graph = Classes::new(self.view, self.union, self.style, detail);
-        let window = u32::try_from(still).unwrap_or(0);
-        // A margin, and room around a small graph: three boxes as large as the screen are no pleasure.
-        let size = self.union.size;
-        let (w, h) = ((size.w + 24.0).max(860.0), (size.h + 24.0).max(480.0));
-        let (x, y) = ((size.w - w) / 2.0, (size.h - h) / 2.0);
-        let mut xml = Xml::with_capacity(1 << 16);
-        xml.open("svg")
-            .attribute("id", "graph")
-            .attribute("viewBox", format_args!("{x:.0} {y:.0} {w:.0} {h:.0}"))
-            .attribute("role", "img")
-            .attribute("aria-label", "Graph; every element is in the search");
-        graph.signs(&mut xml);
-        graph.spaces(&mut xml);
-        xml.open("g").attribute("id", "arrows");
-        for &arrow in &self.union.order {
-            let life = &runs.arrows[arrow];
-            graph.arrow(&mut xml, arrow, &Still { runs, life, window });
-        }
-        xml.close().open("g").attribute("id", "items");
-        for (item, life) in runs.items.iter().enumerate() {
-            graph.item(&mut xml, item, &Still { runs, life, window });
+    /// The badges, once for all drawings.
+    fn signs(&self) -> String {
+        let mut xml = Xml::default();
+        signs::badges(&mut xml, self.style);
+        xml.finish()
+    }
+
+    fn legend(&self) -> String {
+        let views: Vec<&View> = self.drawn().map(|d| d.view).collect();
+        let change = self.sequence.unfolded.map_or(0.25, |u| u.rate_change);
+        signs::legend(&views, change)
+    }
+
+    /// What the picture leaves out and what went wrong, a line each.
+    fn notes(&self) -> String {
+        let mut xml = Xml::default();
+        for notice in self.sequence.notices.iter() {
+            // The page has a font for everything, and all that is folded.
+            if notice.kind != NoticeKind::Glyph {
+                let times = match notice.count {
+                    0 | 1 => String::new(),
+                    n => format!(" ({n} times)"),
+                };
+                let text = format!("{}{times}", visible(&notice.text));
+                xml.open("li").text(&text).close();
+            }
         }
         xml.finish()
     }
 
+    fn graphs(&self, still: usize) -> String {
+        if let Some(overview) = self.overview {
+            return board(overview);
+        }
+        let mut xml = Xml::with_capacity(1 << 16);
+        let is_hidden = self.folded.is_some();
+        self.graph(&mut xml, &self.whole, ("graph", is_hidden), still);
+        if let Some(folded) = &self.folded {
+            self.graph(&mut xml, folded, ("folded", false), still);
+        }
+        xml.finish()
+    }
+
+    /// A graph as it is in the window at place `still`, which is what a reader without scripts sees.
+    fn graph(
+        &self,
+        xml: &mut Xml,
+        drawn: &PageGraph<'_>,
+        (id, is_hidden): (&str, bool),
+        still: usize,
+    ) {
+        let detail = ClassDetail {
+            is_fine: true,
+            has_names: true,
+        };
+        let graph = Classes::new(drawn.view, &drawn.union, self.style, detail);
+        let runs = &drawn.runs;
+        let window = u32::try_from(still).unwrap_or(0);
+        // A margin, and room around a small graph: three boxes as large as the screen are no pleasure.
+        let size = drawn.union.size;
+        let (w, h) = ((size.w + 24.0).max(860.0), (size.h + 24.0).max(480.0));
+        let (x, y) = ((size.w - w) / 2.0, (size.h - h) / 2.0);
+        xml.open("svg")
+            .attribute("id", id)
+            .attribute("class", "graph");
+        if is_hidden {
+            xml.attribute("hidden", "");
+        }
+        xml.attribute("viewBox", format_args!("{x:.0} {y:.0} {w:.0} {h:.0}"))
+            .attribute("role", "img")
+            .attribute("aria-label", "Graph; the search finds every element");
+        xml.open("g").attribute("class", "spaces");
+        graph.spaces(xml);
+        xml.close().open("g").attribute("class", "arrows");
+        for &arrow in &drawn.order {
+            let life = &runs.arrows[arrow];
+            graph.arrow(xml, arrow, &Still { runs, life, window });
+        }
+        xml.close().open("g").attribute("class", "items");
+        for (item, life) in runs.items.iter().enumerate() {
+            graph.item(xml, item, &Still { runs, life, window });
+        }
+        xml.close().close();
+    }
+
     fn place(&self, still: usize) -> String {
-        let count = self.view.frames.len();
-        let at = self.view.frames.get(still).map_or(0, |f| self.offset(f));
-        format!("window {} of {count} · {}", still + 1, words::offset(at))
-    }
-
-    /// Nanoseconds from the start of the first window to that of `frame`.
-    fn offset(&self, frame: &Frame) -> i64 {
-        let first = self.view.frames.first().unwrap_or(frame);
-        frame.span.start.since(first.span.start)
-    }
-
-    fn ticks(&self) -> String {
-        let (Some(first), Some(last)) = (self.view.frames.first(), self.view.frames.last()) else {
+        let frames = &self.whole.view.frames;
+        let (Some(first), Some(at)) = (frames.first(), frames.get(still)) else {
             return String::new();
         };
-        let whole = last.span.end.since(first.span.start);
-        let tick = |quarter: i64| {
-            let second = whole / 4_000_000_000 * quarter;
-            format!("<span>{}</span>", words::offset(second * 1_000_000_000))
+        let at = words::offset(at.span.start.since(first.span.start));
+        format!("window {} of {} · {at}", still + 1, frames.len())
+    }
+
+    /// The date at which it begins, how long it is, and in what it is divided.
+    fn when(&self) -> String {
+        let frames = &self.whole.view.frames;
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
+            return String::new();
         };
-        (0..=4).map(tick).collect()
+        let whole = last.span.end.since(first.span.start) / 1_000_000 * 1_000_000;
+        format!(
+            "{}, {} in {}",
+            words::date_and_clock(first.span.start.0),
+            words::offset(whole),
+            words::count(frames.len(), "window")
+        )
     }
 }
 
@@ -171,6 +268,8 @@ fn board(overview: &Overview) -> String {
     let still = svg::write(&overview.scene);
     let inside = still.split_once(">\n").map_or("", |(_, rest)| rest);
     let inside = inside.trim_end().strip_suffix("</svg>").unwrap_or(inside);
+    // The page has ids of its own.
+    let inside = inside.replace(" id=\"", " data-part=\"");
     let list = |of: &dyn Fn(&Rect) -> f64| {
         let all: Vec<String> = overview
             .heads
@@ -184,8 +283,8 @@ fn board(overview: &Overview) -> String {
         overview.heads.first().copied().unwrap_or_default(),
     );
     format!(
-        "<svg id=\"graph\" viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" aria-label=\"Topics over time\">{inside}<g id=\"arrows\"></g><g id=\"items\"></g>\
-         <rect id=\"head\" data-x=\"{}\" data-width=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"2\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/></svg>",
+        "<svg id=\"graph\" class=\"graph\" viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" aria-label=\"Topics over time\">{inside}\
+         <rect id=\"boardhead\" data-x=\"{}\" data-width=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"2\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/></svg>",
         size.w,
         size.h,
         list(&|h| h.x),
@@ -230,9 +329,10 @@ fn fonts() -> String {
     css
 }
 
-/// Without indentation, which readers of the files need and browsers do not.
+/// Without indentation, empty lines and lines of comments, which readers of the files need and browsers do not.
 fn squeezed(text: &str) -> String {
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let lines = text.lines().map(str::trim);
+    let lines = lines.filter(|line| !line.is_empty() && !line.starts_with("//"));
     lines.collect::<Vec<_>>().join("\n")
 }
 
@@ -266,9 +366,21 @@ mod tests {
     }
 
     #[test]
+    fn what_is_squeezed_keeps_its_words() {
+        let text = "// Why.\n\tlet a = 'b // c';\n\n\t\tb();\n";
+        assert_eq!(squeezed(text), "let a = 'b // c';\nb();");
+    }
+
+    #[test]
     fn the_players_files_stay_small() {
         let kib = |text: &str| text.len() as f64 / 1024.0;
-        assert!(kib(SCRIPT) <= 9.0, "player.js has {:.2} KiB", kib(SCRIPT));
-        assert!(kib(LOOK) <= 4.0, "player.css has {:.2} KiB", kib(LOOK));
+        let script = SCRIPT.map(squeezed).join("\n");
+        assert!(
+            kib(&script) <= 46.0,
+            "the script has {:.2} KiB",
+            kib(&script)
+        );
+        let look = squeezed(LOOK);
+        assert!(kib(&look) <= 10.5, "the look has {:.2} KiB", kib(&look));
     }
 }

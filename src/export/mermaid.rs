@@ -6,14 +6,14 @@ use std::fmt::Write as _;
 
 use crate::base::words;
 use crate::draw::style::Style;
-use crate::view::{Frame, ItemKind, Mark, Shown, View};
+use crate::view::{ItemKind, Mark, SeenWindow, Shown, View};
 
 /// One window as a flow chart. Ids are numbers, so that no name can break the syntax.
-pub(crate) fn chart(view: &View, style: &Style, frame: &Frame) -> String {
+pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
     let mut out = String::from("flowchart LR\n");
-    members(view, frame, &mut out, None, 1);
+    members(view, seen, &mut out, None, 1);
     let mut marked = String::new();
-    for (at, shown) in frame.arrows.iter().enumerate() {
+    for (at, shown) in seen.arrows.iter().enumerate() {
         let Some(arrow) = view.arrows.get(shown.id as usize) else {
             continue;
         };
@@ -46,7 +46,12 @@ pub(crate) fn chart(view: &View, style: &Style, frame: &Frame) -> String {
             body.fill, body.stroke, body.text
         );
     }
-    for class in ["added", "removed", "changed"] {
+    let changes = [
+        ("added", &style.added),
+        ("removed", &style.removed),
+        ("changed", &style.changed),
+    ];
+    for (class, change) in changes {
         let dash = if class == "removed" {
             ",stroke-dasharray:6 4"
         } else {
@@ -54,10 +59,16 @@ pub(crate) fn chart(view: &View, style: &Style, frame: &Frame) -> String {
         };
         let _ = writeln!(
             out,
-            "  classDef {class} stroke:{},stroke-width:3px{dash}",
-            colour(style, class)
+            "  classDef {class} fill:{},stroke:{},color:{},stroke-width:3px{dash}",
+            change.fill, change.color, change.text
         );
     }
+    let cluster = &style.cluster;
+    let _ = writeln!(
+        out,
+        "  classDef space fill:{},stroke:{},color:{}",
+        cluster.fill, cluster.stroke, cluster.text
+    );
     out + &marked
 }
 
@@ -70,7 +81,7 @@ fn colour(style: &Style, class: &str) -> String {
 }
 
 /// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
-fn members(view: &View, frame: &Frame, out: &mut String, home: Option<usize>, depth: usize) {
+fn members(view: &View, seen: &SeenWindow, out: &mut String, home: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
     for (at, space) in view
         .namespaces
@@ -79,16 +90,16 @@ fn members(view: &View, frame: &Frame, out: &mut String, home: Option<usize>, de
         .filter(|(_, s)| s.parent == home)
     {
         let mut inside = String::new();
-        members(view, frame, &mut inside, Some(at), depth + 1);
+        members(view, seen, &mut inside, Some(at), depth + 1);
         if !inside.is_empty() {
             let name = escaped(&space.name);
             let _ = write!(
                 out,
-                "{indent}subgraph s{at}[\"{name}\"]\n{inside}{indent}end\n"
+                "{indent}subgraph s{at}[\"{name}\"]\n{inside}{indent}end\n{indent}class s{at} space\n"
             );
         }
     }
-    for shown in &frame.items {
+    for shown in &seen.items {
         let Some(item) = view
             .items
             .get(shown.id as usize)
@@ -143,13 +154,14 @@ mod tests {
             &mission(&["/n/a>/n/t@2", "/n/a>/n/t@2 /b\"</n/t"]),
             &ViewOptions::default(),
         );
-        let text = chart(&view, &Style::builtin("light").unwrap(), &view.frames[1]);
+        let text = chart(&view, &Style::builtin("light").unwrap(), &view.seen(1));
         let want = [
             "flowchart LR",
             "  subgraph s0[\"/n\"]",
             "    i1([\"/n/a\"]):::node",
             "    i2[\"/n/t\"]:::topic",
             "  end",
+            "  class s0 space",
             "  i0([\"/b#34;\"]):::node",
             "  class i0 added",
             "  i1 -->|\"2 Hz\"| i2",

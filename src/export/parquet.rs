@@ -2,6 +2,8 @@
 //!
 //! Stamps are timestamps of nanoseconds in UTC, numbers keep their width, lists are lists.
 
+pub(crate) mod arrow;
+
 use std::io::{self, Write};
 use std::sync::Arc;
 

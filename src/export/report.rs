@@ -1,5 +1,6 @@
 //! A report in Markdown for a pull request or a job summary: what changed, when, drawn and in tables.
 
+mod changes;
 pub(crate) mod encoder;
 pub(crate) mod escape;
 mod graph;
@@ -8,6 +9,7 @@ mod tables;
 use std::fmt::Write as _;
 
 use crate::base::notice::Notices;
+use crate::base::time::Stamp;
 use crate::base::words;
 use crate::draw::style::{BUILTIN, Style};
 use crate::export::mermaid;
@@ -19,15 +21,19 @@ use escape::{address, plain};
 const MOST_CHANGES: usize = 96 << 10;
 const MOST_TABLE: usize = 40 << 10;
 const MOST_NOTICES: usize = 16 << 10;
-/// So many phrases are written out for one window; the rest is counted.
-const MOST_PHRASES: usize = 12;
 /// A chart of more characters than this is left out: GitHub's Mermaid stops at 50,000.
 const MOST_CHART: usize = 45_000;
 
+/// So many rows of a table are open; the rest folds.
+const MOST_OPEN: usize = 20;
+/// A chart of more edges than this is folded.
+const MOST_EDGES_OPEN: usize = 25;
+
 /// The report.
 pub(crate) fn report(sequence: &Sequence<'_>) -> String {
-    let (mission, view) = (sequence.mission, sequence.view);
-    let mut out = headline(sequence, view) + "\n\n";
+    let mission = sequence.mission;
+    let view = sequence.unfolded.map_or(sequence.view, |all| all.view);
+    let mut out = verdict(sequence, view) + "\n\n";
     let links = sequence.options.links.iter();
     let links: Vec<String> = links
         .map(|(name, url)| format!("[{}](<{}>)", plain(name), address(url)))
@@ -35,58 +41,93 @@ pub(crate) fn report(sequence: &Sequence<'_>) -> String {
     if !links.is_empty() {
         let _ = writeln!(out, "{}\n", links.join(" · "));
     }
-    out.push_str(&changes(view));
+    let times = ReportTimes {
+        start: view
+            .frames
+            .first()
+            .map_or(mission.span.start, |f| f.span.start),
+        player: sequence
+            .options
+            .links
+            .iter()
+            .find(|(name, _)| name == "player"),
+    };
+    out.push_str(&changes::phases(mission, &times));
+    out.push_str(&changes::table(mission, view, &times));
     out.push_str(&chart(view));
-    out.push_str(&tables::nodes(mission, MOST_TABLE));
-    out.push_str(&tables::topics(mission, MOST_TABLE));
+    out.push_str(&tables::nodes(mission, view, MOST_TABLE));
+    out.push_str(&tables::topics(mission, view, MOST_TABLE));
     out.push_str(&tables::evidence(mission));
     out.push_str(&notices(sequence.notices));
     out
 }
 
-/// The one line that says it all.
-fn headline(sequence: &Sequence<'_>, view: &View) -> String {
-    let title = sequence.picture.graph().map_or_else(
-        || {
-            sequence
-                .mission
-                .bags
-                .first()
-                .map_or(String::new(), |b| b.name.clone())
-        },
-        |whole| whole.title.to_owned(),
-    );
-    let mut out = format!("**{}**: ", plain(&title));
+/// How a time is written: as a link into the player where one is known.
+struct ReportTimes<'a> {
+    start: Stamp,
+    player: Option<&'a (String, String)>,
+}
+
+impl ReportTimes<'_> {
+    fn told(&self, at: Stamp) -> String {
+        let millis = at.since(self.start).div_euclid(1_000_000);
+        let text = words::offset_seconds(millis * 1_000_000);
+        match self.player {
+            None => text,
+            Some((_, url)) => {
+                let page = url.split('#').next().unwrap_or(url);
+                format!("[{text}](<{}#t={}>)", address(page), millis as f64 / 1e3)
+            }
+        }
+    }
+}
+
+/// The first lines: what happened, and in what.
+fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
+    let title = title(sequence);
     let (Some(first), Some(last)) = (view.frames.first(), view.frames.last()) else {
-        return out + "no windows.";
+        return format!("**{}**: no windows.", plain(&title));
     };
-    let span = last.span.end.since(first.span.start) / 1_000_000 * 1_000_000;
-    let _ = write!(
-        out,
-        "{} from {} in {} of {}; ",
-        words::offset(span),
-        first
-            .span
-            .start
-            .rfc3339()
-            .unwrap_or_else(|| first.span.start.to_string()),
-        words::count(view.frames.len(), "window"),
-        words::period(first.span.nanos())
-    );
+    let counts = view
+        .frames
+        .iter()
+        .fold(Counts::default(), |sum, f| sum + f.counts);
+    let told = told(&counts);
+    let said = if told.is_empty() {
+        "nothing changed".to_owned()
+    } else {
+        told.join(", ")
+    };
     let changed = (0..view.frames.len())
         .filter(|k| view.is_changed(*k))
         .count();
-    if changed == 0 {
-        return out + "nothing changed.";
-    }
-    let told = told(
-        &view
-            .frames
-            .iter()
-            .fold(Counts::default(), |sum, f| sum + f.counts),
-    );
-    let _ = write!(out, "changes in {changed}: {}.", told.join(", "));
-    out
+    let lengths = words::period(first.span.nanos());
+    format!(
+        "**{}**: {said}.\n\n{} from {}, looked at in {} of {lengths}{}.",
+        plain(&title),
+        words::duration(last.span.end.since(first.span.start)),
+        words::date_and_clock(first.span.start.0),
+        words::count(view.frames.len(), "window"),
+        if changed == 0 {
+            String::new()
+        } else {
+            format!(", of which {changed} changed something")
+        },
+    )
+}
+
+fn title(sequence: &Sequence<'_>) -> String {
+    let bag = || {
+        sequence
+            .mission
+            .bags
+            .first()
+            .map_or(String::new(), |b| b.name.clone())
+    };
+    sequence
+        .picture
+        .graph()
+        .map_or_else(bag, |whole| whole.title.to_owned())
 }
 
 /// What the headlines of all windows count, in words.
@@ -94,8 +135,8 @@ fn told(counts: &Counts) -> Vec<String> {
     let all = [
         (counts.nodes_added, "node", " started"),
         (counts.nodes_removed, "node", " stopped"),
-        (counts.restarted, "restart", ""),
-        (counts.handed_over, "hand-over", ""),
+        (counts.restarted, "node", " restarted"),
+        (counts.handed_over, "topic", " changed hands"),
         (counts.silent, "silence", ""),
         (counts.topics_added, "topic", " appeared"),
         (counts.topics_removed, "topic", " vanished"),
@@ -110,45 +151,32 @@ fn told(counts: &Counts) -> Vec<String> {
         .collect()
 }
 
-fn changes(view: &View) -> String {
-    let start = view.frames.first().map(|f| f.span.start);
-    let frames = view.frames.iter().filter(|f| !f.headlines.is_empty());
-    let rows = frames.map(|frame| {
-        let at = start.map_or(0, |s| frame.span.start.since(s)) / 1_000_000 * 1_000_000;
-        let words = frame.words(MOST_PHRASES);
-        format!(
-            "| {} | {} | {} |\n",
-            words::offset(at),
-            frame.index + 1,
-            plain(&words)
-        )
-    });
-    let table = tables::table(&["Time", "Window", "What changed"], rows, MOST_CHANGES);
-    table.map_or(String::new(), |table| table + "\n")
-}
-
 fn chart(view: &View) -> String {
-    let Some((frame, left_out)) = graph::changed(view) else {
+    let Some((seen, left_out)) = graph::changed(view) else {
         return String::new();
     };
     // The picture's own style may be dark; Markdown is read on any ground.
     let Ok(style) = Style::builtin(BUILTIN[0].0) else {
         return String::new();
     };
-    let chart = mermaid::chart(view, &style, &frame);
+    let chart = mermaid::chart(view, &style, &seen);
     if chart.len() > MOST_CHART {
         return "The graph of what changed is too large for Markdown.\n\n".to_owned();
     }
-    let mut out = String::from("What changed, and what stands beside it:\n\n");
-    let _ = writeln!(out, "```mermaid\n{}\n```\n", chart.trim_end());
+    let mut out = format!("```mermaid\n{}\n```\n\n", chart.trim_end());
+    out += "Solid green is there at the end and was not at first, dashed orange the other way round; purple changed in between.\n";
     if left_out > 0 {
         let _ = writeln!(
             out,
-            "{} more left out of the graph.\n",
+            "\n{} left out of the graph.",
             words::count(left_out, "edge")
         );
     }
-    out
+    let edges = words::count(seen.arrows.len(), "edge");
+    if seen.arrows.len() > MOST_EDGES_OPEN {
+        return tables::folded(&format!("What changed, drawn ({edges})"), &out);
+    }
+    format!("What changed, and what it is connected to:\n\n{out}\n")
 }
 
 fn notices(notices: &Notices) -> String {

@@ -3,6 +3,7 @@
 pub use super::options::SequenceOptions;
 
 pub use crate::draw::board::Overview;
+pub use crate::draw::figure::course::LifeLines;
 
 use crate::base::notice::Notices;
 use crate::draw::board::Board;
@@ -66,6 +67,19 @@ impl Drawings for Board<'_> {
     }
 }
 
+/// Everything one by one, whatever the picture draws as one: what pages and reports hold.
+#[derive(Clone, Copy)]
+pub struct Unfolded<'a> {
+    /// All of it.
+    pub view: &'a View,
+    /// What draws it, if anything does.
+    pub picture: Option<&'a dyn Drawings>,
+    /// Who lived when.
+    pub lives: Option<&'a LifeLines>,
+    /// From which relative change of a rate on it is told.
+    pub rate_change: f64,
+}
+
 /// A mission ready to be shown.
 #[derive(Clone)]
 pub struct Sequence<'a> {
@@ -81,6 +95,8 @@ pub struct Sequence<'a> {
     pub view: &'a View,
     /// What draws a window.
     pub picture: &'a dyn Drawings,
+    /// The same with everything opened, where an output needs it.
+    pub unfolded: Option<Unfolded<'a>>,
     /// What turns a drawing into pixels.
     pub painter: &'a Painter,
     /// What is written with.

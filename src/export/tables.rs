@@ -102,6 +102,17 @@ impl Encoder for Tables<'_> {
     }
 }
 
+/// Every table of a mission by its word, whole.
+#[cfg(feature = "parquet")]
+pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
+    let fill = |table: &Table| {
+        let mut batch = Batch::new(table.columns);
+        (table.fill)(mission, &mut |row: &[TableCell<'_>]| batch.push(row));
+        (table.word, batch)
+    };
+    TABLES.iter().map(fill).collect()
+}
+
 /// How many rows are gathered before they are written.
 const MOST_ROWS: usize = 4096;
 

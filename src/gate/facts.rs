@@ -17,7 +17,7 @@ use crate::mission::Mission;
 use crate::mission::activity::is_hidden_node;
 use crate::mission::ledger::{Entry, Kind};
 
-pub(crate) use tempo::{Rate, Silence};
+pub(crate) use tempo::{Rate, TopicSilence};
 
 /// Robots are shut down before their recorder is: what ends so shortly before the mission does, stays.
 pub(crate) const SHUTDOWN_NS: i64 = 5_000_000_000;

@@ -119,8 +119,7 @@ pub(crate) const KINDS: &[(Kind, &str, &str, &str)] = &[
         Kind::TopicGap,
         "topic-gap",
         "A topic was silent for longer than allowed.",
-        "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`. \
-         Of a mission in JSON only what lies within windows is known.",
+        "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`.",
     ),
     (
         Kind::PublisherMissing,

@@ -1,4 +1,4 @@
-//! Names with blanks: `*` stands for any characters but `/`, `**` for any at all, `?` for one that is not `/`.
+//! Patterns with blanks: `*` stands for any characters but `/`, `**` for any at all, `?` for one that is not `/`.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -86,12 +86,12 @@ impl Pattern {
 
 /// Many names and patterns, of which somebody asks whether a name is one of them.
 #[derive(Debug, Default)]
-pub(crate) struct Names<'a> {
+pub(crate) struct NamePatterns<'a> {
     exact: BTreeSet<&'a str>,
     patterns: Vec<&'a Pattern>,
 }
 
-impl<'a> FromIterator<&'a Pattern> for Names<'a> {
+impl<'a> FromIterator<&'a Pattern> for NamePatterns<'a> {
     fn from_iter<I: IntoIterator<Item = &'a Pattern>>(all: I) -> Self {
         let mut names = Self::default();
         for pattern in all {
@@ -105,7 +105,7 @@ impl<'a> FromIterator<&'a Pattern> for Names<'a> {
     }
 }
 
-impl Names<'_> {
+impl NamePatterns<'_> {
     /// Whether one of them stands for this name.
     pub(crate) fn hold(&self, name: &str) -> bool {
         self.exact.contains(name) || self.patterns.iter().any(|p| p.matches(name))
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn many_names_hold_what_one_of_them_stands_for() {
         let all = ["/a", "/cam_*", "/b"].map(Pattern::new);
-        let names: Names<'_> = all.iter().collect();
+        let names: NamePatterns<'_> = all.iter().collect();
         let held = ["/a", "/b", "/cam_1", "/c", "/cam_1/x"].map(|name| names.hold(name));
         assert_eq!(held, [true, true, true, false, false]);
     }

@@ -3,9 +3,11 @@
 
 mod column;
 mod row;
+mod walk;
 
 pub(crate) use column::{Column, ColumnCursor, ColumnWriter};
 pub(crate) use row::{Number, Row};
+pub(crate) use walk::ColumnWalk;
 
 use std::sync::Arc;
 
@@ -76,6 +78,17 @@ impl Graphs {
     /// The lifecycle state that a row names.
     pub(crate) fn lifecycle(&self, row: &Row) -> Option<&str> {
         self.lifecycle_of(row.lifecycle)
+    }
+
+    /// The same, to be kept.
+    pub(crate) fn lifecycle_word(&self, row: &Row) -> Option<Arc<str>> {
+        let place = (row.lifecycle as usize).checked_sub(1)?;
+        self.lifecycles.get(place).map(Arc::clone)
+    }
+
+    /// Goes through all windows, telling only what differs from the window before.
+    pub(crate) fn walk(&self) -> ColumnWalk<'_> {
+        ColumnWalk::new([&self.nodes, &self.topics, &self.publishes, &self.subscribes])
     }
 
     /// The lifecycle state of a place, counted from 1.

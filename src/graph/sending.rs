@@ -95,13 +95,13 @@ impl SendingRuns {
 
 /// The longest pauses of one sequence of messages, as it is heard.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Pauses {
+pub(crate) struct LongestPauses {
     last: Option<Stamp>,
     /// By length; the shortest is the first to go.
     longest: BinaryHeap<Reverse<(i64, Stamp)>>,
 }
 
-impl Pauses {
+impl LongestPauses {
     /// Takes the next message.
     pub(crate) fn hear(&mut self, time: Stamp) {
         let Some(last) = self.last.replace(time) else {
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_longest_pauses_are_kept_in_order() {
-        let mut pauses = Pauses::default();
+        let mut pauses = LongestPauses::default();
         let mut at = 0;
         // 1 to 40 ns, the long ones early.
         for pause in (1..=40).rev() {

@@ -15,6 +15,7 @@ pub use figure::FigureInfo;
 use figure::figures;
 pub(crate) use survey::survey_table;
 pub use survey::{SurveyRow, survey_text};
+pub(crate) use text::how_many;
 pub use text::text;
 pub use why::why;
 

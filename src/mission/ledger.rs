@@ -30,6 +30,20 @@ const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
 pub type EntryId = u32;
 
 /// Everything that happened, and the phases in which it did.
+///
+/// ```
+/// use bagreel::values::Kind;
+/// use bagreel::{Reading, read};
+///
+/// let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+/// let mission = read(&Reading::of([bag]))?;
+/// for (_, entry) in mission.ledger.headlines(mission.span) {
+///     println!("{} s: {}", mission.offset(entry.time) / 1_000_000_000, entry.kind.word());
+/// }
+/// let started = mission.ledger.entries.iter().filter(|e| e.kind == Kind::Started);
+/// # assert!(started.count() > 0);
+/// # Ok::<(), bagreel::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Ledger {

@@ -100,6 +100,18 @@ fn configuration(
     from: usize,
     to: usize,
 ) -> Configuration {
+    Configuration {
+        names: majority(activity, present, (from, to)),
+        senders: senders(elements, &activity.cells[from..to]),
+    }
+}
+
+/// What is there in at least half of these cells.
+fn majority(
+    activity: &Activity,
+    present: &[Presence],
+    (from, to): (usize, usize),
+) -> BTreeSet<Arc<str>> {
     let topics = is_topics(present);
     let cells = &activity.cells[from..to];
     let whole: i64 = cells.iter().map(|c| c.span.nanos()).sum();
@@ -110,33 +122,34 @@ fn configuration(
     };
     let counted = |p: &&Presence| p.counts(topics);
     let names = present.iter().filter(counted).filter(is_there);
-    Configuration {
-        names: names.map(|p| p.subject.name()).collect(),
-        senders: senders(elements, cells),
-    }
+    names.map(|p| p.subject.name()).collect()
 }
 
 /// Who sends more than half of a topic's messages in these cells.
 fn senders(elements: &Elements, cells: &[Cell]) -> BTreeMap<TopicId, Arc<str>> {
-    let mut sent: BTreeMap<TopicId, BTreeMap<Arc<str>, u64>> = BTreeMap::new();
-    let mut all: BTreeMap<TopicId, u64> = BTreeMap::new();
+    let mut all = vec![0_u64; elements.topics.len()];
+    let mut counts = vec![0_u64; elements.publishes.len()];
     for cell in cells {
         for topic in &cell.graph.topics {
-            *all.entry(topic.id).or_default() += topic.count;
+            if let Some(sum) = all.get_mut(topic.id as usize) {
+                *sum = sum.saturating_add(topic.count);
+            }
         }
         for edge in &cell.graph.publishes {
-            let Some(of) = elements.publishes.get(edge.id as usize) else {
-                continue;
-            };
-            let node = elements.nodes.get(of.node as usize);
-            if let (Some(node), Some(count)) = (node, edge.count.filter(|n| *n > 0)) {
-                let role = Arc::clone(&node.role);
-                *sent.entry(of.topic).or_default().entry(role).or_default() += count;
+            if let Some(sum) = counts.get_mut(edge.id as usize) {
+                *sum = sum.saturating_add(edge.count.unwrap_or(0));
             }
         }
     }
+    let mut sent: BTreeMap<TopicId, BTreeMap<Arc<str>, u64>> = BTreeMap::new();
+    for (edge, count) in elements.publishes.iter().zip(counts).filter(|s| s.1 > 0) {
+        if let Some(node) = elements.nodes.get(edge.node as usize) {
+            let of = sent.entry(edge.topic).or_default();
+            *of.entry(Arc::clone(&node.role)).or_default() += count;
+        }
+    }
     let main = |(topic, of): (TopicId, BTreeMap<Arc<str>, u64>)| {
-        let whole = all.get(&topic).copied().unwrap_or(0);
+        let whole = all.get(topic as usize).copied().unwrap_or(0);
         let found = of.into_iter().find(|(_, n)| n * 2 > whole);
         found.map(|(role, _)| (topic, role))
     };
@@ -171,8 +184,8 @@ fn differing(
     (before, after): ((usize, usize), (usize, usize)),
     cell: Stamp,
 ) -> Option<Stamp> {
-    let old = configuration(elements, activity, present, before.0, before.1).names;
-    let new = configuration(elements, activity, present, after.0, after.1).names;
+    let old = majority(activity, present, before);
+    let new = majority(activity, present, after);
     let around = AROUND.0.max(activity.span().nanos() / AROUND.1);
     let near = |at: &Stamp| at.since(cell).abs() <= around;
     let topics = is_topics(present);

@@ -21,7 +21,10 @@ pub(super) struct Collected {
 
 /// Reads every bag once; with `verify` by the second, independent reader.
 pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) -> Result<Collected> {
-    let options = OpenOptions { verify };
+    let options = OpenOptions {
+        verify,
+        ..OpenOptions::default()
+    };
     let (inputs, twice) = each_once(&reading.inputs)?;
     let mut readers = bag::open_each(inputs, &options).collect::<Result<Vec<_>>>()?;
     let cut = reading.division.start.is_some() || reading.division.end.is_some();
@@ -56,7 +59,9 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
 fn affordable(reading: &Reading) -> collector::CollectOptions {
     let mut options = reading.collect.clone();
     let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
-    if sizes.fold(0, u64::saturating_add) > options.payload_bytes {
+    let is_far = |input: &Input| matches!(input, Input::Url(_));
+    let is_large = sizes.fold(0, u64::saturating_add) > options.payload_bytes;
+    if is_large || reading.inputs.iter().any(is_far) {
         options.payload_bytes = 0;
     }
     options
@@ -69,6 +74,7 @@ fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     for input in inputs {
         let real = match input {
             Input::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
+            Input::Url(url) => PathBuf::from(url),
             Input::Stdin => PathBuf::from("-"),
         };
         if seen.insert(real) {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use super::draw::{Body, Composed, compose, places, unplaced, unseen};
-use super::{Drawing, Phases, Reading, Stage, Watch, read};
+use super::{Drawing, Phases, Reading, Stage, Watch, read, unfolded};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -16,7 +16,7 @@ use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Strip, StripSource, strip};
 use crate::export::options::{self, Choice, FigureOptions};
 use crate::export::run;
-use crate::export::sequence::Sequence;
+use crate::export::sequence::{Drawings, Sequence, Unfolded};
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::graph::window::default_period;
 use crate::mission::Mission;
@@ -87,7 +87,7 @@ pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {
         Input::Path(path) => Some(path),
-        Input::Stdin => None,
+        Input::Url(_) | Input::Stdin => None,
     });
     let kept: Vec<PathBuf> = inputs.chain(&job.kept).cloned().collect();
     export::check(&job.outputs, &kept)
@@ -153,6 +153,11 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     let nothing = View::default();
     let drawn = if is_drawn { &view } else { &nothing };
     let picture = Measured::new(drawn, &drawing.style, &drawing.fonts, page).with(layout);
+    let opened = unfolded::opened(&mission, &drawing, &job.outputs);
+    let opened_picture = opened
+        .as_ref()
+        .and_then(|view| unfolded::drawn(view, &drawing, &job.outputs));
+    let lives = opened.as_ref().map(|_| unfolded::lives(&mission, &drawing));
     let strip = match figure {
         Some(_) => None,
         None => side_by_side(job, &mission, &view, &picture)?,
@@ -170,6 +175,12 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
         notices: &all,
         view: &view,
         picture: &picture,
+        unfolded: opened.as_ref().map(|view| Unfolded {
+            view,
+            picture: opened_picture.as_ref().map(|p| p as &dyn Drawings),
+            lives: lives.as_ref(),
+            rate_change: drawing.page.rate_change,
+        }),
         painter: &Painter::new(&drawing.fonts),
         fonts: &drawing.fonts,
         strip: match &figure {
@@ -289,6 +300,7 @@ fn show_board(
     all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
     let overview = board.overview();
     let viewed = job.is_filtered.then(|| filtered(&mission, options));
+    let lives = unfolded::lives(&mission, drawing);
     let sequence = Sequence {
         mission: &mission,
         data: viewed.as_ref().unwrap_or(&mission),
@@ -296,6 +308,12 @@ fn show_board(
         notices: &all,
         view,
         picture: &board,
+        unfolded: Some(Unfolded {
+            view,
+            picture: None,
+            lives: Some(&lives),
+            rate_change: drawing.page.rate_change,
+        }),
         painter: &Painter::new(&drawing.fonts),
         fonts: &drawing.fonts,
         strip: Some(&overview.scene),

@@ -91,11 +91,7 @@ impl Extract {
 
     /// As [`Extract::open`]; what flows by cannot be read twice.
     fn open_files(&self) -> Result<Vec<Box<dyn Reader>>> {
-        let flows = |input: &Input| match input {
-            Input::Stdin => true,
-            Input::Path(path) => path.exists() && !path.is_file() && !path.is_dir(),
-        };
-        if self.inputs.iter().any(flows) {
+        if self.inputs.iter().any(Input::is_pipe) {
             return Err(Error::usage(
                 "a bag that flows by tells only at its end when it began and ended",
                 "save it to a file first, or leave `--start` and `--end` out",
@@ -130,7 +126,7 @@ fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
 }
 
 /// The first and the last time of all messages.
-struct Bounds(Option<Span>);
+pub(super) struct Bounds(pub(super) Option<Span>);
 
 impl Sink for Bounds {
     fn connection(&mut self, _: &Connection) -> Want {

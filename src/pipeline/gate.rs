@@ -250,7 +250,7 @@ fn paths(readings: &[Reading]) -> Vec<PathBuf> {
     let inputs = readings.iter().flat_map(|reading| &reading.inputs);
     let paths = inputs.filter_map(|input| match input {
         Input::Path(path) => Some(path.clone()),
-        Input::Stdin => None,
+        Input::Url(_) | Input::Stdin => None,
     });
     paths
         .filter(|path| path.as_path() != Path::new(""))

@@ -68,9 +68,9 @@ impl Default for Reading {
 }
 
 impl Reading {
-    /// Bags of one mission by their paths, or one mission's own JSON, with every option as the command line has it.
+    /// Bags of one mission by their paths or URLs, or one mission's own JSON, with every option as the command line has it.
     pub fn of<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
-        let inputs = paths.into_iter().map(|path| Input::Path(path.into()));
+        let inputs = paths.into_iter().map(|path| Input::parse(path.into()));
         Self {
             inputs: inputs.collect(),
             ..Self::default()

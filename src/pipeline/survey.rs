@@ -50,8 +50,7 @@ pub struct Survey {
 /// # Errors
 /// If the folder itself cannot be read or holds no bag.
 pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result<Survey> {
-    let mut bags = Vec::new();
-    find(folder, DEEPEST, &mut bags)?;
+    let bags = recordings(folder)?;
     if bags.is_empty() {
         let hint = "give a bag, a rosbag2 folder, or a folder with bags below it".to_owned();
         return Err(Error::UnknownBag {
@@ -92,6 +91,16 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
     };
     let rows = bags.into_iter().map(row).collect();
     Ok(Survey { rows, skipped })
+}
+
+/// Every recording below `folder`, a path each, in order of names; the folder itself where it is one.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub(super) fn recordings(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut bags = Vec::new();
+    find(folder, DEEPEST, &mut bags)?;
+    Ok(bags)
 }
 
 /// Adds every recording in `folder` in order of names: the folder itself where it is one, each other file that is a

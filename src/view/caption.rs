@@ -273,12 +273,14 @@ mod tests {
 
     #[test]
     fn a_hand_over_is_told_once() {
-        let frame = last(&["/planner>/cmd_vel@2 /teleop", "/planner /teleop>/cmd_vel@2"]);
+        let windows = ["/planner>/cmd_vel@2 /teleop", "/planner /teleop>/cmd_vel@2"];
+        let (view, _) = view(&mission(&windows), &ViewOptions::default());
+        let (frame, seen) = (&view.frames[1], view.seen(1));
         assert_eq!(
             frame.words(usize::MAX),
             "/cmd_vel handed over from /planner to /teleop"
         );
-        let topic = frame.items.last().unwrap();
+        let topic = seen.items.last().unwrap();
         assert_eq!(
             (topic.mark, frame.counts.handed_over),
             (Some(Mark::HandedOver), 1)

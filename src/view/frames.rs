@@ -3,48 +3,212 @@
 use super::caption::Speaker;
 use super::items::Viewed;
 use super::lives::{Alive, ItemTurns};
-use super::marks::{News, Told};
-use super::settle::settle;
-use super::state::{LivingItems, States, present};
+use super::marks::{News, Parts, Told};
+use super::settle::{Lengths, settled};
+use super::showing::{Showing, ShowingWriter};
+use super::state::{LivingItems, Now};
 use super::{ArrowKind, Attendance, Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
 use crate::graph::Element;
-use crate::mission::Mission;
+use crate::mission::{Mission, Window};
 
-/// The windows one after the other.
-pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Vec<Frame> {
+/// The windows, and what becomes of each item and arrow in them.
+#[derive(Default)]
+pub(crate) struct Frames {
+    pub(crate) list: Vec<Frame>,
+    pub(crate) items: Vec<Showing>,
+    pub(crate) arrows: Vec<Showing>,
+}
+
+/// The windows one after the other. Where nothing is told, only what has other numbers is looked at.
+pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Frames {
+    let mut stage = ShownWindows::new(mission, options, viewed);
     let speaker = Speaker::new(mission, viewed);
-    let lives = ItemTurns::new(mission);
-    let parts = mission.ledger.all_parts();
-    let mut frames = Vec::with_capacity(mission.windows.len());
-    for (window, graph) in mission.each() {
-        let span = window.span;
-        let alive = lives.during(span);
-        let paused = lives.paused(span, &alive);
-        let now = present(&graph, options, viewed, (&alive, &paused));
-        let (before, after) = (lives.before(span.start), lives.before(span.end));
-        let turn = WindowTurn {
-            before: LivingItems::of(viewed, &before),
-            after: LivingItems::of(viewed, &after),
-            news: News::new(&mission.ledger, &parts, span, viewed),
-        };
-        let items = turn.items(viewed, now.0);
-        let arrows = turn.arrows(viewed, now.1, &items);
-        frames.push(Frame {
+    let mut walk = mission.graphs.walk();
+    let mut list = Vec::with_capacity(mission.windows.len());
+    let turns = turns(mission);
+    for ((at, window), has_turn) in (0..).zip(&mission.windows).zip(turns) {
+        walk.next(|what, row| stage.hear(what, row));
+        let hides = stage.now.hides_the_silent() && stage.is_touched();
+        if has_turn || hides || stage.now.is_other_length(window.span) {
+            stage.turn(at, window);
+        } else {
+            stage.go_on(at);
+        }
+        let told = std::mem::take(&mut stage.turn.news.headlines);
+        list.push(Frame {
             index: window.index,
-            span,
+            span: window.span,
             partial: window.partial,
             messages: window.messages,
-            counts: Counts::of(&turn.news.headlines),
-            caption: speaker.caption(&turn.news.headlines),
-            headlines: turn.news.headlines,
-            rolls: rolls(viewed, &before, &after, window.index == 0),
-            items,
-            arrows,
+            counts: Counts::of(&told),
+            caption: speaker.caption(&told),
+            headlines: told,
+            rolls: stage.rolls.clone(),
         });
     }
-    settle(&mut frames, viewed.items.len(), |frame| &mut frame.items);
-    settle(&mut frames, viewed.arrows.len(), |frame| &mut frame.arrows);
-    frames
+    let lengths = Lengths::new(mission.windows.iter().map(|w| w.span));
+    Frames {
+        list,
+        items: stage.items.finish(&lengths),
+        arrows: stage.arrows.finish(&lengths),
+    }
+}
+
+/// For each window whether anything is told in it or ends its being told: all else in between stays as it is.
+fn turns(mission: &Mission) -> Vec<bool> {
+    let windows = &mission.windows;
+    let mut turns = vec![false; windows.len()];
+    let entries = mission.ledger.entries.iter();
+    let times = entries.flat_map(|entry| [Some(entry.time), entry.until]);
+    for time in times.flatten() {
+        let from = windows.partition_point(|w| w.span.end <= time);
+        let to = windows.partition_point(|w| w.span.start <= time) + 1;
+        for turn in turns.iter_mut().take(to).skip(from) {
+            *turn = true;
+        }
+    }
+    if let Some(first) = turns.first_mut() {
+        *first = true;
+    }
+    turns
+}
+
+/// What is shown, window by window.
+struct ShownWindows<'a> {
+    mission: &'a Mission,
+    viewed: &'a Viewed,
+    lives: ItemTurns<'a>,
+    parts: Parts,
+    now: Now<'a>,
+    turn: WindowTurn,
+    rolls: Vec<Vec<Attendance>>,
+    items: Cast,
+    arrows: Cast,
+}
+
+/// The items, or the arrows: what was shown of each so far.
+#[derive(Default)]
+struct Cast {
+    shown: Vec<ShowingWriter>,
+    /// Those with other numbers than in the window before.
+    touched: Vec<u32>,
+    is_touched: Vec<bool>,
+}
+
+impl Cast {
+    fn new(count: usize) -> Self {
+        Self {
+            shown: (0..count).map(|_| ShowingWriter::default()).collect(),
+            touched: Vec::new(),
+            is_touched: vec![false; count],
+        }
+    }
+
+    fn touch(&mut self, id: u32) {
+        if let Some(is_touched) = self.is_touched.get_mut(id as usize)
+            && !std::mem::replace(is_touched, true)
+        {
+            self.touched.push(id);
+        }
+    }
+
+    fn take_touched(&mut self) -> Vec<u32> {
+        let all = std::mem::take(&mut self.touched);
+        for id in &all {
+            self.is_touched[*id as usize] = false;
+        }
+        all
+    }
+
+    fn show(&mut self, window: u32, id: u32, shown: Option<Shown>) {
+        if let Some(writer) = self.shown.get_mut(id as usize) {
+            writer.show(window, shown);
+        }
+    }
+
+    fn finish(self, lengths: &Lengths) -> Vec<Showing> {
+        let all = self.shown.into_iter();
+        all.map(|raw| settled(&raw.finish(), lengths)).collect()
+    }
+}
+
+impl<'a> ShownWindows<'a> {
+    fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
+        Self {
+            mission,
+            viewed,
+            lives: ItemTurns::new(mission),
+            parts: mission.ledger.all_parts(),
+            now: Now::new(mission, options, viewed),
+            turn: WindowTurn::default(),
+            rolls: Vec::new(),
+            items: Cast::new(viewed.items.len()),
+            arrows: Cast::new(viewed.arrows.len()),
+        }
+    }
+
+    fn hear(&mut self, what: Element, row: Option<crate::graph::Row>) {
+        self.now.hear(what, row);
+        let (item, arrows) = self.now.shown_by(what);
+        if let Some(item) = item {
+            self.items.touch(item);
+        }
+        for arrow in arrows {
+            self.arrows.touch(*arrow);
+        }
+    }
+
+    fn is_touched(&self) -> bool {
+        !(self.items.touched.is_empty() && self.arrows.touched.is_empty())
+    }
+
+    /// Shows a window in which something is told, or was in the one before.
+    fn turn(&mut self, at: u32, window: &Window) {
+        let span = window.span;
+        let alive = self.lives.during(span);
+        let paused = self.lives.paused(span, &alive);
+        let (before, after) = (self.lives.before(span.start), self.lives.before(span.end));
+        self.now.live(span, alive, paused);
+        self.turn = WindowTurn {
+            before: LivingItems::of(self.viewed, &before),
+            after: LivingItems::of(self.viewed, &after),
+            news: News::new(&self.mission.ledger, &self.parts, span, self.viewed),
+        };
+        self.rolls = rolls(self.viewed, &before, &after, window.index == 0);
+        self.items.take_touched();
+        self.arrows.take_touched();
+        let items = self.turn.items(self.viewed, &self.now);
+        let arrows = self.turn.arrows(self.viewed, &self.now, &items);
+        for (id, shown) in (0..).zip(arrows) {
+            self.arrows.show(at, id, shown);
+        }
+        for (id, shown) in (0..).zip(items) {
+            self.items.show(at, id, shown.marked);
+        }
+    }
+
+    /// Shows a window in which nothing is told, after one in which nothing was: who is there stays so.
+    fn go_on(&mut self, at: u32) {
+        for who in self.rolls.iter_mut().flatten() {
+            *who = match who {
+                Attendance::Joined | Attendance::Here => Attendance::Here,
+                Attendance::Left | Attendance::Away => Attendance::Away,
+            };
+        }
+        for id in self.items.take_touched() {
+            let is_there = self.turn.after.items[id as usize];
+            let shown = is_there.then(|| self.now.item(id)).flatten();
+            self.items.show(at, id, shown);
+        }
+        for id in self.arrows.take_touched() {
+            let arrow = &self.viewed.arrows[id as usize];
+            let is_item = |id: u32| self.turn.after.items[id as usize];
+            let ends = is_item(arrow.from) && is_item(arrow.to);
+            let is_there = ends && self.turn.after.arrows[id as usize];
+            let shown = is_there.then(|| self.now.arrow(id)).flatten();
+            self.arrows.show(at, id, shown);
+        }
+    }
 }
 
 /// Who of each fleet is there, given who lives before and after the window.
@@ -74,57 +238,59 @@ fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<
 }
 
 /// What is there before and after a window, and what is told in between.
+#[derive(Default)]
 struct WindowTurn {
     before: LivingItems,
     after: LivingItems,
     news: News,
 }
 
+/// An item in a window in which something is told.
+struct Marked {
+    /// Whether anything of it lives.
+    is_there: bool,
+    marked: Option<Shown>,
+}
+
 impl WindowTurn {
-    fn items(&self, viewed: &Viewed, now: States) -> Vec<Shown> {
-        let mut items = Vec::new();
-        for shown in now.into_iter().flatten() {
-            let at = shown.id as usize;
+    fn items(&self, viewed: &Viewed, now: &Now<'_>) -> Vec<Marked> {
+        let ids = (0..).zip(&viewed.items);
+        let item = |(id, item): (u32, &super::Item)| {
+            let shown = now.item(id);
+            let at = id as usize;
             let there = (self.before.items[at], self.after.items[at]);
-            let told = self.news.items.get(&shown.id);
-            if let Some(mut shown) = marked(shown, there, told) {
-                let is_folded = viewed.items[at].kind == ItemKind::Namespace;
-                shown.inside = is_folded.then(|| self.inside(&shown)).flatten();
-                items.push(shown);
+            Marked {
+                is_there: shown.is_some(),
+                marked: shown.and_then(|shown| {
+                    let mut shown = marked(shown, there, self.news.items.get(&id))?;
+                    let is_folded = item.kind == ItemKind::Namespace;
+                    shown.inside = is_folded.then(|| self.inside(&shown)).flatten();
+                    Some(shown)
+                }),
             }
-        }
-        items
+        };
+        ids.map(item).collect()
     }
 
     /// An arrow comes and goes with its ends, if nothing is told of itself.
-    fn arrows(&self, viewed: &Viewed, now: States, items: &[Shown]) -> Vec<Shown> {
-        let end = |id: u32| {
-            let at = items.binary_search_by_key(&id, |s| s.id).ok()?;
-            items.get(at)
-        };
-        let mut arrows = Vec::new();
-        for shown in now.into_iter().flatten() {
-            let at = shown.id as usize;
-            let told = self.news.arrows.get(&shown.id).cloned();
-            let arrow = &viewed.arrows[at];
-            let (Some(from), Some(to)) = (end(arrow.from), end(arrow.to)) else {
-                continue;
-            };
+    fn arrows(&self, viewed: &Viewed, now: &Now<'_>, items: &[Marked]) -> Vec<Option<Shown>> {
+        let arrow = |(id, arrow): (u32, &super::Arrow)| {
+            let [from, to] = [arrow.from, arrow.to].map(|end| items.get(end as usize));
+            let (from, to) = (from?, to?);
+            let shown = now.arrow(id).filter(|_| from.is_there && to.is_there)?;
+            let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
+            let at = id as usize;
             // A node that restarts keeps its arrows, though it is away when the window ends.
-            let is_back = [from, to]
-                .iter()
-                .any(|end| end.mark == Some(Mark::Restarted));
+            let is_back = ends.iter().any(|end| end.mark == Some(Mark::Restarted));
             let there = (self.before.arrows[at], self.after.arrows[at] || is_back);
-            let told = told.or_else(|| with_ends(there, [from, to]));
-            let shown = marked(shown, there, told.as_ref()).map(|shown| Shown {
-                inside: (arrow.kind == ArrowKind::Bundle)
-                    .then(|| self.inside(&shown))
-                    .flatten(),
-                ..shown
-            });
-            arrows.extend(shown);
-        }
-        arrows
+            let told = self.news.arrows.get(&id).cloned();
+            let told = told.or_else(|| with_ends(there, ends));
+            let shown = marked(shown, there, told.as_ref())?;
+            let is_bundle = arrow.kind == ArrowKind::Bundle;
+            let inside = is_bundle.then(|| self.inside(&shown)).flatten();
+            Some(Shown { inside, ..shown })
+        };
+        (0..).zip(&viewed.arrows).map(arrow).collect()
     }
 
     /// What the headlines that are told on a folded namespace or a bundle count.
@@ -186,9 +352,8 @@ mod tests {
     /// Each window as text: items and arrows with a sign for their mark, hidden or not there if not named.
     fn seen(windows: &[&str], options: &ViewOptions) -> Vec<String> {
         let (view, _) = view(&mission(windows), options);
-        let frames = view.frames.iter();
-        frames
-            .map(|frame| text(&view, &frame.items, &frame.arrows))
+        let seen = (0..view.frames.len()).map(|k| view.seen(k));
+        seen.map(|seen| text(&view, &seen.items, &seen.arrows))
             .collect()
     }
 
@@ -236,7 +401,7 @@ mod tests {
         ];
         assert_eq!(seen(&windows, &ViewOptions::default()), want);
         let (view, _) = view(&mission(&windows), &ViewOptions::default());
-        let topic = &view.frames[2].items[2];
+        let topic = &view.seen(2).items[2];
         assert_eq!((topic.rates, topic.hz), (Some((20.0, 5.0)), Some(5.0)));
         assert_eq!(
             (view.frames[2].counts.rates, view.frames[0].counts),
@@ -342,7 +507,7 @@ mod tests {
             .iter()
             .position(|i| i.kind == ItemKind::Namespace)
             .unwrap();
-        assert_eq!(view.frames[0].items[space].hz, Some(23.0));
+        assert_eq!(view.seen(0).items[space].hz, Some(23.0));
         let open = ViewOptions {
             expand: vec!["/n".into()],
             ..options

@@ -3,8 +3,6 @@
 //! What the picture shows follows from this and not from what happened to be heard in a window, so that nothing comes,
 //! goes or changes its look without an entry that says so.
 
-use std::collections::BTreeMap;
-
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Edge, Element, Elements};
 use crate::mission::Mission;
@@ -14,9 +12,47 @@ use crate::mission::ledger::Kind;
 pub(crate) struct ItemTurns<'a> {
     elements: &'a Elements,
     /// Per element, sorted by time, when it began (true) and ended.
-    turns: BTreeMap<Element, Vec<(Stamp, bool)>>,
+    turns: PerElement<(Stamp, bool)>,
     /// Per element, from when to when it was silent or away.
-    pauses: BTreeMap<Element, Vec<Span>>,
+    pauses: PerElement<Span>,
+}
+
+/// A list per element, by id; most are empty, and all are looked at in many windows.
+struct PerElement<T>([Vec<Vec<T>>; 4]);
+
+impl<T> PerElement<T> {
+    fn new(elements: &Elements) -> Self {
+        fn lists<E, T>(all: &[E]) -> Vec<Vec<T>> {
+            all.iter().map(|_| Vec::new()).collect()
+        }
+        Self([
+            lists(&elements.nodes),
+            lists(&elements.topics),
+            lists(&elements.publishes),
+            lists(&elements.subscribes),
+        ])
+    }
+
+    fn place(what: Element) -> (usize, usize) {
+        match what {
+            Element::Node(id) => (0, id as usize),
+            Element::Topic(id) => (1, id as usize),
+            Element::Publish(id) => (2, id as usize),
+            Element::Subscribe(id) => (3, id as usize),
+        }
+    }
+
+    fn of(&self, what: Element) -> &[T] {
+        let (kind, id) = Self::place(what);
+        self.0[kind].get(id).map_or(&[], Vec::as_slice)
+    }
+
+    fn add(&mut self, what: Element, one: T) {
+        let (kind, id) = Self::place(what);
+        if let Some(list) = self.0[kind].get_mut(id) {
+            list.push(one);
+        }
+    }
 }
 
 /// Which elements live, per id.
@@ -32,8 +68,8 @@ impl<'a> ItemTurns<'a> {
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let mut lives = Self {
             elements: &mission.elements,
-            turns: BTreeMap::new(),
-            pauses: BTreeMap::new(),
+            turns: PerElement::new(&mission.elements),
+            pauses: PerElement::new(&mission.elements),
         };
         let entries = &mission.ledger.entries;
         for entry in entries {
@@ -47,16 +83,15 @@ impl<'a> ItemTurns<'a> {
                 Kind::Stopped | Kind::Vanished => false,
                 Kind::Restarted | Kind::Silent => {
                     let (start, end) = (entry.time, entry.until.unwrap_or(entry.time));
-                    let pauses = lives.pauses.entry(entry.what).or_default();
-                    pauses.push(Span { start, end });
+                    lives.pauses.add(entry.what, Span { start, end });
                     continue;
                 }
                 _ => continue,
             };
-            let turns = lives.turns.entry(entry.what).or_default();
-            turns.push((whole.unwrap_or(entry).time, begins));
+            let turn = (whole.unwrap_or(entry).time, begins);
+            lives.turns.add(entry.what, turn);
         }
-        for turns in lives.turns.values_mut() {
+        for turns in lives.turns.0.iter_mut().flatten() {
             turns.sort_by_key(|turn| turn.0);
         }
         lives
@@ -80,9 +115,8 @@ impl<'a> ItemTurns<'a> {
     /// its publications, a subscription with its topic.
     pub(crate) fn paused(&self, span: Span, alive: &Alive) -> Alive {
         let own = |element| {
-            let pauses = self.pauses.get(&element).into_iter().flatten();
-            let covers = |pause: &&Span| pause.start <= span.start && span.end <= pause.end;
-            pauses.clone().any(|pause| covers(&pause))
+            let covers = |pause: &Span| pause.start <= span.start && span.end <= pause.end;
+            self.pauses.of(element).iter().any(covers)
         };
         let mut paused = Alive {
             nodes: ids(&self.elements.nodes)
@@ -99,7 +133,7 @@ impl<'a> ItemTurns<'a> {
         paused.publishes = edges
             .map(|(edge, id)| own(Element::Publish(id)) || node(edge))
             .collect();
-        let mut sent: BTreeMap<u32, bool> = BTreeMap::new();
+        let mut sent: Vec<Option<bool>> = vec![None; self.elements.topics.len()];
         let states = alive.publishes.iter().zip(&paused.publishes);
         for (edge, (_, is_paused)) in self
             .elements
@@ -108,12 +142,12 @@ impl<'a> ItemTurns<'a> {
             .zip(states)
             .filter(|s| *s.1.0)
         {
-            *sent.entry(edge.topic).or_insert(true) &= is_paused;
-        }
-        for (topic, is_paused) in sent {
-            if let Some(slot) = paused.topics.get_mut(topic as usize) {
-                *slot |= is_paused;
+            if let Some(all) = sent.get_mut(edge.topic as usize) {
+                *all = Some(all.unwrap_or(true) && *is_paused);
             }
+        }
+        for (slot, all) in paused.topics.iter_mut().zip(sent) {
+            *slot |= all == Some(true);
         }
         let topic = |edge: &Edge| paused.topics.get(edge.topic as usize) == Some(&true);
         paused.subscribes = self.elements.subscribes.iter().map(topic).collect();
@@ -123,7 +157,10 @@ impl<'a> ItemTurns<'a> {
     /// `own` tells whether an element lives by its own beginnings and ends. An edge lives with its node; a topic that
     /// nothing tells of lives with its edges.
     fn alive(&self, own: impl Fn(&[(Stamp, bool)]) -> bool) -> Alive {
-        let own = |element| self.turns.get(&element).map(|turns| own(turns));
+        let own = |element| {
+            let turns = self.turns.of(element);
+            (!turns.is_empty()).then(|| own(turns))
+        };
         let nodes: Vec<bool> = ids(&self.elements.nodes)
             .map(|id| own(Element::Node(id)) != Some(false))
             .collect();

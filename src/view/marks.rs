@@ -27,6 +27,7 @@ pub(crate) struct Told {
 pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
 
 /// What is told in one window, by id.
+#[derive(Default)]
 pub(crate) struct News {
     pub(crate) headlines: Vec<Headline>,
     pub(crate) items: BTreeMap<u32, Told>,
@@ -36,11 +37,7 @@ pub(crate) struct News {
 impl News {
     /// `parts` are the parts of each headline. They are told with it, whenever they were seen.
     pub(crate) fn new(ledger: &Ledger, parts: &Parts, span: Span, viewed: &Viewed) -> Self {
-        let mut news = Self {
-            headlines: Vec::new(),
-            items: BTreeMap::new(),
-            arrows: BTreeMap::new(),
-        };
+        let mut news = Self::default();
         for (id, entry) in ledger.headlines(span) {
             if !viewed.sees(entry.what) {
                 continue;

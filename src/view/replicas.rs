@@ -10,6 +10,9 @@ use crate::graph::{Edge, Element, Elements};
 /// Fewer than this are drawn side by side.
 const FEWEST: usize = 3;
 
+/// So often fleets are looked for among what is left of the namespaces.
+const MOST_ROUNDS: usize = 16;
+
 /// Namespaces with the same graph, drawn as one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Fleet {
@@ -101,6 +104,26 @@ impl Fleets {
     /// The fleet that something drawn under this name is part of.
     pub(crate) fn of(&self, drawn: &str) -> Option<&Fleet> {
         self.all.iter().find(|fleet| within(drawn, &fleet.name))
+    }
+}
+
+impl ViewOptions {
+    /// The same with every namespace opened: none collapsed, none drawn for several.
+    pub(crate) fn opened(&self, elements: &Elements) -> Self {
+        let mut options = Self {
+            collapse: Vec::new(),
+            ..self.clone()
+        };
+        // Those that differed from the largest fleet may be one among themselves.
+        for _ in 0..MOST_ROUNDS {
+            let fleets = Fleets::new(elements, &options);
+            if fleets.all.is_empty() {
+                break;
+            }
+            let members = fleets.all.into_iter().flat_map(|fleet| fleet.members);
+            options.expand.extend(members);
+        }
+        options
     }
 }
 
@@ -239,7 +262,7 @@ mod tests {
             .iter()
             .position(|i| &*i.name == "/rN/odom")
             .unwrap();
-        let shown = &seen.frames[1].items[odom];
+        let shown = seen.items_shown[odom].at(1).unwrap();
         assert_eq!((shown.each, shown.hz), (4, Some(8.0)));
         assert_eq!(shown.mark, Some(Mark::Inside));
     }

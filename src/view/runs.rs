@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Serialize, Serializer};
 
+use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::State;
-use crate::view::{Frame, Mark, Shown, View};
+use crate::view::{Arrow, Mark, Showing, Shown, View};
 
 /// From this window on, this value of a table, until the next run of the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +28,9 @@ pub(crate) struct ElementRuns {
     pub rates: Vec<Run>,
     /// Its lifecycle state: places in [`Runs::labels`]. While it is not there, the last value stays.
     pub lifecycles: Vec<Run>,
+    /// Windows in which its rate changed, each with from what to what: places in [`Runs::labels`]. Such a value holds
+    /// for one window.
+    pub turns: Vec<Run>,
 }
 
 /// The whole sequence of a view as runs.
@@ -49,36 +53,33 @@ pub(crate) fn at(list: &[Run], window: u32) -> u32 {
 }
 
 impl Runs {
-    /// The runs of a view. `label` writes the rate of an element in a window, empty for none.
-    pub(crate) fn of(view: &View, label: impl Fn(&Shown) -> String) -> Self {
+    /// The runs of a view. `label` writes the rate of an element in a window, and what an arrow carries; empty for none.
+    pub(crate) fn of(view: &View, label: impl Fn(&Shown, Option<&Arrow>) -> String) -> Self {
         let mut classes = ValueTable::starting_with(None);
         let mut labels = ValueTable::starting_with(String::new());
-        let mut runs = |count, shown: fn(&Frame) -> &[Shown], are_arrows| {
+        let mut runs = |all: &[Showing], arrows| {
             let mut recorder = RunRecorder {
                 classes: &mut classes,
                 labels: &mut labels,
                 label: &label,
-                are_arrows,
-                runs: vec![ElementRuns::default(); count],
-                last_hz: vec![None; count],
+                arrows,
             };
-            for (frame, window) in view.frames.iter().zip(0..) {
-                recorder.take(shown(frame), window);
-            }
-            recorder.runs
+            let runs = all.iter().map(|showing| recorder.runs(showing));
+            runs.collect::<Vec<_>>()
         };
-        let mut items = runs(view.items.len(), |f| &f.items, false);
-        let mut arrows = runs(view.arrows.len(), |f| &f.arrows, true);
+        let mut items = runs(&view.items_shown, None);
+        let mut arrows = runs(&view.arrows_shown, Some(&view.arrows[..]));
         // The most frequent value gets the shortest number.
         let both = || items.iter().chain(&arrows);
         let new_classes = classes.by_frequency(both().flat_map(|l| &l.classes));
-        let texts = |l: &'_ ElementRuns| [l.rates.clone(), l.lifecycles.clone()].concat();
+        let texts = |l: &'_ ElementRuns| [&l.rates[..], &l.lifecycles[..], &l.turns[..]].concat();
         let all_texts: Vec<Run> = both().flat_map(texts).collect();
         let new_labels = labels.by_frequency(&all_texts);
         for life in items.iter_mut().chain(&mut arrows) {
             renumber(&mut life.classes, &new_classes);
             renumber(&mut life.rates, &new_labels);
             renumber(&mut life.lifecycles, &new_labels);
+            renumber(&mut life.turns, &new_labels);
         }
         Self {
             classes: classes.sorted(&new_classes, |class| {
@@ -98,24 +99,6 @@ impl Runs {
             .iter()
             .flat_map(|class| class.split(' '))
             .collect()
-    }
-
-    /// How many elements have a mark of this class in each window in which there are any.
-    pub(crate) fn counts(&self, class: &str) -> BTreeMap<u32, usize> {
-        let has = |words: &String| words.split(' ').any(|word| word == class);
-        let marked: Vec<bool> = self.classes.iter().map(has).collect();
-        let mut counts = BTreeMap::new();
-        for run in self
-            .items
-            .iter()
-            .chain(&self.arrows)
-            .flat_map(|life| &life.classes)
-        {
-            if marked[run.value as usize] {
-                *counts.entry(run.from).or_default() += 1;
-            }
-        }
-        counts
     }
 }
 
@@ -241,48 +224,56 @@ fn renumber(list: &mut [Run], new: &[u32]) {
     }
 }
 
-/// Writes the lives of the items, or of the arrows, window by window.
+/// Writes the lives of the items, or of the arrows.
 struct RunRecorder<'a, F> {
     classes: &'a mut ValueTable<Option<LookClass>>,
     labels: &'a mut ValueTable<String>,
     label: F,
-    are_arrows: bool,
-    runs: Vec<ElementRuns>,
-    /// The rate last written; rates are mostly the same, and writing one takes time.
-    last_hz: Vec<Option<(u64, Option<u64>)>>,
+    arrows: Option<&'a [Arrow]>,
 }
 
-impl<F: Fn(&Shown) -> String> RunRecorder<'_, F> {
-    fn take(&mut self, shown: &[Shown], window: u32) {
-        let mut there = vec![false; self.runs.len()];
-        for one in shown {
-            let id = one.id as usize;
-            let Some(life) = self.runs.get_mut(id) else {
+impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
+    fn runs(&mut self, showing: &Showing) -> ElementRuns {
+        let mut life = ElementRuns::default();
+        // The label of each rate: writing one takes time, and most come again.
+        let mut known: BTreeMap<_, u32> = BTreeMap::new();
+        let mut last_hz = None;
+        for (window, shown) in showing.runs() {
+            let Some(shown) = shown else {
+                push(&mut life.classes, window, 0);
                 continue;
             };
-            there[id] = true;
             let class = self
                 .classes
-                .place(Some(LookClass::of(one, self.are_arrows)));
+                .place(Some(LookClass::of(shown, self.arrows.is_some())));
             push(&mut life.classes, window, class);
-            if one.mark == Some(Mark::Removed) {
+            if shown.mark == Some(Mark::Removed) {
                 continue;
             }
-            let hz = one.hz.map(|hz| (hz.to_bits(), one.count));
-            if hz != self.last_hz[id] {
-                self.last_hz[id] = hz;
-                let text = (self.label)(one);
-                push(&mut life.rates, window, self.labels.place(text));
+            let hz = shown
+                .hz
+                .map(|hz| (hz.to_bits(), shown.count, shown.each, shown.topics));
+            let arrow = self.arrows.and_then(|all| all.get(shown.id as usize));
+            if hz != last_hz || (life.rates.is_empty() && arrow.is_some()) {
+                last_hz = hz;
+                let place = known.entry(hz).or_insert_with(|| {
+                    let text = (self.label)(shown, arrow);
+                    self.labels.place(text)
+                });
+                push(&mut life.rates, window, *place);
             }
-            let lifecycle = one.lifecycle.as_deref().unwrap_or_default();
+            if let Some((before, now)) = shown.rates {
+                let value = self.labels.place(words::rate_change(before, now));
+                let from = window;
+                life.turns.push(Run { from, value });
+            }
+            let lifecycle = shown.lifecycle.as_deref().unwrap_or_default();
             if !lifecycle.is_empty() || !life.lifecycles.is_empty() {
                 let place = self.labels.place(lifecycle.to_owned());
                 push(&mut life.lifecycles, window, place);
             }
         }
-        for (life, _) in self.runs.iter_mut().zip(there).filter(|(_, there)| !there) {
-            push(&mut life.classes, window, 0);
-        }
+        life
     }
 }
 
@@ -308,57 +299,38 @@ pub(crate) fn flat(list: &[Run]) -> Vec<u32> {
 }
 
 impl Serialize for ElementRuns {
-    /// `[classes, rates, lifecycles]`, each [`flat`].
+    /// `[classes, rates, lifecycles, turns]`, each [`flat`]; empty lists at the end are left out.
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        [&self.classes, &self.rates, &self.lifecycles]
-            .map(|list| flat(list))
-            .serialize(to)
+        let lists = [&self.classes, &self.rates, &self.lifecycles, &self.turns];
+        let told = lists.iter().rposition(|list| !list.is_empty());
+        let lists = &lists[..told.map_or(0, |last| last + 1)];
+        let all: Vec<Vec<u32>> = lists.iter().map(|list| flat(list)).collect();
+        all.serialize(to)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::time::{Span, Stamp};
 
     /// One element over the windows: there with this mark and rate, or not there.
     type Story<'a> = &'a [Option<(Option<Mark>, f64)>];
 
     fn runs(story: Story<'_>) -> Runs {
-        let frame = |(index, there): (usize, &Option<(Option<Mark>, f64)>)| Frame {
-            rolls: Vec::new(),
-            index,
-            span: Span {
-                start: Stamp(0),
-                end: Stamp(1),
-            },
-            partial: false,
-            messages: 0,
-            items: Vec::new(),
-            arrows: there
-                .iter()
-                .map(|(mark, hz)| Shown {
-                    mark: *mark,
-                    hz: Some(*hz),
-                    steady_hz: Some(*hz),
-                    ..Shown::plain(0, State::Active, Degree::Measured)
-                })
-                .collect(),
-            headlines: Vec::new(),
-            counts: crate::view::Counts::default(),
-            caption: Vec::new(),
+        let shown = |there: &Option<(Option<Mark>, f64)>| {
+            there.map(|(mark, hz)| Shown {
+                mark,
+                hz: Some(hz),
+                steady_hz: Some(hz),
+                ..Shown::plain(0, State::Active, Degree::Measured)
+            })
         };
+        let story: Vec<_> = story.iter().map(shown).collect();
         let view = View {
-            arrows: vec![crate::view::Arrow {
-                from: 0,
-                to: 0,
-                kind: crate::view::ArrowKind::Publish,
-                members: Vec::new(),
-            }],
-            frames: story.iter().enumerate().map(frame).collect(),
+            arrows_shown: vec![Showing::of(story.iter().map(Option::as_ref))],
             ..View::default()
         };
-        Runs::of(&view, |shown| format!("{:.0}", shown.hz.unwrap_or(0.0)))
+        Runs::of(&view, |shown, _| format!("{:.0}", shown.hz.unwrap_or(0.0)))
     }
 
     fn told(runs: &Runs, windows: u32) -> Vec<(&str, &str)> {
@@ -399,7 +371,7 @@ mod tests {
         let runs = runs(&[Some((None, 9.8)); 50]);
         assert_eq!(
             serde_json::to_string(&runs.arrows).unwrap(),
-            "[[[0,1],[0,1],[]]]"
+            "[[[0,1],[0,1]]]"
         );
         assert_eq!(told(&runs, 50)[49], ("active w2", "10"));
     }

@@ -1,119 +1,187 @@
 //! Looks that do not flicker: between what the ledger tells, an element keeps its state and the thickness of its rate.
 
-use super::{Frame, Mark, Shown};
+use super::showing::{Showing, ShowingWriter};
+use super::{Mark, Shown};
+use crate::base::time::Span;
 use crate::evidence::Degree;
 use crate::graph::State;
+
+/// How long windows are together, in nanoseconds, from the first to each.
+pub(crate) struct Lengths(Vec<i64>);
+
+impl Lengths {
+    pub(crate) fn new(windows: impl Iterator<Item = Span>) -> Self {
+        let mut whole = 0_i64;
+        let mut all = vec![0];
+        all.extend(windows.map(|span| {
+            whole = whole.saturating_add(span.nanos());
+            whole
+        }));
+        Self(all)
+    }
+
+    /// The windows from this one up to that one, without it.
+    pub(crate) fn of(&self, from: u32, to: u32) -> f64 {
+        let at = |window: u32| self.0.get(window as usize).copied().unwrap_or(0);
+        (at(to) - at(from)) as f64
+    }
+
+    pub(crate) fn windows(&self) -> u32 {
+        u32::try_from(self.0.len() - 1).unwrap_or(u32::MAX)
+    }
+}
 
 /// What is known so far of an element's present life.
 #[derive(Clone, Copy, Default)]
 struct PresentLife {
-    /// The frame in which it was seen last, counted from 1.
-    last: usize,
     look: Option<(State, Degree)>,
     /// Messages and nanoseconds since its rate last changed.
     sent: (f64, f64),
     is_measured: bool,
 }
 
-/// Gives each item or arrow, for as long as it lives, its liveliest state and its strongest degree, and its average
-/// rate between two changes of it. `count` is how many there are.
+/// A look in some windows in a row.
+struct LookRun<'a> {
+    from: u32,
+    to: u32,
+    place: u32,
+    shown: &'a Shown,
+    /// Its state, its degree and its average rate, settled.
+    look: (State, Degree),
+    steady_hz: Option<f64>,
+}
+
+/// Gives an item or arrow, for as long as it lives, its liveliest state and its strongest degree, and its average rate
+/// between two changes of it.
 ///
 /// A topic that speaks once a minute is as alive in the seconds between as in those in which it is heard; only a pause
 /// that the ledger knows is drawn as one.
-pub(crate) fn settle(
-    frames: &mut [Frame],
-    count: usize,
-    shown_of: impl Fn(&mut Frame) -> &mut Vec<Shown>,
-) {
-    let mut lives = vec![PresentLife::default(); count];
-    for (at, frame) in (1..).zip(frames.iter_mut()) {
-        let length = frame.span.nanos() as f64;
-        for shown in shown_of(frame) {
-            if let Some(life) = lives.get_mut(shown.id as usize) {
-                life.forward(at, shown, length);
-            }
+pub(crate) fn settled(raw: &Showing, lengths: &Lengths) -> Showing {
+    let mut runs = runs(raw, lengths.windows());
+    let mut life = PresentLife::default();
+    let mut last = 0;
+    for run in &mut runs {
+        if last != run.from || run.shown.mark == Some(Mark::Added) {
+            life = PresentLife::default();
         }
+        life.forward(run, lengths);
+        last = if is_ghost(run.shown) { 0 } else { run.to };
     }
     // Backwards, what is known at the end of a life is known all through it.
-    let mut lives = vec![PresentLife::default(); count];
-    let last = frames.len();
-    for (at, frame) in frames.iter_mut().rev().enumerate() {
-        for shown in shown_of(frame) {
-            if let Some(life) = lives.get_mut(shown.id as usize) {
-                life.backward(last - at, shown);
-            }
+    let mut next = u32::MAX;
+    for run in runs.iter_mut().rev() {
+        if next != run.to || is_ghost(run.shown) {
+            life = PresentLife::default();
         }
+        life.backward(run);
+        next = if run.shown.mark == Some(Mark::Added) {
+            u32::MAX
+        } else {
+            run.from
+        };
     }
+    written(&runs, lengths.windows())
+}
+
+fn runs(raw: &Showing, windows: u32) -> Vec<LookRun<'_>> {
+    let ends = raw.places().iter().skip(1).map(|next| next.0);
+    let all = raw.places().iter().zip(ends.chain([windows]));
+    let run = |(&(from, place), to): (&(u32, u32), u32)| {
+        let shown = raw.looks().get(place as usize)?;
+        Some(LookRun {
+            from,
+            to,
+            place,
+            shown,
+            look: (shown.state, shown.degree),
+            steady_hz: None,
+        })
+    };
+    all.filter_map(run).collect()
 }
 
 impl PresentLife {
-    fn forward(&mut self, at: usize, shown: &mut Shown, length: f64) {
-        if self.last + 1 != at || shown.mark == Some(Mark::Added) {
-            *self = Self::default();
-        }
+    fn forward(&mut self, run: &mut LookRun<'_>, lengths: &Lengths) {
+        let shown = run.shown;
         if is_rate(shown) {
             (self.sent, self.is_measured) = ((0.0, 0.0), false);
         }
         if !shown.is_paused {
-            let look = (shown.state, shown.degree);
-            let old = self.look.unwrap_or(look);
-            self.look = Some((livelier(old.0, look.0), old.1.min(look.1)));
+            let old = self.look.unwrap_or(run.look);
+            self.look = Some((livelier(old.0, run.look.0), old.1.min(run.look.1)));
         }
-        if let Some(hz) = shown.hz.filter(|hz| hz.is_finite() && !shown.is_paused) {
-            // A ghost's rate is not its own.
-            if shown.mark != Some(Mark::Removed) {
-                self.sent = (self.sent.0 + hz * length, self.sent.1 + length);
-                self.is_measured = true;
-            }
+        // A ghost's rate is not its own.
+        let is_own = !shown.is_paused && !is_ghost(shown);
+        if let Some(hz) = shown.hz.filter(|hz| hz.is_finite() && is_own) {
+            let length = lengths.of(run.from, run.to);
+            self.sent = (self.sent.0 + hz * length, self.sent.1 + length);
+            self.is_measured = true;
         }
-        self.last = if shown.mark == Some(Mark::Removed) {
-            0
-        } else {
-            at
-        };
         let (sent, time) = self.sent;
-        shown.steady_hz = self.is_measured.then(|| sent / time.max(1.0));
-        self.show(shown);
+        run.steady_hz = self.is_measured.then(|| sent / time.max(1.0));
+        self.show(run);
     }
 
-    fn backward(&mut self, at: usize, shown: &mut Shown) {
-        let goes_on = self.last == at + 1 && shown.mark != Some(Mark::Removed);
-        let known = if goes_on { *self } else { Self::default() };
-        let look = if shown.is_paused {
-            known.look
-        } else {
-            known.look.or(Some((shown.state, shown.degree)))
-        };
+    fn backward(&mut self, run: &mut LookRun<'_>) {
+        if !run.shown.is_paused {
+            self.look = self.look.or(Some(run.look));
+        }
         // `sent` holds the rate from here to the next change of it.
-        let steady = if known.is_measured {
-            Some(known.sent.0)
-        } else {
-            shown.steady_hz
-        };
-        shown.steady_hz = steady;
-        let ends_here = is_rate(shown);
-        *self = Self {
-            last: if shown.mark == Some(Mark::Added) {
-                0
-            } else {
-                at
-            },
-            look,
-            sent: (steady.unwrap_or(0.0), 0.0),
-            is_measured: steady.is_some() && !ends_here,
-        };
-        self.show(shown);
+        if self.is_measured {
+            run.steady_hz = Some(self.sent.0);
+        }
+        self.sent = (run.steady_hz.unwrap_or(0.0), 0.0);
+        self.is_measured = run.steady_hz.is_some() && !is_rate(run.shown);
+        self.show(run);
     }
 
-    fn show(&self, shown: &mut Shown) {
-        if let Some((state, degree)) = self.look.filter(|_| !shown.is_paused) {
-            (shown.state, shown.degree) = (state, degree);
+    fn show(&self, run: &mut LookRun<'_>) {
+        if let Some(look) = self.look.filter(|_| !run.shown.is_paused) {
+            run.look = look;
         }
     }
 }
 
+/// The runs with their settled looks.
+fn written(runs: &[LookRun<'_>], windows: u32) -> Showing {
+    let mut writer = ShowingWriter::default();
+    let is_same = |a: &LookRun<'_>, b: &LookRun<'_>| (a.look, a.steady_hz) == (b.look, b.steady_hz);
+    // Between two changes only the numbers differ, and few of them do.
+    let mut places: Vec<Option<u32>> = Vec::new();
+    let mut before: Option<&LookRun<'_>> = None;
+    for run in runs {
+        if before.is_none_or(|before| !is_same(before, run)) {
+            places.clear();
+        }
+        if let Some(before) = before.filter(|before| before.to < run.from) {
+            writer.show(before.to, None);
+        }
+        let at = run.place as usize;
+        places.resize(places.len().max(at + 1), None);
+        let place = *places[at].get_or_insert_with(|| {
+            let (state, degree) = run.look;
+            writer.look(Shown {
+                state,
+                degree,
+                steady_hz: run.steady_hz,
+                ..run.shown.clone()
+            })
+        });
+        writer.turn(run.from, place);
+        before = Some(run);
+    }
+    if let Some(last) = before.filter(|last| last.to < windows) {
+        writer.show(last.to, None);
+    }
+    writer.finish()
+}
+
 fn is_rate(shown: &Shown) -> bool {
     matches!(shown.mark, Some(Mark::Faster | Mark::Slower))
+}
+
+fn is_ghost(shown: &Shown) -> bool {
+    shown.mark == Some(Mark::Removed)
 }
 
 /// Alive by a latched message counts most, since it says more than messages do.

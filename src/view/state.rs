@@ -1,44 +1,30 @@
 //! What of the mission one window shows: states, rates and counts gathered from the graph's elements.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::collections::BTreeSet;
 
 use super::items::{EdgePlace, Viewed};
 use super::lives::Alive;
-use super::{ArrowKind, Item, ItemKind, Mode, Shown, ViewOptions};
+use super::{Arrow, ArrowKind, Item, ItemKind, Mode, Shown, ViewOptions};
+use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
-use crate::graph::{EdgeState, Element, Graph, State, TopicState};
+use crate::graph::{Element, Elements, Row, State};
+use crate::mission::Mission;
 
-/// Items or arrows of one window by id; ghosts are not among them.
-pub(crate) type States = Vec<Option<Shown>>;
-
-/// Gathers what the elements of one window give to an item or arrow.
-struct StateGather(States);
-
-impl StateGather {
-    fn new(size: usize) -> Self {
-        Self(vec![None; size])
-    }
-
-    /// Takes in an element: the liveliest state and the strongest degree count, rates and counts are summed.
-    fn add(&mut self, id: u32, one: &One) {
-        let Some(slot) = self.0.get_mut(id as usize) else {
-            return;
-        };
-        let (state, degree) = (one.state, one.degree);
-        let shown = slot.get_or_insert(Shown {
-            is_paused: true,
-            ..Shown::plain(id, state, degree)
-        });
-        let (hz, count) = (one.hz, one.count);
-        // Those that are there and send nothing would water down the rate of each.
-        shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
-        shown.is_paused &= one.is_paused;
-        shown.state = shown.state.min(state);
-        shown.degree = shown.degree.min(degree);
-        shown.hz = sum(shown.hz, hz, |a, b| a + b);
-        shown.count = sum(shown.count, count, u64::saturating_add);
-    }
+/// Takes in an element of an item or arrow: the liveliest state and the strongest degree count, rates and counts are
+/// summed.
+fn gather(slot: &mut Option<Shown>, id: u32, one: &One) {
+    let (state, degree) = (one.state, one.degree);
+    let shown = slot.get_or_insert_with(|| Shown {
+        is_paused: true,
+        ..Shown::plain(id, state, degree)
+    });
+    // Those that are there and send nothing would water down the rate of each.
+    shown.each += usize::from(one.hz.is_some_and(|hz| hz > 0.0));
+    shown.is_paused &= one.is_paused;
+    shown.state = shown.state.min(state);
+    shown.degree = shown.degree.min(degree);
+    shown.hz = sum(shown.hz, one.hz, |a, b| a + b);
+    shown.count = sum(shown.count, one.count, u64::saturating_add);
 }
 
 /// One element of the graph in a window.
@@ -70,31 +56,8 @@ impl One {
     }
 }
 
-/// Per element of one list that lives, what the graph of a window says of it: nothing, where it was not heard.
-fn ones<'g, T>(
-    alive: &'g [bool],
-    paused: &'g [bool],
-    states: &'g [T],
-    id: impl Fn(&T) -> u32 + 'g,
-    one: impl Fn(&T) -> One + 'g,
-) -> impl Iterator<Item = (u32, Option<&'g T>, One)> + 'g {
-    let mut states = states.iter().peekable();
-    let flags = (0..).zip(alive.iter().zip(paused));
-    flags.filter_map(move |(at, (is_alive, is_paused))| {
-        while states.next_if(|s| id(s) < at).is_some() {}
-        let state = states.next_if(|s| id(s) == at);
-        is_alive.then(|| {
-            let mut one = state.map_or(One::UNHEARD, &one);
-            if *is_paused {
-                one.is_paused = true;
-                one.state = one.state.max(State::Silent);
-            }
-            (at, state, one)
-        })
-    })
-}
-
 /// Which items and arrows have a living element at a moment.
+#[derive(Default)]
 pub(crate) struct LivingItems {
     pub(crate) items: Vec<bool>,
     pub(crate) arrows: Vec<bool>,
@@ -135,30 +98,6 @@ fn sum<T>(a: Option<T>, b: Option<T>, add: impl Fn(T, T) -> T) -> Option<T> {
     }
 }
 
-/// What of the mission one window shows: all that lives in it. `lives` are those that live, and those that pause.
-pub(crate) fn present(
-    graph: &Graph,
-    options: &ViewOptions,
-    viewed: &Viewed,
-    lives: (&Alive, &Alive),
-) -> (States, States) {
-    let items = present_items(graph, options, viewed, lives);
-    let mut arrows = match options.mode {
-        Mode::Nodes | Mode::Bundles => present_direct(graph, viewed, lives),
-        _ => present_arrows(graph, options, viewed, lives),
-    };
-    for (slot, arrow) in arrows.iter_mut().zip(&viewed.arrows) {
-        if let Some(shown) = slot {
-            shown.each = 0;
-        }
-        let there = |id: u32| items.get(id as usize).is_some_and(Option::is_some);
-        if !(there(arrow.from) && there(arrow.to)) {
-            *slot = None;
-        }
-    }
-    (items, arrows)
-}
-
 /// Whether a node in this state is shown in a window.
 pub(crate) fn shows_node(state: State, options: &ViewOptions) -> bool {
     !options.hide.unreachable || matches!(state, State::Active | State::Latched)
@@ -169,145 +108,202 @@ pub(crate) fn shows_topic(state: State, options: &ViewOptions) -> bool {
     options.mode != Mode::Active || state == State::Active
 }
 
-fn present_items(
-    graph: &Graph,
-    options: &ViewOptions,
-    viewed: &Viewed,
-    (alive, paused): (&Alive, &Alive),
-) -> States {
-    let mut items = StateGather::new(viewed.items.len());
-    let nodes = ones(
-        &alive.nodes,
-        &paused.nodes,
-        &graph.nodes,
-        |n| n.id,
-        |n| One {
-            hz: n.hz,
-            ..One::new(n.state, n.degree)
-        },
-    );
-    for (at, node, one) in nodes {
-        let Some(Some(id)) = viewed.node.get(at as usize) else {
-            continue;
+/// What is known of all elements in one window.
+pub(crate) struct Now<'a> {
+    mission: &'a Mission,
+    options: &'a ViewOptions,
+    viewed: &'a Viewed,
+    /// A window as long as this one.
+    span: Span,
+    /// Those that live in it, and those that pause.
+    lives: (Alive, Alive),
+    /// What the graph says of each element that is in it, by kind and id.
+    rows: ElementRows,
+}
+
+/// A row per node, topic, publication and subscription that is there.
+struct ElementRows([Vec<Option<Row>>; 4]);
+
+impl ElementRows {
+    fn new(all: &Elements) -> Self {
+        Self([
+            vec![None; all.nodes.len()],
+            vec![None; all.topics.len()],
+            vec![None; all.publishes.len()],
+            vec![None; all.subscribes.len()],
+        ])
+    }
+
+    fn set(&mut self, what: Element, row: Option<Row>) {
+        let (kind, id) = match what {
+            Element::Node(id) => (0, id),
+            Element::Topic(id) => (1, id),
+            Element::Publish(id) => (2, id),
+            Element::Subscribe(id) => (3, id),
         };
-        if !shows_node(one.state, options) {
-            continue;
-        }
-        items.add(*id, &one);
-        if let (true, Some(shown)) = (is_single(viewed, *id), &mut items.0[*id as usize]) {
-            shown.lifecycle = node.and_then(|n| n.lifecycle.as_ref().map(Arc::clone));
+        if let Some(slot) = self.0[kind].get_mut(id as usize) {
+            *slot = row;
         }
     }
-    for (at, one) in topics(graph, (alive, paused)) {
-        let Some(Some(id)) = viewed.topic.get(at as usize) else {
-            continue;
-        };
-        if !shows_topic(one.state, options) {
-            continue;
+}
+
+impl<'a> Now<'a> {
+    /// Nothing is known yet.
+    pub(crate) fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
+        Self {
+            mission,
+            options,
+            viewed,
+            span: Span {
+                start: Stamp(0),
+                end: Stamp(0),
+            },
+            lives: (Alive::default(), Alive::default()),
+            rows: ElementRows::new(&mission.elements),
         }
-        // The nodes inside a collapsed namespace count what they publish already.
-        let item = viewed.items.get(*id as usize);
-        let hz = one.hz.filter(|_| !item.is_some_and(has_nodes));
-        items.add(*id, &One { hz, ..one });
     }
-    for (slot, item) in items.0.iter_mut().zip(&viewed.items) {
-        if let Some(shown) = slot.as_mut().filter(|_| !item.is_replica) {
+
+    /// From now on the graph says this of an element, or nothing.
+    pub(crate) fn hear(&mut self, what: Element, row: Option<Row>) {
+        self.rows.set(what, row);
+    }
+
+    /// From this window on these live, and these pause.
+    pub(crate) fn live(&mut self, window: Span, alive: Alive, paused: Alive) {
+        (self.span, self.lives) = (window, (alive, paused));
+    }
+
+    /// Whether a window is longer or shorter, so that rates are others.
+    pub(crate) fn is_other_length(&self, window: Span) -> bool {
+        window.nanos() != self.span.nanos()
+    }
+
+    /// What an element that lives shows: nothing of itself, where it was not heard.
+    fn one(&self, kind: usize, id: u32, lists: [&[bool]; 2]) -> Option<One> {
+        let at = id as usize;
+        let [alive, paused] = lists.map(|list| list.get(at) == Some(&true));
+        let row = || self.rows.0[kind].get(at)?.as_ref();
+        let heard = |row: &Row| One {
+            hz: row.hz(self.span),
+            count: row.count,
+            ..One::new(row.state, row.degree)
+        };
+        alive.then(|| {
+            let mut one = row().map_or(One::UNHEARD, heard);
+            if paused {
+                one.is_paused = true;
+                one.state = one.state.max(State::Silent);
+            }
+            one
+        })
+    }
+
+    fn node(&self, id: u32) -> Option<One> {
+        let (alive, paused) = &self.lives;
+        // What a node counts are the messages of its topics.
+        let one = self.one(0, id, [&alive.nodes, &paused.nodes])?;
+        Some(One { count: None, ..one })
+    }
+
+    fn topic(&self, id: u32) -> Option<One> {
+        let (alive, paused) = &self.lives;
+        self.one(1, id, [&alive.topics, &paused.topics])
+    }
+
+    fn publish(&self, id: u32) -> Option<One> {
+        let (alive, paused) = &self.lives;
+        self.one(2, id, [&alive.publishes, &paused.publishes])
+    }
+
+    fn subscribe(&self, id: u32) -> Option<One> {
+        let (alive, paused) = &self.lives;
+        self.one(3, id, [&alive.subscribes, &paused.subscribes])
+    }
+
+    /// What an item shows; `None` where nothing of it lives. Ghosts are not among them.
+    pub(crate) fn item(&self, id: u32) -> Option<Shown> {
+        let item = self.viewed.items.get(id as usize)?;
+        let mut slot = None;
+        for member in &item.members {
+            let one = match member {
+                Element::Node(node) => self
+                    .node(*node)
+                    .filter(|one| shows_node(one.state, self.options)),
+                Element::Topic(topic) => self
+                    .topic(*topic)
+                    .filter(|one| shows_topic(one.state, self.options))
+                    // The nodes inside a collapsed namespace count what they publish already.
+                    .map(|one| One {
+                        hz: one.hz.filter(|_| !has_nodes(item)),
+                        ..one
+                    }),
+                Element::Publish(_) | Element::Subscribe(_) => None,
+            };
+            if let Some(one) = one {
+                gather(&mut slot, id, &one);
+            }
+        }
+        let mut shown = slot?;
+        if let ([Element::Node(node)], true) = (&item.members[..], is_single(self.viewed, id)) {
+            let row = self.rows.0[0].get(*node as usize).and_then(Option::as_ref);
+            shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle_word(row));
+        }
+        if !item.is_replica {
             shown.each = 0;
         }
+        Some(shown)
     }
-    items.0
-}
 
-fn topics<'g>(
-    graph: &'g Graph,
-    (alive, paused): (&'g Alive, &'g Alive),
-) -> impl Iterator<Item = (u32, One)> + 'g {
-    let one = |t: &TopicState| One {
-        hz: t.hz,
-        count: Some(t.count),
-        ..One::new(t.state, t.degree)
-    };
-    ones(&alive.topics, &paused.topics, &graph.topics, |t| t.id, one).map(|(at, _, one)| (at, one))
-}
+    /// What an arrow shows, whether or not its ends are there.
+    pub(crate) fn arrow(&self, id: u32) -> Option<Shown> {
+        let arrow = self.viewed.arrows.get(id as usize)?;
+        let slot = match self.options.mode {
+            Mode::Nodes | Mode::Bundles => self.direct(id, arrow),
+            _ => self.edges(id, arrow),
+        };
+        slot.map(|shown| Shown { each: 0, ..shown })
+    }
 
-/// Publications, or subscriptions, of one window.
-fn edges<'g>(
-    alive: &'g [bool],
-    paused: &'g [bool],
-    states: &'g [EdgeState],
-) -> impl Iterator<Item = (u32, One)> + 'g {
-    let one = |e: &EdgeState| One {
-        hz: e.hz,
-        count: e.count,
-        ..One::new(e.state, e.degree)
-    };
-    ones(alive, paused, states, |e| e.id, one).map(|(at, _, one)| (at, one))
-}
-
-fn has_nodes(item: &Item) -> bool {
-    matches!(item.members.first(), Some(Element::Node(_)))
-}
-
-pub(crate) fn is_single(viewed: &Viewed, item: u32) -> bool {
-    let item = viewed.items.get(item as usize);
-    item.is_some_and(|i| i.members.len() == 1 && i.kind != ItemKind::Namespace)
-}
-
-fn present_arrows(
-    graph: &Graph,
-    options: &ViewOptions,
-    viewed: &Viewed,
-    (alive, paused): (&Alive, &Alive),
-) -> States {
-    let mut arrows = StateGather::new(viewed.arrows.len());
-    for (at, one) in edges(&alive.publishes, &paused.publishes, &graph.publishes) {
-        if let Some(EdgePlace::Arrow(id)) = viewed.publish.get(at as usize)
-            && shows_topic(one.state, options)
-        {
-            arrows.add(*id, &one);
+    fn edges(&self, id: u32, arrow: &Arrow) -> Option<Shown> {
+        let mut slot = None;
+        let shows = |one: &One| shows_topic(one.state, self.options);
+        for member in &arrow.members {
+            let one = match member {
+                Element::Publish(edge) => self.publish(*edge).filter(shows),
+                Element::Subscribe(edge) => {
+                    let ends = self.viewed.subscribed.get(*edge as usize);
+                    let topic = ends.and_then(|(_, topic)| self.topic(*topic));
+                    self.subscribe(*edge)
+                        .filter(|_| topic.as_ref().is_some_and(shows))
+                }
+                Element::Node(_) | Element::Topic(_) => None,
+            };
+            if let Some(one) = one {
+                gather(&mut slot, id, &one);
+            }
         }
+        slot
     }
-    let shown: BTreeSet<u32> = topics(graph, (alive, paused))
-        .filter(|(_, topic)| shows_topic(topic.state, options))
-        .map(|(at, _)| at)
-        .collect();
-    for (at, one) in edges(&alive.subscribes, &paused.subscribes, &graph.subscribes) {
-        let topic = viewed.subscribed.get(at as usize);
-        if let Some(EdgePlace::Arrow(id)) = viewed.subscribe.get(at as usize)
-            && topic.is_some_and(|(_, topic)| shown.contains(topic))
-        {
-            arrows.add(*id, &one);
-        }
-    }
-    arrows.0
-}
 
-/// Arrows from node to node: there in a window where both the publication and the subscription are, with the rate of
-/// the publication, or of the topic where that is not known.
-fn present_direct(graph: &Graph, viewed: &Viewed, lives: (&Alive, &Alive)) -> States {
-    let (alive, paused) = lives;
-    let publishes: BTreeMap<u32, One> =
-        edges(&alive.publishes, &paused.publishes, &graph.publishes).collect();
-    let subscribes: BTreeMap<u32, One> =
-        edges(&alive.subscribes, &paused.subscribes, &graph.subscribes).collect();
-    let topics: BTreeMap<u32, One> = topics(graph, lives).collect();
-    let mut arrows = StateGather::new(viewed.arrows.len());
-    for (pairs, id) in viewed.pairs.iter().zip(0..) {
-        let is_bundle = viewed.arrows.get(id as usize).map(|a| &a.kind) == Some(&ArrowKind::Bundle);
+    /// An arrow from node to node: there in a window where both the publication and the subscription are, with the rate
+    /// of the publication, or of the topic where that is not known.
+    fn direct(&self, id: u32, arrow: &Arrow) -> Option<Shown> {
+        let mut slot = None;
+        let is_bundle = arrow.kind == ArrowKind::Bundle;
         let (mut last, mut carried) = (None, BTreeSet::new());
-        for (publish, subscribe) in pairs {
-            let (Some(p), Some(s)) = (publishes.get(publish), subscribes.get(subscribe)) else {
+        for (publish, subscribe) in self.viewed.pairs.get(id as usize)? {
+            let (Some(p), Some(s)) = (self.publish(*publish), self.subscribe(*subscribe)) else {
                 continue;
             };
             // What several nodes of a box hear comes once.
             if is_bundle && last.replace(publish) == Some(publish) {
                 continue;
             }
-            let topic = viewed.subscribed.get(*subscribe as usize).map(|s| s.1);
+            let topic = self.viewed.subscribed.get(*subscribe as usize).map(|s| s.1);
             let is_new = topic.is_some_and(|topic| carried.insert(topic));
             // The rate of the whole topic counts once, however many publish it.
             let topic = topic.filter(|_| is_new || !is_bundle);
-            let topic = topic.and_then(|topic| topics.get(&topic));
+            let topic = topic.and_then(|topic| self.topic(topic));
             let joined = One {
                 state: p.state.max(s.state),
                 degree: p.degree.max(s.degree),
@@ -315,11 +311,48 @@ fn present_direct(graph: &Graph, viewed: &Viewed, lives: (&Alive, &Alive)) -> St
                 count: p.count,
                 is_paused: p.is_paused,
             };
-            arrows.add(id, &joined);
+            gather(&mut slot, id, &joined);
         }
-        if let Some(Some(shown)) = arrows.0.get_mut(id as usize).filter(|_| is_bundle) {
-            shown.topics = carried.len();
+        let topics = if is_bundle { carried.len() } else { 0 };
+        slot.map(|shown| Shown { topics, ..shown })
+    }
+
+    /// Whether what is heard of an element may decide who is shown at all.
+    pub(crate) fn hides_the_silent(&self) -> bool {
+        self.options.hide.unreachable || self.options.mode == Mode::Active
+    }
+
+    /// The item that shows an element, and the arrows.
+    pub(crate) fn shown_by(&self, what: Element) -> (Option<u32>, &[u32]) {
+        let carriers = || {
+            self.viewed
+                .carriers
+                .get(&what)
+                .map_or(&[][..], Vec::as_slice)
+        };
+        let is_direct = self.options.mode.is_direct();
+        let edge = |place: Option<&'a EdgePlace>| match place {
+            _ if is_direct => carriers(),
+            Some(EdgePlace::Arrow(id)) => std::slice::from_ref(id),
+            _ => &[],
+        };
+        match what {
+            Element::Node(id) => (self.viewed.node.get(id as usize).copied().flatten(), &[]),
+            Element::Topic(id) => {
+                let item = self.viewed.topic.get(id as usize).copied().flatten();
+                (item, if is_direct { carriers() } else { &[] })
+            }
+            Element::Publish(id) => (None, edge(self.viewed.publish.get(id as usize))),
+            Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id as usize))),
         }
     }
-    arrows.0
+}
+
+fn has_nodes(item: &Item) -> bool {
+    matches!(item.members.first(), Some(Element::Node(_)))
+}
+
+fn is_single(viewed: &Viewed, item: u32) -> bool {
+    let item = viewed.items.get(item as usize);
+    item.is_some_and(|i| i.members.len() == 1 && i.kind != ItemKind::Namespace)
 }

@@ -1,57 +1,47 @@
 //! All windows as one: what a still picture of the whole mission shows.
 
-use crate::base::time::Span;
-use crate::view::{Counts, Frame, Shown, View};
+use crate::view::settle::Lengths;
+use crate::view::{SeenWindow, Showing, Shown, View};
 
 /// The whole sequence as one window without marks: everything that was ever there, in its liveliest state, with rates
 /// averaged over the whole time and messages summed. `None` for a view without windows.
-pub(crate) fn union(view: &View) -> Option<Frame> {
-    let (first, last) = (view.frames.first()?, view.frames.last()?);
-    let mut items = vec![None; view.items.len()];
-    let mut arrows = vec![None; view.arrows.len()];
-    let mut whole = 0.0;
-    for frame in &view.frames {
-        let length = frame.span.nanos() as f64;
-        whole += length;
-        for shown in &frame.items {
-            gather(&mut items, shown, length);
-        }
-        for shown in &frame.arrows {
-            gather(&mut arrows, shown, length);
-        }
-    }
-    let average = |all: Vec<Option<Shown>>| {
-        let mut all: Vec<Shown> = all.into_iter().flatten().collect();
-        for shown in &mut all {
-            shown.hz = shown
-                .hz
-                .map(|sum| if whole > 0.0 { sum / whole } else { 0.0 });
-            shown.steady_hz = shown.hz;
-        }
-        all
+pub(crate) fn union(view: &View) -> Option<SeenWindow> {
+    view.frames.first()?;
+    let lengths = Lengths::new(view.frames.iter().map(|f| f.span));
+    let all = |shown: &[Showing]| {
+        let whole = shown.iter().filter_map(|showing| whole(showing, &lengths));
+        whole.collect()
     };
-    Some(Frame {
-        rolls: Vec::new(),
-        index: 0,
-        span: Span {
-            start: first.span.start,
-            end: last.span.end,
-        },
-        partial: false,
-        messages: view.frames.iter().map(|f| f.messages).sum(),
-        items: average(items),
-        arrows: average(arrows),
-        headlines: Vec::new(),
-        counts: Counts::default(),
-        caption: Vec::new(),
+    Some(SeenWindow {
+        items: all(&view.items_shown),
+        arrows: all(&view.arrows_shown),
     })
 }
 
-/// Adds a window of this length in nanoseconds; rates become sums over time.
-fn gather(all: &mut [Option<Shown>], shown: &Shown, length: f64) {
-    let Some(slot) = all.get_mut(shown.id as usize) else {
-        return;
-    };
+/// What is shown of one item or arrow, all windows together.
+fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
+    let ends = showing.runs().skip(1).map(|next| next.0);
+    let ends = ends.chain([lengths.windows()]);
+    let mut slot = None;
+    for ((from, shown), to) in showing.runs().zip(ends) {
+        if let Some(shown) = shown {
+            gather(&mut slot, shown, lengths.of(from, to), u64::from(to - from));
+        }
+    }
+    let time = lengths.of(0, lengths.windows());
+    let average = |sum: f64| if time > 0.0 { sum / time } else { 0.0 };
+    let sum: Shown = slot?;
+    let hz = sum.hz.map(average);
+    Some(Shown {
+        hz,
+        steady_hz: hz,
+        ..sum
+    })
+}
+
+/// Adds so many windows of this length in nanoseconds together; rates become sums over time.
+fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
+    let count = shown.count.map(|count| count.saturating_mul(windows));
     let Some(sum) = slot else {
         *slot = Some(Shown {
             mark: None,
@@ -60,6 +50,7 @@ fn gather(all: &mut [Option<Shown>], shown: &Shown, length: f64) {
             entries: Vec::new(),
             inside: None,
             lifecycle: None,
+            count,
             ..shown.clone()
         });
         return;
@@ -70,7 +61,7 @@ fn gather(all: &mut [Option<Shown>], shown: &Shown, length: f64) {
         (sum, Some(hz)) => Some(sum.unwrap_or(0.0) + hz * length),
         (sum, None) => sum,
     };
-    sum.count = match (sum.count, shown.count) {
+    sum.count = match (sum.count, count) {
         (sum, Some(count)) => Some(sum.unwrap_or(0).saturating_add(count)),
         (sum, None) => sum,
     };

@@ -84,6 +84,7 @@ fn main() {
         notices: &mission.notices,
         view: &view,
         picture: &picture,
+        unfolded: None,
         painter: &painter,
         fonts: &fonts,
         latex: None,

@@ -12,6 +12,8 @@
     reason = "a benchmark that fails says where, and its own numbers are small"
 )]
 
+mod measure;
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
@@ -22,6 +24,7 @@ use std::time::Instant;
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
 use bagreel::internals::base::notice::Notice;
 use bagreel::internals::base::time::{Span, Stamp};
+use measure::{Took, cpu, io_bytes, median, parse, peak_mb};
 
 /// What one robot sends: topic, type, messages per second, bytes of each.
 type Stream = (&'static str, &'static str, u32, usize);
@@ -403,16 +406,6 @@ impl Sink for Counter {
     }
 }
 
-/// What a run took.
-#[derive(Clone, Copy, Default)]
-struct Took {
-    wall: f64,
-    cpu: f64,
-    bytes: f64,
-    peak_mb: f64,
-    messages: f64,
-}
-
 /// Reads a bag in this process and prints what it took: `--one bag logs|counts start_s end_s rounds`.
 fn one(args: &[String]) {
     let path = PathBuf::from(&args[0]);
@@ -450,57 +443,7 @@ fn one(args: &[String]) {
     );
 }
 
-fn proc(file: &str, key: &str) -> u64 {
-    let text = fs::read_to_string(format!("/proc/self/{file}")).unwrap_or_default();
-    let line = text.lines().find_map(|l| l.strip_prefix(key));
-    line.and_then(|l| l.split_whitespace().next()?.parse().ok())
-        .unwrap_or(0)
-}
-
-fn io_bytes() -> u64 {
-    proc("io", "rchar:")
-}
-
-fn peak_mb() -> f64 {
-    proc("status", "VmHWM:") as f64 / 1024.0
-}
-
-/// Processor seconds of this process so far.
-fn cpu() -> f64 {
-    let text = fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = text.rsplit(')').next().unwrap_or_default();
-    let ticks = after
-        .split_whitespace()
-        .skip(11)
-        .take(2)
-        .filter_map(|t| t.parse::<f64>().ok());
-    ticks.sum::<f64>() / 100.0
-}
-
 // ---------------------------------------------------------------- runs
-
-fn parse(out: &[u8]) -> Option<Took> {
-    let text = String::from_utf8_lossy(out);
-    let line = text.lines().find_map(|l| l.strip_prefix("took "))?;
-    let n: Vec<f64> = line
-        .split_whitespace()
-        .filter_map(|x| x.parse().ok())
-        .collect();
-    Some(Took {
-        wall: n[0],
-        cpu: n[1],
-        bytes: n[2],
-        peak_mb: n[3],
-        messages: n[4],
-    })
-}
-
-/// The median of some runs of a command, by wall time.
-fn median(times: usize, run: impl Fn() -> Option<Took>) -> Option<Took> {
-    let mut all: Vec<Took> = (0..times).filter_map(|_| run()).collect();
-    all.sort_by(|a, b| a.wall.total_cmp(&b.wall));
-    all.get(all.len() / 2).copied()
-}
 
 fn ours(path: &Path, what: &str, (from, to): (i64, i64), rounds: u32) -> Option<Took> {
     let args = [

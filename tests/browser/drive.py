@@ -45,11 +45,14 @@ def at(spells, window):
 def compare_data(page, evolution):
     """Every value of every window: who is there, how alive, how fast."""
     data, compared = data_of(page), 0
+    graph = data["graphs"][0]
+    facts = [" ".join(data["words"][f] for f in own) for own in graph["facts"]]
+    lives = [[lists[k] if k < len(lists) else [] for k in range(4)] for lists in graph["lives"]]
     items = {}
-    for i, name in enumerate(data["names"]):
+    for i, name in enumerate(graph["names"]):
         items.setdefault(name, []).append(i)
-    count = len(data["names"])
-    arrows = {(data["names"][a], data["names"][b]): count + k for k, (a, b) in enumerate(data["arrows"])}
+    count = len(graph["names"])
+    arrows = {(graph["names"][a], graph["names"][b]): count + k for k, (a, b, _) in enumerate(graph["arrows"])}
     for w, window in enumerate(evolution["windows"]):
         there = set()
         rows = [(items.get(e["name"], [None])[0], e) for e in window["nodes"]]
@@ -57,23 +60,31 @@ def compare_data(page, evolution):
         rows += [(arrows.get((e["node"], e["topic"])), e) for e in window["publishes"]]
         rows += [(arrows.get((e["topic"], e["node"])), e) for e in window["subscribes"]]
         for i, element in rows:
-            if i is None or "together" in " ".join(data["words"][f] for f in data["facts"][i]):
+            if i is None or "together" in facts[i]:
                 continue
-            words = data["classes"][at(data["lives"][i][0], w)].split()
-            label = data["labels"][at(data["lives"][i][1], w)]
+            words = graph["classes"][at(lives[i][0], w)].split()
+            label = graph["labels"][at(lives[i][1], w)]
             assert words[0] == element["state"], (w, element, words)
             if element["hz"] is not None:
                 assert label == hertz(element["hz"]) + " Hz", (w, element, label)
             there.add(i)
             compared += 1
-        for i, life in enumerate(data["lives"]):
-            words = data["classes"][at(life[0], w)].split()
-            grouped = "together" in " ".join(data["words"][f] for f in data["facts"][i])
-            ends = data["arrows"][i - count] if i >= count else []
-            grouped |= any("together" in " ".join(data["words"][f] for f in data["facts"][e]) for e in ends)
+        for i, life in enumerate(lives):
+            words = graph["classes"][at(life[0], w)].split()
+            ends = graph["arrows"][i - count][:2] if i >= count else []
+            grouped = any("together" in facts[e] for e in [i, *ends])
             assert i in there or grouped or words == ["off"] or "removed" in words, (w, i, words)
     assert compared > 1000, compared
     print(f"  {compared} values of the data equal the evolution's")
+    return data
+
+
+def headlines(evolution):
+    """Per window, the entries that are told by themselves."""
+    parts = {part for e in evolution["ledger"] for part in e.get("parts", [])}
+    own = [e for e in evolution["ledger"] if not e["quiet"] and e["id"] not in parts]
+    inside = lambda e, w: w["start_ns"] <= e["time_ns"] < w["end_ns"]
+    return [[e for e in own if inside(e, w)] for w in evolution["windows"]]
 
 
 def check_console(b):
@@ -90,13 +101,14 @@ def window(b):
     return int(b.js("return document.getElementById('seek').value"))
 
 
-def drive(url, evolution):
+def drive(url, evolution, data):
     windows = evolution["windows"]
+    told = [len(own) for own in headlines(evolution)]
     last = len(windows) - 1
     with Browser() as b:
         b.open(url)
-        assert window(b) == 0
-        b.keys(RIGHT)
+        assert window(b) == data["still"] == told.index(max(told)), (window(b), data["still"], told)
+        b.keys(HOME, RIGHT)
         assert window(b) == 1
         b.keys((SHIFT, RIGHT))
         assert window(b) == 11
@@ -107,12 +119,20 @@ def drive(url, evolution):
         b.keys((CTRL, RIGHT))
         assert window(b) == int(last / 2 + 0.5)
         b.keys(HOME, "]")
-        first_change = next(i for i, w in enumerate(windows) if w["changes"])
+        first_change = next(w for w in range(1, len(windows)) if told[w])
         assert window(b) == first_change, (window(b), first_change)
         value = b.js("return document.getElementById('seek').ariaValueText")
         assert f"window {first_change + 1} of {len(windows)}" in value, value
         assert b.js("return document.getElementById('live').textContent")
-        print("  keys move through the mission")
+        b.keys(HOME)
+        seen = [0] if told[0] else []
+        while len(seen) < 2 or seen[-1] != seen[-2]:
+            b.keys("n")
+            seen.append(window(b))
+        assert seen[:-1] == [w for w, n in enumerate(told) if n], (seen, told)
+        b.keys("p")
+        assert window(b) == seen[-3], (window(b), seen)
+        print("  keys move through the mission, n and p from change to change")
 
         b.js("const s = document.getElementById('seek'); s.value = 7; s.dispatchEvent(new Event('input'))")
         assert window(b) == 7
@@ -134,10 +154,10 @@ def drive(url, evolution):
         assert topic in b.js("return document.getElementById('name').textContent")
         assert b.js("return document.querySelectorAll('#graph .near').length") > 1
         time.sleep(0.2)
-        assert f"sel={topic}" in b.js("return location.hash"), b.js("return location.hash")
+        assert f"sel=topic:{topic}" in b.js("return location.hash"), b.js("return location.hash")
         assert b.js("return document.getElementById('life').children.length") > 1
         b.keys(ESC, ESC)
-        assert b.js("return document.getElementById('card').hidden")
+        assert b.js("return document.getElementById('card').hidden && document.getElementById('hits').children.length == 0")
         node = windows[0]["nodes"][0]["name"]
         b.js("document.querySelector('.node[data-name=\"%s\"] text').dispatchEvent(new MouseEvent('click', {bubbles: true}))" % node)
         assert b.js("return document.getElementById('name').textContent") == node
@@ -156,18 +176,24 @@ def drive(url, evolution):
         b.open("about:blank")
         b.open(f"{url}#t={seconds:g}&sel={node}")
         assert window(b) == 30 and b.js("return document.getElementById('name').textContent") == node
+        b.open("about:blank")
+        b.open(f"{url}#t=0&sel=topic:{topic}")
+        assert b.js("return document.getElementById('state').textContent").startswith("topic")
         b.js("location.hash = '#t=0&q=scan'")
         time.sleep(0.2)
         assert window(b) == 0 and b.js("return document.getElementById('q').value") == "scan"
         print("  links lead where they say")
 
         compare_drawing(b, windows)
+        compare_telling(b, evolution)
+        compare_table(b, evolution, data)
+        compare_windows(b, evolution, data)
         check_console(b)
 
 
 def compare_drawing(b, windows):
     """What is drawn in every window: classes of the boxes, and rates beside the arrows."""
-    b.keys(HOME, ESC)
+    b.keys(HOME, ESC, ESC)
     read = """return [...document.querySelectorAll('#graph [data-name], #graph [data-from]')].map(g =>
         [g.dataset.name || g.dataset.from + ' ' + g.dataset.to, g.getAttribute('class'), g.querySelector('.r')?.textContent])"""
     b.js("document.activeElement.blur()")
@@ -184,6 +210,71 @@ def compare_drawing(b, windows):
                 assert told.endswith(hertz(rates[name]) + " Hz"), (w, name, told)
         b.keys(RIGHT)
     print("  every window is drawn as the evolution says")
+
+
+def compare_telling(b, evolution):
+    """Chips, list and marks of every window: each counts the headlines of the ledger."""
+    b.keys(HOME)
+    for w, own in enumerate(headlines(evolution)):
+        entries, numbers, listed = b.js("""const chips = document.getElementById('chips');
+            return [+chips.dataset.entries, [...chips.children].map(c => c.textContent), document.querySelectorAll('#news button').length]""")
+        assert entries == listed == len(own), (w, entries, listed, own)
+        assert sum(int(n) for n in re.findall(r"\d+", " ".join(numbers))) == len(own), (w, numbers)
+        for e in own[:1]:
+            at = (e["time_ns"] - evolution["windows"][0]["start_ns"]) / 1e9
+            went = b.js("""const axis = document.getElementById('axis').getBoundingClientRect(), marks = document.getElementById('marks');
+                const total = Math.max(...JSON.parse(arguments[1]));
+                marks.dispatchEvent(new PointerEvent('pointerdown', {bubbles: true, clientX: axis.left + axis.width * arguments[0] / total, clientY: 0}));
+                return +document.getElementById('seek').value""", at + 1e-3, json.dumps(
+                    [(x["end_ns"] - evolution["windows"][0]["start_ns"]) / 1e9 for x in evolution["windows"]]))
+            assert went == w, (went, w)
+        b.keys(RIGHT)
+    print("  chips, lists and marks count what the ledger tells")
+
+
+def compare_table(b, evolution, data):
+    """Every row of the table in some windows: what is there, and how fast."""
+    b.keys("t")
+    for w in (0, 7, 23, 44):
+        b.js(f"const s = document.getElementById('seek'); s.value = {w}; s.dispatchEvent(new Event('input'))")
+        rows = b.js("""return [...document.querySelectorAll('#sheet tbody tr[data-key]')].map(r => [r.dataset.key, ...[2, 7].map(k => r.children[k].textContent)])""")
+        assert len(rows) == len(data["graphs"][0]["names"]), len(rows)
+        state = {"topic:" + e["name"]: e for e in evolution["windows"][w]["topics"]}
+        state |= {"node:" + e["name"]: e for e in evolution["windows"][w]["nodes"]}
+        for key, rate, says in rows:
+            if key in state and state[key]["hz"] is not None:
+                assert rate == hertz(state[key]["hz"]) + " Hz", (w, key, rate, state[key])
+                assert says.startswith(state[key]["state"]), (w, key, says)
+            elif key not in state:
+                assert rate == "–" and says.startswith("not there"), (w, key, rate, says)
+    b.keys(ESC, ESC)
+    assert b.js("return document.getElementById('sheet').hidden")
+    print("  the table says what the evolution says")
+
+
+def compare_windows(b, evolution, data):
+    """Two windows: what is told to differ, differs, and nothing else."""
+    def present(w):
+        window, all_of = evolution["windows"][w], {}
+        for kind, name in (("nodes", "node:{name}"), ("topics", "topic:{name}"),
+                           ("publishes", "edge:{node} → {topic}"), ("subscribes", "edge:{topic} → {node}")):
+            all_of |= {name.format(**e): e["hz"] or 0 for e in window[kind]}
+        return all_of
+    for before, after in ((3, 30), (30, 3), (10, 11)):
+        b.js("document.activeElement.blur()")
+        b.js(f"location.hash = '#t={data['starts'][after]}&b={data['starts'][before]}'")
+        time.sleep(0.2)
+        old, new = present(before), present(after)
+        moved = {k for k in old.keys() & new.keys() if abs(new[k] - old[k]) > 0.25 * (old[k] or new[k])}
+        differs = (old.keys() ^ new.keys()) | moved
+        shown = b.js("""const more = document.querySelector('#news .more'); more?.click();
+            return [+document.getElementById('chips').dataset.entries, document.querySelectorAll('#news button').length]""")
+        assert shown == [len(differs), len(differs)], (before, after, shown, len(differs))
+        drawn = b.js("return document.querySelectorAll('#graph .items > :is(.added, .removed, .changed), #graph .arrows > :is(.added, .removed, .changed)').length")
+        assert drawn == len(differs), (drawn, len(differs))
+    b.js("location.hash = '#t=0'")
+    time.sleep(0.2)
+    print("  two windows differ in what the evolution says")
 
 
 def hostile(url):
@@ -210,14 +301,18 @@ def elsewhere(url, page):
         outer.write_text(f'<!doctype html><iframe sandbox="allow-scripts" width="1000" height="700" srcdoc="{html.escape(page)}"></iframe>')
         b.open(outer.as_uri())
         b.frame(0)
-        b.click("[data-key='.']")
-        assert window(b) == 1
+        before = window(b)
+        b.click("[data-key=',']")
+        assert window(b) == before - 1
+        b.click("#toside")
+        b.click("#told a")
+        assert window(b) >= 0 and b.js("return location.href") == "about:srcdoc", "a link left the frame"
         check_console(b)
         b.cdp("Emulation.setScriptExecutionDisabled", value=True)
         b.open(url)
         b.cdp("Emulation.setScriptExecutionDisabled", value=False)
         assert b.js("return document.querySelectorAll('tbody a').length") > 3
-        assert b.js("return document.querySelectorAll('#items > .node:not(.off)').length") > 3
+        assert b.js("return document.querySelectorAll('.items > .node:not(.off)').length") > 3
     print("  it works in a sandboxed frame, and says what changed without scripts")
 
 
@@ -246,8 +341,8 @@ def main(page, evolution, hostile_page, svg):
     path = pathlib.Path(page).resolve()
     text = path.read_text()
     evolution = json.loads(pathlib.Path(evolution).read_text())
-    compare_data(text, evolution)
-    drive(path.as_uri(), evolution)
+    data = compare_data(text, evolution)
+    drive(path.as_uri(), evolution, data)
     hostile(pathlib.Path(hostile_page).resolve().as_uri())
     elsewhere(path.as_uri(), text)
     animation(svg)

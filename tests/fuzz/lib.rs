@@ -51,7 +51,7 @@ impl Sink for Nothing {
 /// Reads whatever lies there, every payload of it.
 pub fn read_bag(path: &Path, verify: bool) {
     let input = Input::Path(path.to_owned());
-    if let Ok(mut reader) = bag::open(&input, &OpenOptions { verify }) {
+    if let Ok(mut reader) = bag::open(&input, &OpenOptions { verify, ..OpenOptions::default() }) {
         let _ = reader.span();
         let mut nothing = Nothing::default();
         if reader.read(None, &mut nothing).is_ok() {

@@ -95,13 +95,8 @@ impl Summary {
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
                 op::STATISTICS => self.statistics = statistics(record),
                 op::CHUNK_INDEX => {
-                    let (chunk, size) =
-                        chunk_index(record, &mut self.used).ok_or(NoRecord::Broken)?;
-                    self.blind |= chunk.promised.is_none() && size > 0;
-                    if self.plan.chunks.len() >= MOST_CHUNKS {
-                        return Err(NoRecord::Broken);
-                    }
-                    self.plan.chunks.push(chunk);
+                    let index = chunk_index(record, &mut self.used).ok_or(NoRecord::Broken)?;
+                    self.chunk(index)?;
                 }
                 _ => {}
             }
@@ -116,6 +111,21 @@ impl Summary {
                 connections.add(raw, connection);
             }
         }
+        Ok(())
+    }
+
+    fn chunk(&mut self, index: ChunkIndex) -> Result<(), NoRecord> {
+        let ChunkIndex {
+            chunk,
+            counts,
+            size,
+        } = index;
+        self.blind |= chunk.promised.is_none() && size > 0;
+        if self.plan.chunks.len() >= MOST_CHUNKS {
+            return Err(NoRecord::Broken);
+        }
+        let counts = self.plan.keep(&counts);
+        self.plan.chunks.push(Chunk { counts, ..chunk });
         Ok(())
     }
 
@@ -188,8 +198,16 @@ fn statistics(record: &[u8]) -> Option<Statistics> {
     }
 }
 
-/// What a chunk index record says, and the length of the chunk's records.
-fn chunk_index(record: &[u8], used: &mut Used) -> Option<(Chunk, u64)> {
+/// What a chunk index record says.
+struct ChunkIndex {
+    chunk: Chunk,
+    /// Messages by channel.
+    counts: Vec<(u32, u32)>,
+    /// The length of the chunk's records.
+    size: u64,
+}
+
+fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
     let mut cursor = FieldCursor(record);
     let (first, last) = (cursor.u64()?, cursor.u64()?);
     let (start, len) = (cursor.u64()?, cursor.u64()?);
@@ -202,20 +220,27 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<(Chunk, u64)> {
     if len < HEAD {
         return None;
     }
+    let counts = counts(offsets, behind, end);
+    let promised = counts.as_ref().map(|counts| promised(counts, used));
     let chunk = Chunk {
         start,
         index: behind..end,
         end,
         first: Stamp::from_nanos(first),
         last: Stamp::from_nanos(last),
-        promised: promised(offsets, behind, end, used),
+        promised,
+        counts: 0..0,
     };
-    Some((chunk, size))
+    Some(ChunkIndex {
+        chunk,
+        counts: counts.unwrap_or_default(),
+        size,
+    })
 }
 
 /// The counts that follow from where the message indexes of a chunk's channels begin: they stand one behind the other,
 /// 15 bytes and 16 for each message. `None` if they do not, or if there are none.
-fn promised(offsets: &[u8], start: u64, end: u64, used: &mut Used) -> Option<IndexSum> {
+fn counts(offsets: &[u8], start: u64, end: u64) -> Option<Vec<(u32, u32)>> {
     let mut places = Vec::with_capacity(offsets.len() / 10);
     let mut cursor = FieldCursor(offsets);
     while let (Some(channel), Some(at)) = (cursor.u16(), cursor.u64()) {
@@ -225,17 +250,23 @@ fn promised(offsets: &[u8], start: u64, end: u64, used: &mut Used) -> Option<Ind
     if places.first()?.0 != start {
         return None;
     }
-    let mut sum = IndexSum::default();
     let ends = places.iter().skip(1).map(|p| p.0).chain([end]);
-    for ((at, channel), end) in places.iter().zip(ends) {
+    let count = |((at, channel), end): (&(u64, u16), u64)| {
         let entries = end.checked_sub(*at)?.checked_sub(15)?;
-        if entries % 16 != 0 {
-            return None;
-        }
-        sum.add(u32::from(*channel), u32::try_from(entries / 16).ok()?);
-        if entries > 0 {
-            used.add(u32::from(*channel));
+        let count = u32::try_from(entries / 16).ok()?;
+        (entries % 16 == 0).then_some((u32::from(*channel), count))
+    };
+    places.iter().zip(ends).map(count).collect()
+}
+
+/// What the index should add up to.
+fn promised(counts: &[(u32, u32)], used: &mut Used) -> IndexSum {
+    let mut sum = IndexSum::default();
+    for (channel, count) in counts {
+        sum.add(*channel, *count);
+        if *count > 0 {
+            used.add(*channel);
         }
     }
-    Some(sum)
+    sum
 }

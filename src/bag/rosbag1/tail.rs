@@ -138,7 +138,8 @@ impl Tail {
         else {
             return Err(NoRecord::Broken);
         };
-        let promised = self.promised(stream, count, len)?;
+        let (promised, counts) = self.promised(stream, count, len)?;
+        let counts = self.plan.keep(&counts);
         self.plan.chunks.push(Chunk {
             start: pos,
             index: 0..0,
@@ -146,6 +147,7 @@ impl Tail {
             first: start,
             last: end,
             promised: Some(promised),
+            counts,
         });
         Ok(())
     }
@@ -156,8 +158,9 @@ impl Tail {
         stream: &mut ByteStream<'_>,
         count: u32,
         len: u32,
-    ) -> Result<IndexSum, NoRecord> {
+    ) -> Result<(IndexSum, Vec<(u32, u32)>), NoRecord> {
         let mut sum = IndexSum::default();
+        let mut counts = Vec::new();
         if u64::from(count) * 8 > u64::from(len) {
             return Err(NoRecord::Broken);
         }
@@ -166,12 +169,13 @@ impl Tail {
             let raw = records::u32_at(pair, 0).ok_or(NoRecord::Cut)?;
             let messages = records::u32_at(pair, 4).ok_or(NoRecord::Cut)?;
             sum.add(raw, messages);
+            counts.push((raw, messages));
             if messages > 0 {
                 self.used.add(raw);
             }
             stream.advance(8);
         }
-        Ok(sum)
+        Ok((sum, counts))
     }
 
     /// Orders the chunks and tells each where it ends.

@@ -1,4 +1,5 @@
-//! The course of a mission at its smallest: life lines without words, for the strip below frames.
+//! The course of a mission beside its picture: life lines without words for the strip below frames, and with names for
+//! the timeline of a page.
 
 use super::groups;
 use super::lives::LivesFigure;
@@ -6,7 +7,7 @@ use super::rows::FigureRow;
 use super::source::FigureSource;
 use super::tracks::{SendingBar, TrackLife};
 use crate::base::time::{Span, Stamp};
-use crate::graph::NodeId;
+use crate::graph::{Element, NodeId};
 
 /// Who lived when, in rows from top to bottom, and the phases.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,4 +82,65 @@ fn rows(lives: &LivesFigure<'_>) -> Vec<(Vec<usize>, CourseRow)> {
         }
     };
     lives.rows.iter().filter_map(row).collect()
+}
+
+/// The lives of all, a row each with its name, in the order of the figure: the timeline of a page.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LifeLines {
+    pub(crate) rows: Vec<LifeLine>,
+    /// Topics that others send from a moment on: the rows of the one before and the one after.
+    pub(crate) handovers: Vec<(Stamp, usize, usize)>,
+}
+
+/// A node, a topic, or the title of the namespace of those that follow.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct LifeLine {
+    pub(crate) label: String,
+    /// Whether it stands below the title of its namespace.
+    pub(crate) is_inside: bool,
+    /// Whom it is about; `None` for a title.
+    pub(crate) what: Option<Element>,
+    pub(crate) lives: Vec<TrackLife>,
+    pub(crate) bars: Vec<SendingBar>,
+}
+
+impl LifeLines {
+    /// The rows of nodes; of topics where publishers are unknown.
+    pub(crate) fn new(source: &FigureSource<'_>) -> Self {
+        let lives = LivesFigure::new(source, !source.knows_publishers());
+        let handed = lives.handovers.clone();
+        let lives = lives.opened();
+        let place = |track| lives.rows.iter().position(|row| row.holds(track));
+        let handed = handed.iter();
+        let handed = handed.filter_map(|h| Some((h.at, place(h.from)?, place(h.to)?)));
+        Self {
+            handovers: handed.collect(),
+            rows: lives.rows.iter().filter_map(|r| line(&lives, r)).collect(),
+        }
+    }
+}
+
+fn line(lives: &LivesFigure<'_>, row: &FigureRow) -> Option<LifeLine> {
+    match row {
+        FigureRow::Space(name) => Some(LifeLine {
+            label: name.clone(),
+            is_inside: false,
+            what: None,
+            lives: Vec::new(),
+            bars: Vec::new(),
+        }),
+        FigureRow::Track(at, label, is_inside) => {
+            let track = lives.tracks.get(*at)?;
+            let node = track.nodes.last().map(|id| Element::Node(*id));
+            Some(LifeLine {
+                label: label.clone(),
+                is_inside: *is_inside,
+                what: node.or(track.topic.map(Element::Topic)),
+                lives: track.lives.clone(),
+                bars: track.bars.clone(),
+            })
+        }
+        // Opened, they fold nothing.
+        FigureRow::Folded(..) => None,
+    }
 }

@@ -3,37 +3,45 @@
 //! It runs inside `<img>`. Whoever asks for less motion gets a still of everything that ever was, because the rules for
 //! the classes hold only where motion is welcome; a reader that knows no animation shows the busiest window.
 
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
 use super::classes::{self, ClassDetail, Classes, ElementLook, bars};
 use super::xml::Xml;
+use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
-use crate::view::View;
-use crate::view::runs::{ElementRuns, Run, Runs, at};
+use crate::mission::ledger::Phase;
+use crate::view::runs::{ElementRuns, Runs, at};
+use crate::view::{Frame, View};
 
 /// With more changed windows than this, what changed is not written in words.
 const MOST_CAPTIONS: usize = 24;
 /// So many phrases are written out at most; the rest is counted.
 const MOST_PHRASES: usize = 4;
-/// The longest caption, in characters.
-const LONGEST_CAPTION: usize = 110;
+/// How wide a letter of a caption is, at most, in pixels.
+const LETTER: f64 = 7.0;
+/// A rate that changes more often than this is not written: a text for each value would outweigh the graph.
+const MOST_VALUES: usize = 40;
 /// Around the graph.
 const MARGIN: f64 = 12.0;
 /// Above and below the graph.
-const TOP: f64 = 58.0;
+const TOP: f64 = 76.0;
 const BOTTOM: f64 = 62.0;
 
 /// The windows of `view` one after the other, each for so many milliseconds, over the graph of them all.
 pub(crate) fn write(
     view: &View,
-    union: &Union,
-    style: &Style,
+    phases: &[Phase],
+    (union, style): (&Union, &Style),
     title: &str,
     frame_ms: u32,
 ) -> String {
     let runs = Runs::of(view, rate_label);
     let play = Play {
         view,
+        phases: if phases.len() > 1 { phases } else { &[] },
         runs: &runs,
         union,
         style,
@@ -47,6 +55,8 @@ pub(crate) fn write(
 
 struct Play<'a> {
     view: &'a View,
+    /// None where there is only one.
+    phases: &'a [Phase],
     runs: &'a Runs,
     union: &'a Union,
     style: &'a Style,
@@ -86,7 +96,14 @@ impl Play<'_> {
         graph.signs(&mut xml);
         let (left, top) = ((width - size.w) / 2.0, TOP + MARGIN);
         let place = format_args!("translate({left:.0} {top:.0})");
-        xml.open("g").attribute("transform", place).raw("\n");
+        // How it looks where styles are refused: outlines, not blobs.
+        xml.open("g")
+            .attribute("transform", place)
+            .attribute("fill", "none")
+            .attribute("stroke", self.style.edge.stroke)
+            .attribute("font-size", 11)
+            .attribute("text-anchor", "middle")
+            .raw("\n");
         graph.spaces(&mut xml);
         for &at in &self.union.order {
             graph.arrow(&mut xml, at, &self.element(&self.runs.arrows[at], "edge"));
@@ -106,14 +123,16 @@ impl Play<'_> {
         let page = &style.page;
         format!(
             "{}.t{{text-anchor:start;font:600 17px {f};fill:{}}}.u{{text-anchor:start;font:12.5px {f};fill:{}}}\
-             .x{{font:12px {f};fill:{}}}.k,.head{{visibility:hidden}}.k{{text-anchor:end;font:13px {f};fill:{}}}\
+             .x{{font:12px {f};fill:{}}}.k,.v,.head{{visibility:hidden}}.k{{font:13px {f};fill:{}}}\
+             .phase{{fill:none;stroke:{}}}\
              path.added{{fill:{}}}path.removed{{fill:{}}}path.changed{{fill:{}}}\
-             @media(prefers-reduced-motion:no-preference){{{}.on,.head{{visibility:visible}}}}",
+             @media(prefers-reduced-motion:no-preference){{{}.on,.head{{visibility:visible}}.v.on{{visibility:inherit}}}}",
             classes::base(style),
             page.text,
             page.quiet,
             page.quiet,
             page.text,
+            style.timeline.axis,
             style.added.color,
             style.removed.color,
             style.changed.color,
@@ -179,39 +198,85 @@ impl Play<'_> {
             line(xml, "u", 45, &told);
         }
         xml.raw("\n");
-        let frames = self.view.frames.iter().zip(0_u32..);
-        let told = frames.filter(|(f, _)| !f.headlines.is_empty());
-        if told.clone().count() > MOST_CAPTIONS {
+        self.captions(xml, width);
+        for (phase, next) in self.phases.iter().zip(1..) {
+            let begins = |at: Stamp| self.view.frames.partition_point(|f| f.span.end <= at);
+            let from = begins(phase.span.start);
+            let to = self
+                .phases
+                .get(next)
+                .map_or(self.windows, |p| begins(p.span.start));
+            let name = words::shorten(&phase.name, 60);
+            let text = format!("{next} {}", visible(&name));
+            self.while_shown(xml, (from, to), ("end", width - 16.0, 45.0), &text);
+        }
+    }
+
+    /// What changed in each window, as much as its line holds.
+    fn captions(&self, xml: &mut Xml, width: f64) {
+        let told = |f: &&Frame| !f.headlines.is_empty();
+        if self.view.frames.iter().filter(told).count() > MOST_CAPTIONS {
             return;
         }
-        for (frame, window) in told {
-            let on = (window, "k on".to_owned());
-            let mut steps = vec![(0, "k".to_owned()), on, (window + 1, "k".to_owned())];
-            steps.retain(|s| (s.0 as usize) < self.windows);
-            if window == 0 {
-                steps.remove(0);
+        let start = self.view.frames.first().map_or(Stamp(0), |f| f.span.start);
+        for (window, frame) in self.view.frames.iter().enumerate() {
+            let at = words::offset(frame.span.start.since(start));
+            let fits = |text: &String| text.chars().count() as f64 * LETTER < width - 32.0;
+            let all = (0..=MOST_PHRASES).rev();
+            let mut all = all.map(|most| format!("{at}  {}", visible(&frame.words(most))));
+            if let Some(text) = all.find(fits).filter(|_| told(&&*frame)) {
+                self.while_shown(xml, (window, window + 1), ("start", 16.0, 66.0), &text);
             }
-            let all = frame.words(MOST_PHRASES);
-            let words: String = visible(&all).chars().take(LONGEST_CAPTION).collect();
-            xml.open("text")
-                .attribute("class", "k")
-                .attribute("x", format_args!("{:.0}", width - 16.0))
-                .attribute("y", 45);
-            self.classes(xml, &steps);
-            xml.text(&words).close().raw("\n");
         }
+    }
+
+    /// A text that is seen from one window to before another.
+    fn while_shown(
+        &self,
+        xml: &mut Xml,
+        (from, to): (usize, usize),
+        (anchor, x, y): (&str, f64, f64),
+        text: &str,
+    ) {
+        if from >= to.min(self.windows) {
+            return;
+        }
+        xml.open("text")
+            .attribute("class", "k")
+            .attribute("visibility", "hidden")
+            .attribute("text-anchor", anchor)
+            .attribute("style", format_args!("text-anchor:{anchor}"))
+            .attribute("x", format_args!("{x:.0}"))
+            .attribute("y", format_args!("{y:.0}"));
+        self.classes(xml, &self.shown(&[(from, to)], "k"));
+        xml.text(text).close().raw("\n");
+    }
+
+    /// The classes of what is seen from some windows to before others, in order.
+    fn shown(&self, times: &[(usize, usize)], class: &str) -> Vec<(u32, String)> {
+        let window = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
+        let mut steps = vec![(0, class.to_owned())];
+        for (from, to) in times {
+            if steps.last().is_some_and(|(at, _)| *at == window(*from)) {
+                steps.pop();
+            }
+            steps.push((window(*from), format!("{class} on")));
+            steps.push((window(*to), class.to_owned()));
+        }
+        steps.retain(|s| (s.0 as usize) < self.windows);
+        steps
     }
 
     /// What changed when, and where in the mission the picture is.
     fn timeline(&self, xml: &mut Xml, width: f64, height: f64) {
         let style = &self.style.timeline;
         let (left, wide, y) = (16.0, width - 32.0, height - 26.0);
-        let scale = wide / self.windows.max(1) as f64;
         let top = y - 30.0;
-        let place = format_args!("translate({left} {top:.0}) scale({scale:.4} .5)");
+        let place = format_args!("translate({left} {top:.0}) scale(1 .5)");
         xml.open("g").attribute("transform", place);
-        bars(xml, self.runs);
+        bars(xml, self.view, wide);
         xml.close();
+        self.band(xml, (left, wide), y);
         xml.open("path")
             .attribute("d", format_args!("M{left} {y:.0}h{wide:.0}"))
             .attribute("stroke", style.axis)
@@ -224,14 +289,47 @@ impl Play<'_> {
             .attribute("width", 2.5)
             .attribute("height", 34)
             .attribute("fill", style.head);
-        xml.open("animate")
-            .attribute("attributeName", "x")
-            .attribute("from", left)
-            .attribute("to", format_args!("{:.1}", left + wide))
-            .attribute("dur", format_args!("{}s", self.seconds))
+        let at = |window: usize| left + wide * self.view.place_in_time(window);
+        let even = |k: usize| left + wide * k as f64 / self.windows.max(1) as f64;
+        xml.open("animate").attribute("attributeName", "x");
+        if (0..self.windows).all(|k| (at(k) - even(k)).abs() < 1.0) {
+            xml.attribute("from", left)
+                .attribute("to", format_args!("{:.1}", left + wide));
+        } else {
+            let places: Vec<String> = (0..=self.windows)
+                .map(|k| format!("{:.0}", at(k)))
+                .collect();
+            xml.attribute("values", places.join(";"));
+        }
+        xml.attribute("dur", format_args!("{}s", self.seconds))
             .attribute("repeatCount", "indefinite")
             .close_empty();
         xml.close().raw("\n");
+    }
+
+    /// The phases as boxes on the axis.
+    fn band(&self, xml: &mut Xml, (left, wide): (f64, f64), y: f64) {
+        let (Some(first), Some(last)) = (self.view.frames.first(), self.view.frames.last()) else {
+            return;
+        };
+        let whole = last.span.end.since(first.span.start).max(1) as f64;
+        let x = |at: Stamp| {
+            let part = at.since(first.span.start) as f64 / whole;
+            left + wide * part.clamp(0.0, 1.0)
+        };
+        let mut boxes = String::new();
+        for phase in self.phases {
+            let (from, to) = (x(phase.span.start), x(phase.span.end));
+            let _ = write!(boxes, "M{from:.1} {y:.0}v4H{to:.1}v-4");
+        }
+        if !boxes.is_empty() {
+            xml.open("path")
+                .attribute("class", "phase")
+                .attribute("fill", "none")
+                .attribute("stroke", self.style.timeline.axis)
+                .attribute("d", boxes)
+                .close_empty();
+        }
     }
 
     /// The time at every quarter of an axis that begins at `left`.
@@ -242,8 +340,11 @@ impl Play<'_> {
         let whole = last.span.end.since(first.span.start);
         let anchors = ["start", "middle", "middle", "middle", "end"];
         for (quarter, anchor) in (0_i32..).zip(anchors) {
-            let nanos = whole / 4_000_000_000 * i64::from(quarter) * 1_000_000_000;
-            let x = left + wide * f64::from(quarter) / 4.0;
+            let nanos = match quarter {
+                4 => whole / 1_000_000 * 1_000_000,
+                quarter => whole / 4_000_000_000 * i64::from(quarter) * 1_000_000_000,
+            };
+            let x = left + wide * nanos as f64 / whole.max(1) as f64;
             xml.open("text")
                 .attribute("class", "x")
                 .attribute("style", format_args!("text-anchor:{anchor}"))
@@ -263,6 +364,24 @@ struct AnimatedElement<'a> {
 }
 
 impl AnimatedElement<'_> {
+    /// What its live text says from which window to before which, where it says something.
+    fn values(&self, tells_changes: bool) -> Vec<(usize, usize, u32)> {
+        let list = match (tells_changes, self.life.lifecycles.is_empty()) {
+            (true, _) => &self.life.turns,
+            (false, true) => &self.life.rates,
+            (false, false) => &self.life.lifecycles,
+        };
+        let ends = list.iter().skip(1).map(|run| run.from as usize);
+        let ends = ends.chain([self.play.windows]);
+        let all = list.iter().zip(ends).map(|(run, end)| {
+            let from = run.from as usize;
+            (from, if tells_changes { from + 1 } else { end }, run.value)
+        });
+        let is_told = |label: &String| !label.is_empty() && *label != words::rate(0.0);
+        all.filter(|(.., value)| is_told(&self.play.runs.labels[*value as usize]))
+            .collect()
+    }
+
     /// The class attribute for a place in the table of classes: only words that a rule is about.
     fn words(&self, class: u32) -> String {
         let all = self.play.runs.classes[class as usize].split(' ');
@@ -281,14 +400,34 @@ impl ElementLook for AnimatedElement<'_> {
     }
 
     fn text(&self) -> String {
-        let still = at(&self.life.rates, self.play.still);
-        let label = |place: u32| &self.play.runs.labels[place as usize];
-        let silent = words::rate(0.0);
-        let is_known = |label: &String| !label.is_empty() && *label != silent;
-        let known = |run: &&Run| is_known(label(run.value));
-        let first = self.life.rates.iter().find(known).map_or(0, |s| s.value);
-        let shown = if is_known(label(still)) { still } else { first };
-        label(shown).clone()
+        String::new()
+    }
+
+    /// A text for each value, seen in its windows; none where that would be too many.
+    fn live(&self, xml: &mut Xml, (x, y): (i64, i64), tells_changes: bool) {
+        let values = self.values(tells_changes);
+        let is_one = matches!(values[..], [(_, to, _)] if to == self.play.windows);
+        if values.len() > MOST_VALUES {
+            return;
+        }
+        let mut by_label: BTreeMap<u32, Vec<(usize, usize)>> = BTreeMap::new();
+        for (from, to, label) in values {
+            by_label.entry(label).or_default().push((from, to));
+        }
+        for (label, times) in by_label {
+            xml.open("text");
+            if is_one {
+                xml.attribute("class", "r");
+            } else {
+                xml.attribute("class", "r v")
+                    .attribute("visibility", "hidden");
+            }
+            xml.attribute("x", x).attribute("y", y);
+            if !is_one {
+                self.play.classes(xml, &self.play.shown(&times, "r v"));
+            }
+            xml.text(&self.play.runs.labels[label as usize]).close();
+        }
     }
 
     fn more(&self, xml: &mut Xml) {

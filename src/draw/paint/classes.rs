@@ -13,9 +13,8 @@ use crate::draw::paint::xml::{Xml, units};
 use crate::draw::picture::{Union, UnionElement};
 use crate::draw::scene::{Form, Group, Piece, Step};
 use crate::draw::style::Style;
-use crate::view::runs::Runs;
 use crate::view::runs::word;
-use crate::view::{Mark, View};
+use crate::view::{Counts, Frame, Mark, View};
 
 /// How much is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +42,16 @@ pub(crate) trait ElementLook {
     fn text(&self) -> String;
     /// Writes more elements inside it, such as animations.
     fn more(&self, _xml: &mut Xml) {}
+    /// Writes its live text at a place, as one element or more; `tells_changes` where it stands only in windows in
+    /// which its rate changed.
+    fn live(&self, xml: &mut Xml, (x, y): (i64, i64), tells_changes: bool) {
+        xml.open("text")
+            .attribute("class", if tells_changes { "r c" } else { "r" })
+            .attribute("x", x)
+            .attribute("y", y)
+            .text(&self.text())
+            .close();
+    }
 }
 
 impl<'a> Classes<'a> {
@@ -67,18 +76,7 @@ impl<'a> Classes<'a> {
         let marks: BTreeSet<Mark> = parts.flat_map(|p| p.marks.iter().copied()).collect();
         xml.open("defs");
         for mark in marks {
-            xml.open("g").attribute("id", word(mark));
-            for (at, piece) in crate::draw::picture::sign(self.style, mark)
-                .pieces
-                .iter()
-                .enumerate()
-            {
-                let Piece::Shape(shape) = piece else { continue };
-                let pen = if shape.stroke.width > 0.0 { "p" } else { "f" };
-                let class = if at == 0 { "b" } else { pen };
-                fine(xml, &shape.form, class);
-            }
-            xml.close();
+            badge_shapes(xml, self.style, mark);
         }
         xml.close();
     }
@@ -136,9 +134,7 @@ impl<'a> Classes<'a> {
             }
         }
         look.more(xml);
-        let text = look.text();
-        let class = if part.tells_changes { "r c" } else { "r" };
-        self.pieces(xml, &part.group, part.is_live.then_some((class, &text)));
+        self.pieces(xml, &part.group, Some((part, look)));
         for mark in &part.marks {
             let word = word(*mark);
             let Point { x, y } = part.badge;
@@ -157,39 +153,47 @@ impl<'a> Classes<'a> {
         xml.close().raw("\n");
     }
 
-    /// Shapes and texts. `live` is what the last text says in place of its own words.
-    fn pieces(&self, xml: &mut Xml, group: &Group, live: Option<(&str, &String)>) {
-        let texts = group
-            .pieces
-            .iter()
-            .filter(|p| matches!(p, Piece::Text(_)))
-            .count();
+    /// Shapes and texts; of an element with its latch before its first text, and its live text as its last.
+    fn pieces(
+        &self,
+        xml: &mut Xml,
+        group: &Group,
+        element: Option<(&UnionElement, &dyn ElementLook)>,
+    ) {
+        let is_text = |p: &&Piece| matches!(p, Piece::Text(_));
+        let texts = group.pieces.iter().filter(is_text).count();
         let mut seen = 0;
         for piece in &group.pieces {
-            match piece {
-                Piece::Shape(shape) => self.form(xml, &shape.form),
-                Piece::Text(text) => {
-                    seen += 1;
-                    let live = live.filter(|_| seen == texts);
-                    let class = match (live, seen) {
-                        (Some((class, _)), _) => Some(class),
-                        (None, 2..) => Some("m"),
-                        _ => None,
-                    };
-                    xml.open("text");
-                    if let Some(class) = class {
-                        xml.attribute("class", class);
-                    }
-                    xml.attribute("x", whole(text.at.x))
-                        .attribute("y", whole(text.at.y))
-                        .text(live.map_or(&text.text, |(_, words)| words))
-                        .close();
+            let text = match piece {
+                Piece::Shape(shape) => {
+                    self.form(xml, &shape.form, None);
+                    continue;
                 }
+                Piece::Text(text) => text,
+            };
+            seen += 1;
+            if let Some((Some(latch), 1)) = element.map(|(part, _)| (&part.latch, seen)) {
+                self.form(xml, latch, Some("l"));
             }
+            let place = (whole(text.at.x), whole(text.at.y));
+            if let Some((part, look)) = element.filter(|(part, _)| part.is_live && seen == texts) {
+                look.live(xml, place, part.tells_changes);
+                continue;
+            }
+            let name = element.and_then(|(part, _)| part.name.as_ref());
+            let name = name.filter(|_| self.detail.has_names && seen == 1);
+            xml.open("text");
+            if seen > 1 {
+                xml.attribute("class", "m");
+            }
+            xml.attribute("x", place.0)
+                .attribute("y", place.1)
+                .text(name.unwrap_or(&text.text))
+                .close();
         }
     }
 
-    fn form(&self, xml: &mut Xml, form: &Form) {
+    fn form(&self, xml: &mut Xml, form: &Form, class: Option<&str>) {
         let n = |v: f64| {
             if self.detail.is_fine {
                 tenth(v)
@@ -200,8 +204,11 @@ impl<'a> Classes<'a> {
         match form {
             Form::Rect(r, radius) => {
                 // Edges are rounded, not lengths, so that what touches goes on touching.
-                xml.open("rect")
-                    .attribute("x", n(r.x))
+                xml.open("rect");
+                if let Some(class) = class {
+                    xml.attribute("class", class);
+                }
+                xml.attribute("x", n(r.x))
                     .attribute("y", n(r.y))
                     .attribute("width", n(r.right() - r.x))
                     .attribute("height", n(r.bottom() - r.y));
@@ -229,6 +236,21 @@ impl<'a> Classes<'a> {
         }
         xml.close_empty();
     }
+}
+
+/// The badge of a mark under the mark's word as its id, without colours, and seen only where styles are.
+pub(crate) fn badge_shapes(xml: &mut Xml, style: &Style, mark: Mark) {
+    xml.open("g")
+        .attribute("id", word(mark))
+        .attribute("class", "badge")
+        .attribute("visibility", "hidden");
+    let sign = crate::draw::picture::sign(style, mark);
+    for (at, piece) in sign.pieces.iter().enumerate() {
+        let Piece::Shape(shape) = piece else { continue };
+        let pen = if shape.stroke.width > 0.0 { "p" } else { "f" };
+        fine(xml, &shape.form, if at == 0 { "b" } else { pen });
+    }
+    xml.close();
 }
 
 /// A badge's shape, to a tenth of a pixel.
@@ -380,22 +402,32 @@ impl ClassPen {
     }
 }
 
-/// How much changed, window by window, as paths in a box 60 high and a window wide for each: what was added above the
-/// line in the middle, what was removed below it, what changed on the ground.
-pub(crate) fn bars(xml: &mut Xml, runs: &Runs) {
-    for (kind, base, up) in [
-        ("added", 30.0, -1.0),
-        ("removed", 30.0, 1.0),
-        ("changed", 60.0, -1.0),
-    ] {
-        let counts = runs.counts(kind);
-        let most = counts.values().max().copied().unwrap_or(1) as f64;
+/// How many headlines each window tells, as paths in a box `wide` and 60 high, at the windows' times: what came above
+/// the line in the middle, what went below it, what changed on the ground.
+pub(crate) fn bars(xml: &mut Xml, view: &View, wide: f64) {
+    type CountOf = fn(&Counts) -> usize;
+    let counts: [(&str, f64, f64, CountOf); 3] = [
+        ("added", 30.0, -1.0, Counts::came),
+        ("removed", 30.0, 1.0, Counts::went),
+        ("changed", 60.0, -1.0, Counts::changed),
+    ];
+    for (kind, base, up, count) in counts {
+        let of = |frame: &Frame| count(&frame.counts);
+        let most = view.frames.iter().map(of).max().unwrap_or(1) as f64;
         let mut bars = String::new();
-        for (window, count) in counts {
+        for (at, frame) in view.frames.iter().enumerate().filter(|(_, f)| of(f) > 0) {
             // Logarithms, so that one change is seen beside a hundred.
-            let part = libm::log(count as f64) / libm::log(most.max(9.0));
+            let part = libm::log(of(frame) as f64) / libm::log(most.max(9.0));
             let height = up * libm::round(6.0 + 20.0 * part);
-            let _ = write!(bars, "M{window} {base}h1v{height}h-1z");
+            let x = view.place_in_time(at) * wide;
+            let width = (view.place_in_time(at + 1) * wide - x).max(1.0);
+            let _ = write!(
+                bars,
+                "M{} {base}h{}v{height}h-{}z",
+                tenth(x),
+                tenth(width),
+                tenth(width)
+            );
         }
         xml.open("path")
             .attribute("class", kind)

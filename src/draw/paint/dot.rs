@@ -15,7 +15,7 @@ use crate::evidence::Evidence;
 use crate::graph::{Element, Elements, State};
 use crate::layout::{self, Layout, Link, Orientation, Outline, Plan, Vertex};
 use crate::mission::Mission;
-use crate::view::{Frame, ItemKind, Mark, Shown, View};
+use crate::view::{ItemKind, Mark, SeenWindow, Showing, Shown, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
@@ -65,10 +65,10 @@ impl<'a> DotView<'a> {
 
     /// One window, or the [`union`] of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
     /// Only the latter shows the `title`.
-    pub(crate) fn write(&self, frame: &Frame, title: &str) -> String {
+    pub(crate) fn write(&self, seen: &SeenWindow, title: &str) -> String {
         match &self.layout {
-            Some(layout) => rqt::write(self, layout, frame),
-            None => plain::write(self, frame, title),
+            Some(layout) => rqt::write(self, layout, seen),
+            None => plain::write(self, seen, title),
         }
     }
 
@@ -86,10 +86,10 @@ impl<'a> DotView<'a> {
         words.join(" ")
     }
 
-    /// The namespaces that hold an item of this frame, by place.
-    fn inhabited(&self, frame: &Frame) -> Vec<bool> {
+    /// The namespaces that hold an item that is seen, by place.
+    fn inhabited(&self, seen: &SeenWindow) -> Vec<bool> {
         let mut inhabited = vec![false; self.view.namespaces.len()];
-        for shown in &frame.items {
+        for shown in &seen.items {
             let item = self.view.items.get(shown.id as usize);
             let mut at = item.and_then(|item| item.cluster);
             while let Some(space) = at.filter(|at| inhabited.get(*at) == Some(&false)) {
@@ -154,7 +154,7 @@ fn plan(view: &View, fonts: &Fonts) -> Plan {
         }
     });
     let mut widest: Vec<Option<f64>> = vec![None; view.arrows.len()];
-    for shown in view.frames.iter().flat_map(|frame| &frame.arrows) {
+    for shown in view.arrows_shown.iter().flat_map(Showing::looks) {
         let arrow = view.arrows.get(shown.id as usize);
         let label = arrow.and_then(|arrow| rqt::label(arrow, shown));
         if let (Some(label), Some(most)) = (label, widest.get_mut(shown.id as usize)) {

@@ -254,8 +254,7 @@ impl Boxes<'_> {
             return place;
         }
         // Several in one: a second card in front of the first.
-        let depth = self.style.stack.depth * scale;
-        let front = Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth);
+        let front = self.front(place);
         group.shape(Shape {
             form: Form::Rect(front, radius),
             fill: look.fill,
@@ -264,7 +263,30 @@ impl Boxes<'_> {
         front
     }
 
+    fn front(&self, place: Rect) -> Rect {
+        let depth = self.style.stack.depth * self.fit.scale;
+        Rect::new(place.x, place.y + depth, place.w - depth, place.h - depth)
+    }
+
+    /// The bar of a box of this kind that is latched.
+    pub(crate) fn latch_of(&self, kind: ItemKind, place: Rect) -> Form {
+        match kind {
+            ItemKind::Node => self.latch_bar(place, &self.style.node),
+            ItemKind::Topic => self.latch_bar(place, &self.style.topic),
+            ItemKind::Group => self.latch_bar(self.front(place), &self.style.topic),
+            ItemKind::Namespace => self.latch_bar(self.front(place), &self.style.node),
+        }
+    }
+
     fn latch(&self, group: &mut Group, place: Rect, body: &Body) {
+        group.shape(Shape::filled(
+            self.latch_bar(place, body),
+            self.style.latched.stroke,
+        ));
+    }
+
+    /// The bar at the left of a box whose last message is kept for whoever comes late.
+    fn latch_bar(&self, place: Rect, body: &Body) -> Form {
         let width = self.style.latched.bar * self.fit.scale;
         let inset = body.width * self.fit.pen / 2.0;
         let bar = Rect::new(
@@ -273,10 +295,7 @@ impl Boxes<'_> {
             width,
             place.h - 2.0 * inset,
         );
-        group.shape(Shape::filled(
-            Form::Rect(bar, 0.0),
-            self.style.latched.stroke,
-        ));
+        Form::Rect(bar, 0.0)
     }
 
     fn lines(

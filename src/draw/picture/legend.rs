@@ -11,7 +11,7 @@ use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
 use crate::evidence::Degree;
 use crate::graph::State;
-use crate::view::{ArrowKind, ItemKind, Mark, Shown, View};
+use crate::view::{ArrowKind, ItemKind, Mark, Showing, Shown, View};
 
 /// A sign with its meaning.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,17 +29,12 @@ pub(crate) enum LegendSign {
 /// The signs that occur in the view, with their words.
 pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> {
     let kind = |kind| view.items.iter().any(|i| i.kind == kind);
-    let any = |is: &dyn Fn(&Shown) -> bool| {
-        view.frames
-            .iter()
-            .any(|f| f.items.iter().chain(&f.arrows).any(is))
-    };
+    let any = |is: &dyn Fn(&Shown) -> bool| view.looks().any(is);
     let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
     let state = |state| any(&|s| s.state == state && s.mark.is_none());
     let degree = |degree| {
-        view.frames
-            .iter()
-            .any(|f| f.arrows.iter().any(|s| s.degree == degree))
+        let mut looks = view.arrows_shown.iter().flat_map(Showing::looks);
+        looks.any(|s| s.degree == degree)
     };
     let percent = words::percent(rate_change);
     let all = [

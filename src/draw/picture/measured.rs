@@ -7,7 +7,8 @@ use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::{Element, State};
 use crate::layout::{self, Link, Outline, Plan, Vertex};
-use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Shown, View};
+use crate::view::showing::both;
+use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Showing, Shown, View};
 
 /// The widest that a name is drawn; longer ones are shortened in their middle.
 const WIDEST: f64 = 230.0;
@@ -28,6 +29,8 @@ pub(crate) struct Label {
     pub(crate) second: bool,
     /// The smaller line where it is the same in all windows.
     pub(crate) fixed: String,
+    /// The name as it is, where the font lacks some of its characters.
+    pub(crate) unshown: Option<String>,
 }
 
 impl Label {
@@ -164,10 +167,9 @@ impl Measurer<'_> {
 
     fn label(&self, item: &Item, inside: &str, second: bool) -> Label {
         let body = self.body(item);
-        let mut name = self
-            .fonts
-            .shown(short_name(&item.label, inside))
-            .into_owned();
+        let whole = short_name(&item.label, inside);
+        let mut name = self.fonts.shown(whole).into_owned();
+        let unshown = (name != whole).then(|| words::visible(whole).into_owned());
         let mut fixed = String::new();
         if item.kind == ItemKind::Namespace {
             name.push_str("/…");
@@ -180,6 +182,7 @@ impl Measurer<'_> {
                 .into_owned(),
             second: second || !fixed.is_empty(),
             fixed,
+            unshown,
         }
     }
 
@@ -206,7 +209,7 @@ impl Measurer<'_> {
     fn second_lines(&self) -> Vec<Option<f64>> {
         let tells = tells(self.view);
         let mut widest = vec![None; self.view.items.len()];
-        for shown in self.view.frames.iter().flat_map(|f| &f.items) {
+        for shown in self.view.items_shown.iter().flat_map(Showing::looks) {
             let at = shown.id as usize;
             let Some(item) = self.view.items.get(at) else {
                 continue;
@@ -228,18 +231,25 @@ impl Measurer<'_> {
     fn rooms(&self) -> Vec<Option<Size>> {
         let style = &self.style.edge;
         let told = told_by_arrows(self.view);
-        let mut widest = vec![None; self.view.arrows.len()];
-        for frame in &self.view.frames {
-            for shown in &frame.arrows {
-                let at = shown.id as usize;
-                let Some(arrow) = self.view.arrows.get(at) else {
-                    continue;
-                };
-                if !told[at] {
-                    continue;
-                }
-                let topic = find(&frame.items, arrow.from as usize);
-                let Some((text, is_pill)) = arrow_label(arrow, shown, topic) else {
+        let nothing = Showing::default();
+        let all = self
+            .view
+            .arrows
+            .iter()
+            .zip(&self.view.arrows_shown)
+            .zip(told);
+        let widest = all.map(|((arrow, showing), is_told)| {
+            let mut widest = None;
+            // A subscription tells its rate where its topic has another.
+            let topic = self.view.items_shown.get(arrow.from as usize);
+            let topic = topic.filter(|_| is_told && arrow.kind == ArrowKind::Subscribe);
+            let looks = both(
+                if is_told { showing } else { &nothing },
+                topic.unwrap_or(&nothing),
+            );
+            for (shown, topic) in looks {
+                let label = shown.and_then(|shown| arrow_label(arrow, shown, topic));
+                let Some((text, is_pill)) = label else {
                     continue;
                 };
                 let (weight, pad) = if is_pill {
@@ -247,14 +257,13 @@ impl Measurer<'_> {
                 } else {
                     (Weight::Regular, style.halo_width)
                 };
-                widen(
-                    &mut widest[at],
-                    self.fonts.width(&text, style.size, weight) + pad,
-                );
+                let width = self.fonts.width(&text, style.size, weight);
+                widen(&mut widest, width + pad);
             }
-        }
+            widest
+        });
         let room = |width: Option<f64>| Some(Size::new(width?, style.size * PILL_HEIGHT));
-        widest.into_iter().map(room).collect()
+        widest.map(room).collect()
     }
 }
 

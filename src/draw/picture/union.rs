@@ -4,15 +4,15 @@ use std::collections::BTreeSet;
 
 use super::arrows::{Arrows, is_badged};
 use super::boxes::{Boxes, corner};
-use super::measured::{self, Tells};
+use super::measured::Tells;
 use super::page::GraphFit;
 use super::{Picture, badge, cards, chips, encoded, tracks};
 use crate::base::geometry::{Point, Rect, Size};
-use crate::draw::scene::Group;
+use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
 use crate::evidence::Degree;
 use crate::graph::State;
-use crate::view::{Mark, Shown};
+use crate::view::{Arrow, ArrowKind, ItemKind, Mark, Showing, Shown};
 
 /// The whole graph, every element once and as if it were active; a painter leaves out the colours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,15 +40,25 @@ pub struct UnionElement {
     pub tells_changes: bool,
     /// Where an item stands; empty for an arrow.
     pub rect: Rect,
+    /// Its name where the font of the drawing lacks some of it, for readers that have more fonts.
+    pub name: Option<String>,
+    /// The bar at its left that says that its last message is kept, if it ever is.
+    pub latch: Option<Form>,
     /// Where its badge stands.
     pub badge: Point,
     /// The marks that it carries a badge for in some window.
     pub marks: BTreeSet<Mark>,
 }
 
-/// The rate of an element in a window as it is drawn; empty for none.
-pub fn rate_label(shown: &Shown) -> String {
-    chips::rate_in(shown).unwrap_or_default()
+/// The rate of an element in a window as it is drawn, after what an arrow between nodes carries; empty for none.
+pub fn rate_label(shown: &Shown, arrow: Option<&Arrow>) -> String {
+    let rate = chips::rate_in(shown).unwrap_or_default();
+    match arrow.map(|arrow| (&arrow.kind, arrow.carries(shown))) {
+        Some((ArrowKind::Direct(_), Some(topic))) => {
+            format!("{topic} {rate}").trim_end().to_owned()
+        }
+        _ => rate,
+    }
 }
 
 /// The badge of a mark around (0, 0).
@@ -97,16 +107,21 @@ impl Picture<'_> {
     fn union_items(&self, boxes: &Boxes<'_>, fit: GraphFit) -> Vec<UnionElement> {
         let view = self.measured.view;
         let mut marks = vec![BTreeSet::new(); view.items.len()];
-        for shown in view.frames.iter().flat_map(|f| &f.items) {
+        let mut latched = BTreeSet::new();
+        for shown in view.items_shown.iter().flat_map(Showing::looks) {
+            if shown.state == State::Latched {
+                latched.insert(shown.id as usize);
+            }
             if let (Some(mark), Some(marks)) = (shown.mark, marks.get_mut(shown.id as usize)) {
                 marks.insert(mark);
             }
         }
         let cards = cards(&self.measured, &self.layout, fit);
-        let items = view.items.iter().zip(cards).zip(marks);
+        let items = view.items.iter().zip(cards).zip(marks).enumerate();
         items
-            .map(|((item, card), marks)| {
+            .map(|(at, ((item, card), marks))| {
                 let label = &card.label;
+                let is_latched = item.kind != ItemKind::Node && latched.contains(&at);
                 let is_live = label.second && label.fixed.is_empty();
                 let mut shown = plain(is_live.then_some(1.0));
                 // Whatever it tells, it is a line to be filled.
@@ -122,6 +137,8 @@ impl Picture<'_> {
                     is_live: is_live || tells_changes,
                     tells_changes,
                     rect: card.place,
+                    name: label.unshown.clone(),
+                    latch: is_latched.then(|| boxes.latch_of(item.kind, card.place)),
                     badge: corner(item.kind, card.place, 1.0),
                     marks,
                 }
@@ -137,16 +154,15 @@ impl Picture<'_> {
             fit,
         };
         let mut marks = vec![BTreeSet::new(); view.arrows.len()];
-        for frame in &view.frames {
-            for shown in &frame.arrows {
-                let at = shown.id as usize;
-                let (Some(mark), Some(arrow)) = (shown.mark, view.arrows.get(at)) else {
+        for ((arrow, showing), marks) in view.arrows.iter().zip(&view.arrows_shown).zip(&mut marks)
+        {
+            for (window, shown) in showing.runs() {
+                let Some(mark) = shown.and_then(|shown| shown.mark) else {
                     continue;
                 };
-                let ends =
-                    [arrow.from, arrow.to].map(|id| measured::find(&frame.items, id as usize));
-                if is_badged(mark, ends) {
-                    marks[at].insert(mark);
+                let item = |id: u32| view.items_shown.get(id as usize)?.at(window as usize);
+                if is_badged(mark, [arrow.from, arrow.to].map(item)) {
+                    marks.insert(mark);
                 }
             }
         }
@@ -160,6 +176,8 @@ impl Picture<'_> {
                     is_live: link.label.is_some(),
                     tells_changes: false,
                     rect: Rect::default(),
+                    name: None,
+                    latch: None,
                     badge: track.badge,
                     marks,
                 }

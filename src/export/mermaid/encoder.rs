@@ -34,24 +34,25 @@ impl Encoder for Charts<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let mut written = Written::to(&self.target);
         let frames = &self.view.frames;
-        let mut write = |target: &Target, frame: &view::Frame| -> Result<()> {
+        let mut write = |target: &Target, seen: &view::SeenWindow| -> Result<()> {
             let mut sink = OutputSink::create(target, None)?;
-            let text = chart(self.view, &self.style, frame);
+            let text = chart(self.view, &self.style, seen);
             sink.write_all(text.as_bytes()).map_err(sink.error())?;
             written.add(sink.commit()?);
             written
                 .remarks
-                .extend(too_large(target, frame.arrows.len(), text.len()));
+                .extend(too_large(target, seen.arrows.len(), text.len()));
             Ok(())
         };
         if self.target.is_numbered() {
-            for frame in frames {
-                write(&self.target.numbered(frame.index, frames.len()), frame)?;
+            for (k, frame) in frames.iter().enumerate() {
+                let target = self.target.numbered(frame.index, frames.len());
+                write(&target, &self.view.seen(k))?;
             }
-        } else if let [frame] = &frames[..] {
-            write(&self.target, frame)?;
-        } else if let Some(frame) = union(self.view) {
-            write(&self.target, &frame)?;
+        } else if frames.len() == 1 {
+            write(&self.target, &self.view.seen(0))?;
+        } else if let Some(all) = union(self.view) {
+            write(&self.target, &all)?;
         }
         Ok(written)
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::view::{Counts, Frame, Mark, Shown, View};
+use crate::view::{Mark, SeenWindow, Showing, Shown, View};
 
 /// The most edges that are drawn.
 const MOST_EDGES: usize = 60;
@@ -12,10 +12,10 @@ const MOST_ITEMS: usize = 80;
 /// Everything that changed during the mission with what it is connected to, as one window, and how many edges were
 /// left out; `None` where nothing changed. An element is marked added or removed if it is there only at the end or
 /// only at the start, else changed if it ever was.
-pub(super) fn changed(view: &View) -> Option<(Frame, usize)> {
-    let frame = view.frames.last()?;
-    let items = fates(view, |f| &f.items);
-    let arrows = fates(view, |f| &f.arrows);
+pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
+    let last = view.frames.len().checked_sub(1)?;
+    let items = fates(&view.items_shown, last);
+    let arrows = fates(&view.arrows_shown, last);
     let is_changed =
         |fates: &BTreeMap<u32, Shown>, id: u32| fates.get(&id).is_some_and(|s| s.mark.is_some());
     let mut wanted: Vec<(u8, u32)> = Vec::new();
@@ -45,7 +45,9 @@ pub(super) fn changed(view: &View) -> Option<(Frame, usize)> {
         .iter()
         .filter(|(_, s)| s.mark.is_some())
         .map(|(id, _)| *id);
-    for id in changed_items {
+    // A box whose edges found no room would look like one that has none.
+    let linked: BTreeSet<u32> = view.arrows.iter().flat_map(|a| [a.from, a.to]).collect();
+    for id in changed_items.filter(|id| !linked.contains(id)) {
         if boxes.len() < MOST_ITEMS {
             boxes.insert(id);
         }
@@ -56,44 +58,33 @@ pub(super) fn changed(view: &View) -> Option<(Frame, usize)> {
     let pick = |fates: &BTreeMap<u32, Shown>, ids: &mut dyn Iterator<Item = u32>| -> Vec<Shown> {
         ids.filter_map(|id| fates.get(&id).cloned()).collect()
     };
-    let frame = Frame {
+    let seen = SeenWindow {
         items: pick(&items, &mut boxes.into_iter()),
         arrows: pick(&arrows, &mut drawn.into_iter()),
-        headlines: Vec::new(),
-        rolls: Vec::new(),
-        counts: Counts::default(),
-        caption: Vec::new(),
-        ..*frame
     };
-    Some((frame, left_out))
+    Some((seen, left_out))
 }
 
-/// What became of each element: its last state, with a mark for the whole mission.
-fn fates(view: &View, shown: fn(&Frame) -> &[Shown]) -> BTreeMap<u32, Shown> {
-    let mut fates: BTreeMap<u32, Shown> = BTreeMap::new();
-    let mut marked = BTreeSet::new();
-    for one in view.frames.iter().flat_map(shown) {
-        if one.mark.is_some() {
-            marked.insert(one.id);
-        }
-        if one.mark != Some(Mark::Removed) || !fates.contains_key(&one.id) {
-            fates.insert(one.id, one.clone());
-        }
-    }
-    let there = |frame: Option<&Frame>| -> BTreeSet<u32> {
-        let all = frame.map_or(&[][..], shown).iter();
-        all.filter(|s| s.mark != Some(Mark::Removed))
-            .map(|s| s.id)
-            .collect()
-    };
-    let (first, last) = (there(view.frames.first()), there(view.frames.last()));
-    for (id, fate) in &mut fates {
-        fate.rates = None;
-        fate.mark = match (first.contains(id), last.contains(id)) {
+/// What became of each element until the window at place `last`: its last state, with a mark for the whole mission.
+fn fates(all: &[Showing], last: usize) -> BTreeMap<u32, Shown> {
+    let fates = all.iter().filter_map(|showing| fate(showing, last));
+    fates.map(|shown| (shown.id, shown)).collect()
+}
+
+fn fate(showing: &Showing, last: usize) -> Option<Shown> {
+    let is_gone = |shown: &Shown| shown.mark == Some(Mark::Removed);
+    let runs = || showing.runs().filter_map(|(_, shown)| shown);
+    let fate = runs().rev().find(|shown| !is_gone(shown));
+    let fate = fate.or_else(|| runs().next())?;
+    let there = |k: usize| showing.at(k).is_some_and(|shown| !is_gone(shown));
+    let is_marked = runs().any(|shown| shown.mark.is_some());
+    Some(Shown {
+        rates: None,
+        mark: match (there(0), there(last)) {
             (false, true) => Some(Mark::Added),
             (true, false) => Some(Mark::Removed),
-            _ => marked.contains(id).then_some(Mark::Changed),
-        };
-    }
-    fates
+            _ => is_marked.then_some(Mark::Changed),
+        },
+        ..fate.clone()
+    })
 }

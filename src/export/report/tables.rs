@@ -1,6 +1,6 @@
 //! The tables of a report, each cut where it would become too long.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::escape::{code, plain};
@@ -8,7 +8,10 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::base::words::count;
 use crate::evidence::Evidence;
+use crate::graph::Element;
 use crate::mission::Mission;
+use crate::mission::info::{how_many, info};
+use crate::view::View;
 
 /// A table of these rows, of at most `most` bytes; a last line tells how many rows were cut. `None` without rows.
 pub(super) fn table(
@@ -77,20 +80,35 @@ fn seen(mission: &Mission, first: Option<Stamp>, last: Option<Stamp>) -> String 
     }
 }
 
+/// How it is known, but for what holds of everybody.
 fn words(evidence: Evidence) -> String {
-    evidence.words().collect::<Vec<_>>().join(", ")
+    let words = evidence.words().filter(|word| *word != "rosout_rule");
+    words.collect::<Vec<_>>().join(", ")
 }
 
-/// Every node of the mission.
-pub(super) fn nodes(mission: &Mission, most: usize) -> String {
+/// The elements that a view shows.
+fn shown(view: &View) -> BTreeSet<Element> {
+    view.items
+        .iter()
+        .flat_map(|item| item.members.iter().copied())
+        .collect()
+}
+
+/// Every node that is shown.
+pub(super) fn nodes(mission: &Mission, view: &View, most: usize) -> String {
     let elements = &mission.elements;
+    let shown = shown(view);
+    let is_shown = |id: u32| shown.contains(&Element::Node(id));
     let mut presence = vec![WindowsOf::default(); elements.nodes.len()];
     for state in mission.graphs.iter().flat_map(|graph| graph.nodes) {
         if let Some(one) = presence.get_mut(state.id as usize) {
             one.add(state.hz);
         }
     }
-    let rows = elements.nodes.iter().zip(&presence).map(|(node, there)| {
+    let all = (0..).zip(elements.nodes.iter().zip(&presence));
+    let all = all.filter(|(id, _)| is_shown(*id));
+    let nodes = all.clone().count();
+    let rows = all.map(|(_, (node, there))| {
         format!(
             "| {} | {} | {} | {} | {} |\n",
             code(node.name.as_str()),
@@ -100,14 +118,16 @@ pub(super) fn nodes(mission: &Mission, most: usize) -> String {
             words(node.evidence)
         )
     });
-    let heads = ["Node", "Seen", "Windows", "Hz sent", "Known by"];
-    let summary = count(elements.nodes.len(), "node");
+    let heads = ["Node", "Seen", "Windows", "Hz sent on average", "Known by"];
+    let summary = count(nodes, "node");
     table(&heads, rows, most).map_or(String::new(), |table| folded(&summary, &table))
 }
 
-/// Every topic of the mission.
-pub(super) fn topics(mission: &Mission, most: usize) -> String {
+/// Every topic that is shown.
+pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
     let elements = &mission.elements;
+    let shown = shown(view);
+    let is_shown = |id: u32| shown.contains(&Element::Topic(id));
     let mut presence = vec![(WindowsOf::default(), 0_u64); elements.topics.len()];
     for state in mission.graphs.iter().flat_map(|graph| graph.topics) {
         if let Some((one, messages)) = presence.get_mut(state.id as usize) {
@@ -115,74 +135,54 @@ pub(super) fn topics(mission: &Mission, most: usize) -> String {
             *messages += state.count;
         }
     }
-    let rows = elements
-        .topics
-        .iter()
-        .zip(&presence)
-        .map(|(topic, (there, messages))| {
-            let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
-            format!(
-                "| {} | {} | {} | {} | {messages} | {} | {} |\n",
-                code(topic.name.as_str()),
-                types.join(", "),
-                seen(mission, topic.first, topic.last),
-                there.windows,
-                there.mean(),
-                words(topic.evidence)
-            )
-        });
+    let all = (0..).zip(elements.topics.iter().zip(&presence));
+    let all = all.filter(|(id, _)| is_shown(*id));
+    let topics = all.clone().count();
+    let rows = all.map(|(_, (topic, (there, messages)))| {
+        let types: Vec<String> = topic.types.iter().map(|t| code(t)).collect();
+        format!(
+            "| {} | {} | {} | {} | {messages} | {} | {} |\n",
+            code(topic.name.as_str()),
+            types.join(", "),
+            seen(mission, topic.first, topic.last),
+            there.windows,
+            there.mean(),
+            words(topic.evidence)
+        )
+    });
     let heads = [
-        "Topic", "Type", "Seen", "Windows", "Messages", "Hz", "Known by",
+        "Topic",
+        "Type",
+        "Seen",
+        "Windows",
+        "Messages",
+        "Hz on average",
+        "Known by",
     ];
-    let summary = count(elements.topics.len(), "topic");
+    let summary = count(topics, "topic");
     table(&heads, rows, most).map_or(String::new(), |table| folded(&summary, &table))
 }
 
-/// What the bags are and what proves the graph.
+/// How well the graph is known, as sentences, and what the bags are.
 pub(super) fn evidence(mission: &Mission) -> String {
-    let elements = &mission.elements;
-    let lists = [
-        (
-            "nodes",
-            elements
-                .nodes
-                .iter()
-                .map(|n| n.evidence)
-                .collect::<Vec<_>>(),
-        ),
-        (
-            "topics",
-            elements.topics.iter().map(|t| t.evidence).collect(),
-        ),
-        (
-            "publications",
-            elements.publishes.iter().map(|e| e.evidence).collect(),
-        ),
-        (
-            "subscriptions",
-            elements.subscribes.iter().map(|e| e.evidence).collect(),
-        ),
+    let info = info(mission);
+    let parts = [
+        ("node", info.nodes_by_degree),
+        ("publication", info.publishes_by_degree),
+        ("subscription", info.subscribes_by_degree),
     ];
-    let mut counts: BTreeMap<&str, [usize; 4]> = BTreeMap::new();
-    for (at, (_, list)) in lists.iter().enumerate() {
-        for word in list.iter().flat_map(|evidence| evidence.words()) {
-            counts.entry(word).or_default()[at] += 1;
-        }
+    let parts = parts.map(|(word, degrees)| how_many(word, degrees));
+    let with = info.topics.iter().filter(|t| t.count > 0).count();
+    let mut out = format!(
+        "Known are {}. Of {} with messages, {} have a known publisher and {} a known subscriber.\n\n",
+        parts.join(", "),
+        count(with, "topic"),
+        with.saturating_sub(info.topics_without_publisher),
+        with.saturating_sub(info.topics_without_subscriber),
+    );
+    for line in &info.advice {
+        let _ = writeln!(out, "- to know more: {}", plain(line));
     }
-    let rows = counts
-        .iter()
-        .map(|(word, [nodes, topics, publishes, subscribes])| {
-            format!("| {word} | {nodes} | {topics} | {publishes} | {subscribes} |\n")
-        });
-    let heads = [
-        "Known by",
-        "Nodes",
-        "Topics",
-        "Publications",
-        "Subscriptions",
-    ];
-    let mut out = table(&heads, rows, usize::MAX).unwrap_or_default();
-    out.push('\n');
     for bag in mission.bags.iter().take(50) {
         let state = if bag.complete {
             "complete"
@@ -196,5 +196,5 @@ pub(super) fn evidence(mission: &Mission) -> String {
             plain(&bag.format)
         );
     }
-    folded("Evidence", &out)
+    folded("How well it is known", &out)
 }

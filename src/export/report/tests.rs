@@ -26,15 +26,15 @@ fn only_what_changed_and_its_neighbours_are_drawn() {
         &mission(&["/a>/t@2 /x>/y@1", "/a>/t@2 /b</t /x>/y@1"]),
         &ViewOptions::default(),
     );
-    let (frame, left_out) = graph::changed(&view).unwrap();
-    let mut names: Vec<&str> = frame
+    let (seen, left_out) = graph::changed(&view).unwrap();
+    let mut names: Vec<&str> = seen
         .items
         .iter()
         .map(|s| &*view.items[s.id as usize].name)
         .collect();
     names.sort_unstable();
     assert_eq!(
-        (names, frame.arrows.len(), left_out),
+        (names, seen.arrows.len(), left_out),
         (vec!["/b", "/t"], 1, 0)
     );
 }

@@ -144,20 +144,23 @@ impl<'a> Facts<'a> {
     /// The longest silences of a topic inside `during`: those of the whole mission, to the nanosecond where the times of
     /// messages are known; the longest of each window; and, unless it `may_end`, from its last message to the mission's
     /// end.
-    pub(crate) fn silences(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Silence> {
+    pub(crate) fn silences(
+        &self,
+        topic: TopicId,
+        may_end: bool,
+        during: Span,
+    ) -> Vec<TopicSilence> {
         let mut all = Vec::new();
         for (window, row) in self.rows(topic) {
             let inside = during.start <= window.span.start && window.span.end <= during.end;
             if let (true, Some(gap)) = (inside, row.gap.value()) {
-                all.push(Silence {
+                all.push(TopicSilence {
                     span: window.span,
                     nanos: nanos(gap),
                 });
             }
         }
-        let pauses = self.mission.activity.sending.pauses.get(topic as usize);
-        let pauses = pauses.into_iter().flatten();
-        all.extend(pauses.filter_map(|gap| clipped(*gap, during)));
+        all.extend(self.pauses(topic).filter_map(|gap| clipped(gap, during)));
         let whole = self.mission.span;
         if let (Some(heard), false) = (self.heard(topic), may_end) {
             let span = Span {
@@ -170,6 +173,22 @@ impl<'a> Facts<'a> {
             }
         }
         all
+    }
+
+    /// The longest times between two messages; of a mission in JSON only those that end a stretch of sending.
+    fn pauses(&self, topic: TopicId) -> impl Iterator<Item = Span> + use<'a> {
+        let sending = &self.mission.activity.sending;
+        let exact = sending.pauses.get(topic as usize);
+        let stretches = sending
+            .topics
+            .get(topic as usize)
+            .filter(|_| exact.is_none());
+        let between = stretches.map_or(&[][..], Vec::as_slice).windows(2);
+        let between = between.map(|pair| Span {
+            start: pair[0].end.plus(-1),
+            end: pair[1].start,
+        });
+        exact.into_iter().flatten().copied().chain(between)
     }
 }
 
@@ -184,7 +203,7 @@ fn begun(window: Span, first: Stamp) -> Option<Span> {
 
 /// A time without messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Silence {
+pub(crate) struct TopicSilence {
     /// When it was, or the window that it is in.
     pub(crate) span: Span,
     /// How long it lasted.
@@ -192,13 +211,13 @@ pub(crate) struct Silence {
 }
 
 /// The part of a silence that lies in a stretch of time.
-fn clipped(gap: Span, during: Span) -> Option<Silence> {
+fn clipped(gap: Span, during: Span) -> Option<TopicSilence> {
     let span = Span {
         start: gap.start.max(during.start),
         end: gap.end.min(during.end),
     };
     let nanos = span.end.since(span.start);
-    (nanos > 0).then_some(Silence { span, nanos })
+    (nanos > 0).then_some(TopicSilence { span, nanos })
 }
 
 fn count(row: &Row) -> u64 {

@@ -3,7 +3,7 @@
 use super::Judge;
 use crate::gate::expectation::Demand;
 use crate::gate::finding::{Finding, Kind};
-use crate::gate::pattern::{Names, Pattern};
+use crate::gate::pattern::{NamePatterns, Pattern};
 use crate::graph::NodeId;
 
 impl Judge<'_> {
@@ -48,7 +48,7 @@ impl Judge<'_> {
     }
 
     /// Every name of a node that stands anywhere in the file.
-    fn named_nodes(&self) -> Names<'_> {
+    fn named_nodes(&self) -> NamePatterns<'_> {
         let mut all: Vec<&Pattern> = self.expectation.nodes.iter().map(|n| &n.name).collect();
         for topic in &self.expectation.topics {
             let lists = topic.facts.by.iter().chain(&topic.facts.to);
@@ -63,7 +63,7 @@ impl Judge<'_> {
     }
 
     fn strange_topics(&self) -> Vec<Finding> {
-        let known: Names<'_> = self.expectation.topics.iter().map(|t| &t.name).collect();
+        let known: NamePatterns<'_> = self.expectation.topics.iter().map(|t| &t.name).collect();
         let policy = self.expectation.policy;
         let mut found = Vec::new();
         for topic in self.facts.topics(&Pattern::new("**")) {

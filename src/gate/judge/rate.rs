@@ -4,7 +4,7 @@ use super::Judge;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{TopicFacts, While, YamlPlace};
-use crate::gate::facts::{Rate, Silence};
+use crate::gate::facts::{Rate, TopicSilence};
 use crate::gate::finding::{Finding, Kind};
 use crate::gate::range::Range;
 use crate::graph::TopicId;
@@ -146,7 +146,7 @@ impl Judge<'_> {
         let during = facts.during.map_or(whole, |d| d.on(whole));
         let silences = self.facts.silences(topic, facts.may_end, during);
         let longest = silences.iter().max_by_key(|silence| silence.nanos);
-        let Some(Silence { span, nanos }) = longest.filter(|s| s.nanos > most) else {
+        let Some(TopicSilence { span, nanos }) = longest.filter(|s| s.nanos > most) else {
             return Vec::new();
         };
         let name = self.facts.topic(topic);

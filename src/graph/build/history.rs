@@ -125,6 +125,7 @@ fn assembled(tracks: &Tracks, traffic: &Traffic, findings: &Findings) -> History
         findings,
         traffic,
         publishers: BTreeMap::new(),
+        sent: sent(traffic),
     };
     for (what, track) in tracks {
         if let (ElementKey::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
@@ -144,12 +145,26 @@ fn assembled(tracks: &Tracks, traffic: &Traffic, findings: &Findings) -> History
     all.history
 }
 
+/// What each node sends, but for what is latched.
+fn sent(traffic: &Traffic) -> BTreeMap<Name, Vec<&[Stretch]>> {
+    let mut sent: BTreeMap<Name, Vec<&[Stretch]>> = BTreeMap::new();
+    let senders = traffic.values().flat_map(|of| &of.list);
+    for sender in senders.filter(|sender| !sender.latched) {
+        if let Some(node) = sender.node {
+            sent.entry(node).or_default().push(&sender.stretches);
+        }
+    }
+    sent
+}
+
 struct Assembly<'a> {
     history: History,
     findings: &'a Findings,
     traffic: &'a Traffic,
     /// How many nodes are known to publish each topic.
     publishers: BTreeMap<Name, u32>,
+    /// What each node sends, but for what is latched.
+    sent: BTreeMap<Name, Vec<&'a [Stretch]>>,
 }
 
 impl Assembly<'_> {
@@ -301,10 +316,8 @@ impl Assembly<'_> {
 
     /// When all is silent that a node sends.
     fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
-        let senders = self.traffic.values().flat_map(|of| &of.list);
-        let own = senders.filter(|s| s.node == Some(node) && !s.latched);
-        let of: Vec<&[Stretch]> = own.map(|s| &s.stretches[..]).collect();
-        all_silent(&of, lives)
+        let of = self.sent.get(&node).map_or(&[][..], Vec::as_slice);
+        all_silent(of, lives)
     }
 }
 

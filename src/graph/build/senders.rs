@@ -10,7 +10,7 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{Reliability, Stream};
 use crate::graph::lives::Stretch;
-use crate::graph::sending::{Pauses, SendingRuns, shortest_silence};
+use crate::graph::sending::{LongestPauses, SendingRuns, shortest_silence};
 
 /// What happened on each topic.
 pub(crate) type Traffic = BTreeMap<Name, Senders>;
@@ -67,7 +67,7 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
     let least = shortest_silence(recorded.span.map_or(0, |span| span.nanos()));
     let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
     let (of, mut heard) = places(&of_topic);
-    let (mut all, mut pauses) = (SendingRuns::default(), Pauses::default());
+    let (mut all, mut pauses) = (SendingRuns::default(), LongestPauses::default());
     recorded.messages.merge(&ids, |timed| {
         if !recorded.believes(timed.time) {
             return;

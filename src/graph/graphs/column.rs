@@ -180,6 +180,17 @@ impl ColumnCursor<'_> {
         Some(self.memory.row)
     }
 
+    /// The row of the next window as [`Self::next`], and for how many windows it stays, 1...
+    pub(crate) fn next_run(&mut self) -> (Option<Row>, u64) {
+        let row = self.next();
+        let more = match row {
+            Some(_) => std::mem::take(&mut self.same),
+            None if self.away == 0 && self.bytes.is_empty() => u64::MAX - 1,
+            None => std::mem::take(&mut self.away),
+        };
+        (row, more.saturating_add(1))
+    }
+
     fn row(&mut self, tag: u8) {
         let (bytes, Memory { row, halves }) = (&mut self.bytes, &mut self.memory);
         if tag & LOOK != 0 {

@@ -87,7 +87,8 @@ impl Row {
         }
     }
 
-    fn hz(&self, span: Span) -> Option<f64> {
+    /// Messages per second in a window of this length.
+    pub(crate) fn hz(&self, span: Span) -> Option<f64> {
         match self.rate {
             Some(rate) => rate.value(),
             None => self.count.and_then(|count| per_second(count, span)),

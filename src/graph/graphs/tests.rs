@@ -118,6 +118,17 @@ proptest! {
         if let Some((_, last)) = graphs.last() {
             prop_assert_eq!(&all.get(graphs.len() - 1).unwrap(), last);
         }
+        let (mut walk, mut now) = (all.walk(), std::collections::BTreeMap::new());
+        for (span, put) in &graphs {
+            walk.next(|what, row| {
+                now.insert(what, row);
+            });
+            let topics = now.iter().filter_map(|(what, row)| match (what, row) {
+                (Element::Topic(id), Some(row)) => Some(row.topic(*id, *span)),
+                _ => None,
+            });
+            prop_assert_eq!(topics.collect::<Vec<_>>(), put.topics.clone());
+        }
         let of_topic: Vec<_> = all.rows(Element::Topic(1)).map(|(at, row)| row.topic(1, graphs[at].0)).collect();
         let put = graphs.iter().flat_map(|(_, g)| g.topics.iter().filter(|t| t.id == 1));
         prop_assert_eq!(of_topic, put.cloned().collect::<Vec<_>>());

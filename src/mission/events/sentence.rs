@@ -13,6 +13,15 @@ const NAMED: usize = 6;
 
 /// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`.
 pub(crate) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String {
+    let all = (0..).zip(&mission.ledger.entries);
+    let parts = all
+        .filter(|(_, e)| e.part_of == Some(id))
+        .map(|(part, _)| part);
+    sentence_with(mission, &parts.collect::<Vec<_>>(), entry)
+}
+
+/// The same for whoever knows the entries that are part of it.
+pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let elements = &mission.elements;
     let name = name(elements, entry);
     let lasted = entry
@@ -50,7 +59,7 @@ pub(crate) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String 
             None => format!("{name} silent to the end"),
         },
         (Detail::None, kind @ (Kind::Started | Kind::Stopped)) => {
-            format!("{name} {}{}", kind.word(), with(mission, id, entry))
+            format!("{name} {}{}", kind.word(), with(mission, parts, entry))
         }
         (Detail::None, kind) => format!("{name} {}", kind.word()),
     }
@@ -78,10 +87,11 @@ fn name(elements: &Elements, entry: &Entry) -> String {
 }
 
 /// What a node publishes and subscribes, by the parts of its entry: `: publishes plan; subscribes map`.
-fn with(mission: &Mission, id: EntryId, entry: &Entry) -> String {
+fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let elements = &mission.elements;
     let (mut sends, mut takes) = (BTreeSet::new(), BTreeSet::new());
-    for part in mission.ledger.parts(id) {
+    let entries = &mission.ledger.entries;
+    for part in parts.iter().filter_map(|id| entries.get(*id as usize)) {
         match part.what {
             Element::Publish(edge) => sends.insert(elements.publishes[edge as usize].topic),
             Element::Subscribe(edge) => takes.insert(elements.subscribes[edge as usize].topic),

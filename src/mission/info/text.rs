@@ -116,7 +116,7 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
 }
 
 /// Such as `34 nodes (31 measured, 3 stated)`.
-fn how_many(what: &str, degrees: DegreeCounts) -> String {
+pub(crate) fn how_many(what: &str, degrees: DegreeCounts) -> String {
     let parts = [
         (degrees.measured, "measured"),
         (degrees.stated, "stated"),

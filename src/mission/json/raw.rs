@@ -8,7 +8,7 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{EdgeState, State};
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(crate) struct Raw {
     pub(crate) schema: String,
     #[serde(default)]
@@ -50,7 +50,7 @@ pub(crate) struct RawActivity {
     pub(crate) subscribes: Vec<RawWhole<RawEdge>>,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(crate) struct RawBag {
     #[serde(default)]
     pub(crate) name: String,
@@ -97,7 +97,7 @@ pub(crate) struct RawBox {
     pub(crate) h: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(crate) struct RawWindow {
     pub(crate) start_ns: i64,
     pub(crate) end_ns: i64,
@@ -114,7 +114,7 @@ pub(crate) struct RawWindow {
 }
 
 /// What every element may say of itself.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(crate) struct RawState {
     pub(crate) state: Option<String>,
     pub(crate) degree: Option<String>,
@@ -130,7 +130,7 @@ pub(crate) struct RawState {
     pub(crate) hz: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(crate) struct RawNode {
     pub(crate) name: String,
     pub(crate) role: Option<String>,
@@ -139,7 +139,7 @@ pub(crate) struct RawNode {
     pub(crate) rest: RawState,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(crate) struct RawTopic {
     pub(crate) name: String,
     #[serde(default)]
@@ -153,7 +153,7 @@ pub(crate) struct RawTopic {
     pub(crate) rest: RawState,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 pub(crate) struct RawEdge {
     pub(crate) node: String,
     pub(crate) topic: String,

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::activity;
 use super::names::Names;
-use super::raw::{Raw, RawActivity, RawBag, RawBox, RawLayout, RawNotice};
+use super::raw::{Raw, RawActivity, RawBag, RawBox, RawLayout, RawNotice, RawWindow};
 use super::runs::RawElements;
 use super::write::{OLD_SCHEMA, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
@@ -76,6 +76,17 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
         }
     }
     Ok(spans)
+}
+
+/// The mission of windows made elsewhere, each with all that is in it; what changed is left for
+/// [`Mission::find_changes`]. There is at least one window, and they are in order of time.
+pub(crate) fn mission_of(raw: Raw) -> Result<Mission, String> {
+    let span = |w: &RawWindow| Span {
+        start: Stamp(w.start_ns),
+        end: Stamp(w.end_ns),
+    };
+    let spans: Vec<Span> = raw.windows.iter().map(span).collect();
+    build(raw, &spans)
 }
 
 fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
@@ -174,7 +185,7 @@ const ONE: Period = match Period::from_nanos(1) {
 };
 
 fn report(raw: RawBag) -> Report {
-    let tiers = [Tier::Index, Tier::Forward, Tier::Verify];
+    let tiers = [Tier::Index, Tier::Chunks, Tier::Forward, Tier::Verify];
     Report {
         name: raw.name,
         format: raw.format,

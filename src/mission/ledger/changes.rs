@@ -14,7 +14,7 @@ pub(crate) fn explain(
     elements: &Elements,
     ledger: &Ledger,
 ) -> Vec<(Vec<Change>, Vec<EntryId>)> {
-    let turns = EntryTurns::new(ledger);
+    let turns = EntryTurns::new(ledger, elements);
     let mut before: Option<(Span, Graph)> = None;
     let mut all = Vec::new();
     for (span, graph) in windows {
@@ -37,10 +37,12 @@ pub(crate) fn explain(
 struct EntryTurns {
     begins: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
     ends: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
+    /// Publishers that nobody names, and their publications: they come and go with their topic.
+    unnamed: BTreeMap<Element, Element>,
 }
 
 impl EntryTurns {
-    fn new(ledger: &Ledger) -> Self {
+    fn new(ledger: &Ledger, elements: &Elements) -> Self {
         let (mut begins, mut ends) = (BTreeMap::new(), BTreeMap::new());
         let add = |to: &mut BTreeMap<Element, Vec<_>>, what, time, id| {
             to.entry(what).or_default().push((time, id));
@@ -60,19 +62,38 @@ impl EntryTurns {
         for list in begins.values_mut().chain(ends.values_mut()) {
             list.sort_unstable();
         }
-        Self { begins, ends }
+        Self {
+            begins,
+            ends,
+            unnamed: unnamed(elements),
+        }
     }
 
     /// The last entry of a list before `end`, else its first.
     fn find(
+        &self,
         list: &BTreeMap<Element, Vec<(Stamp, EntryId)>>,
         what: Element,
         end: Stamp,
     ) -> Option<(Stamp, EntryId)> {
-        let list = list.get(&what)?;
+        let topic = || list.get(self.unnamed.get(&what)?);
+        let list = list.get(&what).or_else(topic)?;
         let next = list.partition_point(|(time, _)| *time < end);
         list.get(next.saturating_sub(1)).copied()
     }
+}
+
+/// The topics of publishers that nobody names, and of what these publish.
+fn unnamed(elements: &Elements) -> BTreeMap<Element, Element> {
+    let mut unnamed = BTreeMap::new();
+    for (id, edge) in (0..).zip(&elements.publishes) {
+        for what in [Element::Publish(id), Element::Node(edge.node)] {
+            if elements.evidence(what).is_timeless() {
+                unnamed.insert(what, Element::Topic(edge.topic));
+            }
+        }
+    }
+    unnamed
 }
 
 fn structure(
@@ -90,7 +111,7 @@ fn structure(
         .chain(ids(&diff.subscribes.added, |s| Element::Subscribe(s.id)));
     for what in added {
         let time = elements.life(what).0.filter(|t| span.contains(*t));
-        if let Some((at, id)) = EntryTurns::find(&turns.begins, what, span.end) {
+        if let Some((at, id)) = turns.find(&turns.begins, what, span.end) {
             let time = time.or(Some(at).filter(|at| span.contains(*at)));
             list.push((Change::Added { what, time }, id));
         }
@@ -100,7 +121,7 @@ fn structure(
         .chain(ids(&diff.publishes.removed, |id| Element::Publish(*id)))
         .chain(ids(&diff.subscribes.removed, |id| Element::Subscribe(*id)));
     for what in removed {
-        if let Some((at, id)) = EntryTurns::find(&turns.ends, what, span.end) {
+        if let Some((at, id)) = turns.find(&turns.ends, what, span.end) {
             let time = Some(at).filter(|at| *at < span.end);
             list.push((Change::Removed { what, time }, id));
         }

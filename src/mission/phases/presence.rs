@@ -1,12 +1,11 @@
 //! In which cells of the activity each element of the graph is there, which is what phases are cut by.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::base::name::is_quiet;
 use crate::base::time::Stamp;
-use crate::graph::{Elements, State};
-use crate::mission::activity::{Activity, Cell, is_hidden_node};
+use crate::graph::{Edge, Elements, Node, State, Topic};
+use crate::mission::activity::{Activity, is_hidden_node};
 
 /// Absences up to this share of the mission, one in so many, inside an element's life are none: a slow topic has no
 /// message in some cells.
@@ -60,47 +59,101 @@ pub(crate) fn is_topics(present: &[Presence]) -> bool {
 /// Every element's presence, sorted: nodes by role and their publications that carry messages; topics with messages
 /// where less than half of these have a known publisher. Housekeeping and recorders are left out.
 pub(crate) fn presences(elements: &Elements, activity: &Activity) -> Vec<Presence> {
-    let mut all: BTreeMap<PresentThing, Vec<bool>> = BTreeMap::new();
-    let many = activity.cells.len();
-    let known = knows_publishers(elements, activity);
+    let subjects = Subjects::new(elements, knows_publishers(elements, activity));
+    let all = subjects.sorted();
+    let [nodes, publishes, topics] = subjects.places(&all);
+    let mut cells = vec![vec![false; activity.cells.len()]; all.len()];
     for (at, cell) in activity.cells.iter().enumerate() {
-        let subjects = if known {
-            nodes(elements, cell)
-        } else {
-            topics(elements, cell)
+        let mut see = |places: &[Option<usize>], id: u32| {
+            if let Some(Some(place)) = places.get(id as usize) {
+                cells[*place][at] = true;
+            }
         };
-        for subject in subjects {
-            all.entry(subject).or_insert_with(|| vec![false; many])[at] = true;
-        }
+        let graph = &cell.graph;
+        graph.nodes.iter().for_each(|node| see(&nodes, node.id));
+        let carries = |state| matches!(state, State::Active | State::Latched);
+        let sends = graph.publishes.iter().filter(|edge| carries(edge.state));
+        sends.for_each(|edge| see(&publishes, edge.id));
+        let active = graph.topics.iter().filter(|topic| topic.count > 0);
+        active.for_each(|topic| see(&topics, topic.id));
     }
     let widths: Vec<i64> = activity.cells.iter().map(|c| c.span.nanos()).collect();
     let most = activity.span().nanos() / FILLED;
-    let filled = |(subject, cells)| Presence {
-        subject,
+    let seen = all
+        .into_iter()
+        .zip(cells)
+        .filter(|(_, cells)| cells.contains(&true));
+    let filled = |(subject, cells): (&PresentThing, _)| Presence {
+        subject: subject.clone(),
         cells: filled(cells, &widths, most),
     };
-    all.into_iter().map(filled).collect()
+    seen.map(filled).collect()
+}
+
+/// What each node, publication and topic stands for in the activity, by id; `None` for what is left out.
+struct Subjects([Vec<Option<PresentThing>>; 3]);
+
+impl Subjects {
+    /// Nodes and their publications, or topics.
+    fn new(elements: &Elements, knows_publishers: bool) -> Self {
+        let told = |topic: &Topic| Some(topic.name.shared()).filter(|name| !is_quiet(name));
+        if !knows_publishers {
+            let topics = elements.topics.iter();
+            let topics = topics.map(|topic| told(topic).map(PresentThing::Topic));
+            return Self([Vec::new(), Vec::new(), topics.collect()]);
+        }
+        let role = |node: &Node| (!is_hidden_node(node)).then(|| Arc::clone(&node.role));
+        let roles: Vec<Option<Arc<str>>> = elements.nodes.iter().map(role).collect();
+        let publication = |edge: &Edge| {
+            let role = roles.get(edge.node as usize)?.clone()?;
+            let topic = elements.topics.get(edge.topic as usize)?;
+            Some(PresentThing::Publication(role, told(topic)?))
+        };
+        let publishes = elements.publishes.iter().map(publication).collect();
+        let nodes = roles
+            .iter()
+            .map(|role| role.clone().map(PresentThing::Node));
+        Self([nodes.collect(), publishes, Vec::new()])
+    }
+
+    fn sorted(&self) -> Vec<&PresentThing> {
+        let mut all: Vec<&PresentThing> = self.0.iter().flatten().flatten().collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// The places of all among those that are sorted.
+    fn places(&self, all: &[&PresentThing]) -> [Vec<Option<usize>>; 3] {
+        let place = |subject: &PresentThing| all.binary_search(&subject).ok();
+        self.0.each_ref().map(|list| {
+            let places = list.iter().map(|subject| place(subject.as_ref()?));
+            places.collect()
+        })
+    }
 }
 
 /// Whether at least half of the messages are on topics of which some publisher is known.
 pub(crate) fn knows_publishers(elements: &Elements, activity: &Activity) -> bool {
+    let guess = |edge: &Edge| edge.evidence.is_guess();
+    let guesses: Vec<bool> = elements.publishes.iter().map(guess).collect();
+    let quiet = |topic: &Topic| is_quiet(topic.name.as_str());
+    let quiets: Vec<bool> = elements.topics.iter().map(quiet).collect();
     let (mut all, mut known) = (0_u64, 0_u64);
+    let mut sent = vec![false; elements.topics.len()];
     for cell in &activity.cells {
-        let mut sent = vec![false; elements.topics.len()];
-        for edge in &cell.graph.publishes {
-            let edge = elements.publishes.get(edge.id as usize);
-            let known = edge.filter(|e| !e.evidence.is_guess());
-            if let Some(is) = known
-                .map(|e| e.topic)
-                .and_then(|t| sent.get_mut(t as usize))
-            {
+        sent.fill(false);
+        for state in &cell.graph.publishes {
+            let edge = elements.publishes.get(state.id as usize);
+            let is_known = guesses.get(state.id as usize) == Some(&false);
+            let topic = edge.filter(|_| is_known).map(|edge| edge.topic);
+            if let Some(is) = topic.and_then(|t| sent.get_mut(t as usize)) {
                 *is = true;
             }
         }
         for topic in &cell.graph.topics {
             let id = topic.id as usize;
-            let quiet = |t: &crate::graph::Topic| is_quiet(t.name.as_str());
-            if elements.topics.get(id).is_none_or(quiet) {
+            if quiets.get(id) != Some(&false) {
                 continue;
             }
             all = all.saturating_add(topic.count);
@@ -110,35 +163,6 @@ pub(crate) fn knows_publishers(elements: &Elements, activity: &Activity) -> bool
         }
     }
     known >= all - known
-}
-
-/// Nodes that are alive and publications that are active or latched.
-fn nodes(elements: &Elements, cell: &Cell) -> Vec<PresentThing> {
-    let node = |id: u32| {
-        let node = elements.nodes.get(id as usize);
-        node.filter(|n| !is_hidden_node(n))
-            .map(|n| Arc::clone(&n.role))
-    };
-    let alive = cell.graph.nodes.iter().filter_map(|n| node(n.id));
-    let sends = cell.graph.publishes.iter().filter_map(|edge| {
-        let carries = matches!(edge.state, State::Active | State::Latched);
-        let of = elements
-            .publishes
-            .get(edge.id as usize)
-            .filter(|_| carries)?;
-        let topic = elements.topics.get(of.topic as usize)?;
-        let name = topic.name.shared();
-        (!is_quiet(&name)).then_some(PresentThing::Publication(node(of.node)?, name))
-    });
-    alive.map(PresentThing::Node).chain(sends).collect()
-}
-
-/// Topics that carry messages.
-fn topics(elements: &Elements, cell: &Cell) -> Vec<PresentThing> {
-    let active = cell.graph.topics.iter().filter(|t| t.count > 0);
-    let names = active.filter_map(|t| elements.topics.get(t.id as usize));
-    let names = names.map(|t| t.name.shared()).filter(|n| !is_quiet(n));
-    names.map(PresentThing::Topic).collect()
 }
 
 /// The cells with every absence of at most `most` nanoseconds between two presences filled.

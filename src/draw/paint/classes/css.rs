@@ -14,7 +14,9 @@ pub(crate) fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
 
 /// How elements look that are active and did not change.
 pub(crate) fn base(style: &Style) -> String {
-    let mut out = String::from("text{text-anchor:middle}use,.c{visibility:hidden}");
+    let mut out = String::from(
+        ":is(.node,.topic,.edge) text{text-anchor:middle;stroke:none}use,.c,.l{visibility:hidden}",
+    );
     let cluster = &style.cluster;
     let _ = write!(
         out,
@@ -27,6 +29,8 @@ pub(crate) fn base(style: &Style) -> String {
     body(&mut out, ".topic", &style.topic);
     edges(&mut out, style);
     badges(&mut out, style);
+    // A shape of its own among those of its box.
+    let _ = write!(out, "g>rect.l{{fill:{};stroke:none}}", style.latched.stroke);
     out
 }
 
@@ -62,19 +66,20 @@ pub(crate) fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     }
     let badges = MARKS.iter().filter(|word| words.contains(*word));
     let mut shown: Vec<String> = badges.map(|word| format!(".{word}>.{word}")).collect();
-    shown.push(":is(.faster,.slower)>.c".to_owned());
+    shown.push(":is(.faster,.slower)>.c,.latched:not(.removed)>.l".to_owned());
     let _ = write!(out, "{}{{visibility:inherit}}", shown.join(","));
     out
 }
 
 /// The class words of badges.
-const MARKS: [&str; 8] = [
+const MARKS: [&str; 9] = [
     "added",
     "removed",
     "faster",
     "slower",
     "handed-over",
     "restarted",
+    "paused",
     "other",
     "inside",
 ];
@@ -152,7 +157,7 @@ fn change(out: &mut String, kind: &str, change: &Change) {
 fn badges(out: &mut String, style: &Style) {
     let _ = write!(
         out,
-        ".b{{stroke:{};stroke-width:1.2}}.p{{fill:none;stroke:{s};stroke-width:2}}\
+        ".badge{{visibility:inherit}}.b{{stroke:{};stroke-width:1.2}}.p{{fill:none;stroke:{s};stroke-width:2}}\
          .f{{fill:{s};stroke:none}}use{{fill:{}}}use.added{{fill:{}}}use.removed{{fill:{}}}",
         style.badge.halo,
         style.changed.color,

@@ -6,11 +6,11 @@ use super::names::quoted;
 use super::{DotView, line, pen_width, rate};
 use crate::draw::style::Body;
 use crate::graph::State;
-use crate::view::{Arrow, Frame, Item, ItemKind, Shown};
+use crate::view::{Arrow, Item, ItemKind, SeenWindow, Shown};
 
 const FONTS: &str = "Helvetica,Arial,sans-serif";
 
-pub(super) fn write(drawing: &DotView<'_>, frame: &Frame, title: &str) -> String {
+pub(super) fn write(drawing: &DotView<'_>, seen: &SeenWindow, title: &str) -> String {
     let style = &drawing.style;
     let mut out = format!(
         "digraph graphname {{\n graph [rankdir=LR, compound=true, label={}, labelloc=t, fontsize=16, fontcolor=\"{}\", fontname=\"{FONTS}\"];\n",
@@ -26,8 +26,8 @@ pub(super) fn write(drawing: &DotView<'_>, frame: &Frame, title: &str) -> String
         " edge [fontsize=10, fontname=\"{FONTS}\", color=\"{}\", fontcolor=\"{}\", arrowsize=0.7];",
         style.edge.stroke, style.edge.text,
     );
-    members(drawing, frame, &mut out, None, &drawing.inhabited(frame), 1);
-    for shown in &frame.arrows {
+    members(drawing, seen, &mut out, None, &drawing.inhabited(seen), 1);
+    for shown in &seen.arrows {
         if let Some(arrow) = drawing.view.arrows.get(shown.id as usize) {
             edge(drawing, &mut out, arrow, shown);
         }
@@ -39,7 +39,7 @@ pub(super) fn write(drawing: &DotView<'_>, frame: &Frame, title: &str) -> String
 /// The namespaces and items that stand directly in a namespace. Namespaces nest 16 deep at most.
 fn members(
     drawing: &DotView<'_>,
-    frame: &Frame,
+    seen: &SeenWindow,
     out: &mut String,
     home: Option<usize>,
     inhabited: &[bool],
@@ -60,10 +60,10 @@ fn members(
             cluster.stroke,
             cluster.text,
         );
-        members(drawing, frame, out, Some(at), inhabited, depth + 1);
+        members(drawing, seen, out, Some(at), inhabited, depth + 1);
         let _ = writeln!(out, "{indent}}}");
     }
-    for shown in &frame.items {
+    for shown in &seen.items {
         let at = shown.id as usize;
         if let Some(item) = drawing
             .view
@@ -144,7 +144,7 @@ mod tests {
         let mission = mission(&["/ns/a>/t@3", "/ns/a>/t@3 /b</t"]);
         let (view, _) = view(&mission, &ViewOptions::default());
         let drawing = DotView::new(&mission, &view, Style::builtin("light").unwrap());
-        let file = drawing.write(&view.frames[1], "a \"bag\", window 2 of 2");
+        let file = drawing.write(&view.seen(1), "a \"bag\", window 2 of 2");
         assert!(file.contains(r#"label="a \"bag\", window 2 of 2""#) && !file.contains("pos="));
         let added = format!(
             "color=\"{}\", penwidth=3",

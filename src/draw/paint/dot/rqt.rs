@@ -11,7 +11,7 @@ use super::{DotView, line, pen_width, rate};
 use crate::base::geometry::{Point, Rect};
 use crate::graph::Element;
 use crate::layout::{Layout, Route};
-use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, Mark, Shown};
+use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, SeenWindow, Shown};
 
 /// The length of an arrow's head in points, as Graphviz draws it.
 const HEAD: f64 = 10.0;
@@ -27,19 +27,19 @@ pub(super) fn label(arrow: &Arrow, shown: &Shown) -> Option<String> {
     }
 }
 
-pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, frame: &Frame) -> String {
+pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, seen: &SeenWindow) -> String {
     let writer = RqtWriter {
         drawing,
         layout,
-        frame,
+        seen,
     };
     let size = layout.size;
     let bb = format!("0,0,{},{}", number(size.w), number(size.h));
     let mut out = format!(
         "digraph graphname {{\n graph [bb=\"{bb}\", compound=true, rank=same, rankdir=LR, ranksep=0.2];\n"
     );
-    writer.members(&mut out, None, &drawing.inhabited(frame), 1);
-    for shown in &frame.arrows {
+    writer.members(&mut out, None, &drawing.inhabited(seen), 1);
+    for shown in &seen.arrows {
         writer.arrow(&mut out, shown);
     }
     out.push_str("}\n");
@@ -49,7 +49,7 @@ pub(super) fn write(drawing: &DotView<'_>, layout: &Layout, frame: &Frame) -> St
 struct RqtWriter<'a> {
     drawing: &'a DotView<'a>,
     layout: &'a Layout,
-    frame: &'a Frame,
+    seen: &'a SeenWindow,
 }
 
 impl RqtWriter<'_> {
@@ -69,7 +69,7 @@ impl RqtWriter<'_> {
             self.members(out, Some(at), inhabited, depth + 1);
             let _ = writeln!(out, "{indent}}}");
         }
-        for shown in &self.frame.items {
+        for shown in &self.seen.items {
             let at = shown.id as usize;
             let (Some(item), Some(place)) =
                 (self.drawing.view.items.get(at), self.layout.boxes.get(at))
@@ -318,7 +318,7 @@ mod tests {
         let (view, _) = view(&mission, options);
         let style = Style::builtin("light").unwrap();
         let drawing = DotView::new(&mission, &view, style).laid_out(&Fonts::bundled());
-        drawing.write(view.frames.last().unwrap(), "")
+        drawing.write(&view.seen(view.frames.len() - 1), "")
     }
 
     /// The line that begins with this, without indent.

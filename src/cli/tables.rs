@@ -1,0 +1,76 @@
+//! `bagreel tables`: what was typed, turned into the tables of a fleet.
+
+use std::io::Read as _;
+use std::path::Path;
+
+use super::{DONE, SKIPPED};
+use crate::base::error::{Error, Result};
+use crate::base::{budget, file, words};
+use crate::cli::args::tables::TablesArgs;
+use crate::cli::terminal::Terminal;
+use crate::pipeline::fleet::{self, FleetJob, Planning, Tabled};
+
+/// Writes the tables; answers the exit code.
+pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
+    let mut sources = args.bags.clone();
+    if let Some(manifest) = &args.manifest {
+        sources.extend(listed(manifest)?);
+    }
+    let mut job = FleetJob::new(sources, args.output.clone());
+    job.planning = Planning {
+        period: args.period,
+        align: args.align,
+        mission: args.mission.clone(),
+    };
+    job.detail = args.tier;
+    job.shard = args.shard;
+    job.skip_existing = args.skip_existing;
+    job.on_error = args.on_error;
+    job.jobs = args.jobs;
+    let done = fleet::tables(&job, terminal)?;
+    let seconds = terminal.seconds();
+    let to = args.output.display();
+    terminal.say(&format!("wrote {to}: {}, in {seconds:.1} s", told(&done)));
+    let is_whole = done.unreadable + done.incomplete == 0;
+    Ok(if is_whole { DONE } else { SKIPPED })
+}
+
+/// `12 bags (1 unreadable, 3 there already), 4711 messages`.
+fn told(done: &Tabled) -> String {
+    let of = [
+        (done.unreadable, "unreadable"),
+        (done.incomplete, "damaged"),
+        (done.kept, "there already"),
+    ];
+    let of: Vec<String> = of
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    let bags = words::count(done.bags, "bag");
+    let bags = if of.is_empty() {
+        bags
+    } else {
+        format!("{bags} ({})", of.join(", "))
+    };
+    let messages = usize::try_from(done.messages).unwrap_or(usize::MAX);
+    format!("{bags}, {}", words::count(messages, "message"))
+}
+
+/// The bags in a list: zero bytes stand between names that may hold line ends.
+fn listed(manifest: &Path) -> Result<Vec<String>> {
+    let text = if manifest == Path::new("-") {
+        let mut text = String::new();
+        let read = std::io::stdin()
+            .take(budget::MANIFEST)
+            .read_to_string(&mut text);
+        read.map_err(Error::io("read", manifest))?;
+        text
+    } else {
+        file::read_text(manifest, budget::MANIFEST)?
+    };
+    let between = if text.contains('\0') { '\0' } else { '\n' };
+    let lines = text.split(between).map(|line| line.trim_end_matches('\r'));
+    let lines = lines.filter(|line| !line.trim().is_empty());
+    Ok(lines.map(str::to_owned).collect())
+}

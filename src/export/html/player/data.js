@@ -1,0 +1,101 @@
+// What the page holds, unpacked: any value of any element in any window is one search away. `data.rs` says what it is.
+const $ = new Proxy({}, { get: (_, id) => document.getElementById(id) });
+const say = (id, text) => { $[id].textContent = text; };
+const make = (tag, props, ...inside) => {
+	const element = Object.assign(document.createElement(tag), props);
+	element.append(...inside);
+	return element;
+};
+async function unpacked({ type, textContent: text }) {
+	if (type != 'deflated') return text;
+	const bytes = Uint8Array.from(atob(text), c => c.charCodeAt());
+	return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate-raw'))).text();
+}
+const data = JSON.parse(await unpacked($.data));
+say('data', '');
+const { words, starts, ends, told, phases, rows, hands, sizes } = data;
+const W = starts.length, last = W - 1, total = Math.max(...ends.slice(-50), 1e-3);
+// The window that shows a time: the last that begins before it.
+const windowAt = s => Math.max(0, starts.findLastIndex(start => start <= s + 1e-6));
+const iso = (s, from, to) => new Date(Math.round(s * 1e3)).toISOString().slice(from, to).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '');
+const clock = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
+
+// The value of a run list in a window, and the place of its run.
+function place(list, w, lo = 0, hi = list.length) {
+	while (lo < hi) { const mid = (lo + hi >> 2) * 2; list[mid] <= w ? lo = mid + 2 : hi = mid; }
+	return lo;
+}
+const at = (list, w) => { const p = place(list, w); return p && list[p - 1]; };
+const KINDS = ['added', 'removed', 'changed'], ITEMS = ['node', 'topic', 'topics', 'namespace'];
+const NONE = [];
+
+// Elements are numbered: items, then arrows.
+class Graph {
+	constructor({ names, kinds, arrows, facts, boxes, classes, labels, lives, holds }, svg) {
+		Object.assign(this, { names, kinds, arrows, boxes, classes, labels, holds, svg, N: names.length, count: names.length + arrows.length });
+		this.lives = lives.map(lists => [0, 1, 2, 3].map(k => lists[k] ?? NONE));
+		for (const list of lives.flat()) for (let i = 2; i < list.length; i += 2) list[i] += list[i - 2];
+		this.facts = facts.map(list => list.map(f => words[f]));
+		this.els = svg ? [...svg.querySelectorAll('.items > g, .arrows > g')] : [];
+		if (svg) this.els = [...svg.querySelector('.items').children, ...svg.querySelector('.arrows').children];
+		this.base = this.els.map(e => e.classList[0] + ' ');
+		this.live = this.els.map(e => e.querySelector('.r'));
+		this.cur = this.els.map(() => '');
+		this.dom = new Map(this.els.map((e, i) => [e, i]));
+		// What a class says: the mark, whether it is there, and the same without marks.
+		this.marks = classes.map(c => KINDS.findIndex(k => c.split(' ').includes(k)));
+		this.there = classes.map((c, k) => k > 0 && this.marks[k] != 1);
+		this.plain = classes.map(c => c.split(' ').filter((word, k) => !k || /^(stated|inferred|declared|w\d)$/.test(word)).join(' '));
+		this.neighbours = names.map(() => []);
+		arrows.forEach(([a, b], k) => { this.neighbours[a].push(this.N + k); if (a != b) this.neighbours[b].push(this.N + k); });
+		this.keys = new Map();
+		for (let i = 0; i < this.count; i++) this.keys.set(this.key(i), i);
+	}
+	ends(i) { return i < this.N ? this.neighbours[i] : this.arrows[i - this.N].slice(0, 2); }
+	name(i) {
+		if (i < this.N) return this.names[i];
+		const [a, b, topic] = this.arrows[i - this.N];
+		return this.names[a] + ' → ' + this.names[b] + (topic && ' over ' + topic);
+	}
+	kind(i) { return i < this.N ? ITEMS[this.kinds[i]] : 'edge'; }
+	key(i) { return this.kind(i) + ':' + this.name(i); }
+	type(i) { return this.facts[i].find(f => f.startsWith('type ')) ?? ''; }
+	class(i, w) { return at(this.lives[i][0], w); }
+	isThere(i, w) { return this.there[this.class(i, w)]; }
+	rate(i, w) {
+		const k = this.class(i, w);
+		return this.there[k] && !/^(silent|latched|declared)/.test(this.classes[k]) ? this.labels[at(this.lives[i][1], w)] : '';
+	}
+	// Messages per second, as the label says.
+	hz(i, w) {
+		const [, number, unit] = this.rate(i, w).match(/([\d.]+) (Hz|kHz|msg)( each)?$/) ?? [];
+		return number ? number * ({ kHz: 1e3, msg: 1 / (ends[w] - starts[w]) }[unit] ?? 1) : 0;
+	}
+	lifecycle(i, w) { return this.labels[at(this.lives[i][2], w)]; }
+	turn(i, w) {
+		const list = this.lives[i][3], p = place(list, w);
+		return p && list[p - 2] == w ? this.labels[list[p - 1]] : '';
+	}
+	// How one window differs from another: class words, and what is told of it.
+	difference(i, from, to) {
+		const a = this.isThere(i, from), b = this.isThere(i, to);
+		if (!a && !b) return NONE;
+		if (!a) return ['added', this.rate(i, to)];
+		if (!b) return ['removed', this.rate(i, from)];
+		const before = this.hz(i, from), after = this.hz(i, to), change = `${this.rate(i, from) || '0 Hz'} → ${this.rate(i, to) || '0 Hz'}`;
+		if (Math.abs(after - before) > data.change * (before || after) * (1 + 1e-9)) return [after > before ? 'changed faster' : 'changed slower', change];
+		const [x, y] = [from, to].map(w => this.lifecycle(i, w));
+		return x != y ? ['changed other', `${x || '?'} → ${y || '?'}`] : NONE;
+	}
+	// Windows in which something happens to it.
+	turns(i) {
+		const found = new Set(told.filter(([, , , lines]) => lines.some(line => line[2] == i)).map(([w]) => w)), list = this.lives[i][0];
+		for (let r = 0; r < list.length; r += 2) {
+			if (this.marks[list[r + 1]] >= 0) for (let w = list[r]; w < Math.min(list[r + 2] ?? W, list[r] + 1000); w++) found.add(w);
+		}
+		return found;
+	}
+}
+const whole = new Graph(data.graphs[0], document.querySelector('#graph .items') && $.graph);
+const folded = data.graphs[1] && new Graph(data.graphs[1], $.folded);
+const news = new Map(told.map(([w, n, chips, lines]) => [w, { n, chips, lines }]));

@@ -1,0 +1,64 @@
+// Keys and buttons, and the beginning.
+const toggle = (id, name, on) => { $[id].ariaPressed = on; document.body.classList.toggle(name, !on); };
+const sideIsOpen = () => !document.body.classList.contains('noside');
+function side(on) {
+	toggle('toside', 'noside', on);
+	resized();
+}
+function livesOn(on) {
+	$.tolives.ariaPressed = on;
+	$.deck.classList.toggle('small', !on);
+	resized();
+}
+function escape() {
+	if (!$.sheet.hidden) return table(false);
+	if ($.q.value) return clearSearch();
+	if (sel >= 0 || !$.card.hidden) return pick(-1);
+	if (base >= 0) compare(-1);
+}
+const MOVES = { ArrowRight: 1, ArrowLeft: -1, '.': 1, ',': -1, PageDown: W / 10, PageUp: -W / 10, Home: -W, End: W };
+const KEYS = {
+	' ': () => play(!timer), '[': () => jump(-1), ']': () => jump(1), p: () => jump(-1), n: () => jump(1),
+	'+': () => zoom(1.25), '=': () => zoom(1.25), '-': () => zoom(.8), f: () => fit(homeOf()), z: () => bring([...near]), c: () => bring(marked()),
+	'/': () => { side(true); $.q.focus(); $.q.select(); }, '?': () => $.help.showModal(), Escape: escape,
+	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => livesOn($.deck.classList.contains('small')), s: () => side(!sideIsOpen()),
+	o: () => { if (folded) { show(shown == folded ? whole : folded); search(); firstView(); } },
+};
+const press = (key, far) => KEYS[key] ? KEYS[key]() : go(MOVES[key] ? now + Math.sign(MOVES[key]) * Math.ceil(Math.abs(MOVES[key] * far)) : Math.round(last * key / 10));
+onkeydown = e => {
+	const { key, target, shiftKey } = e;
+	if (e.ctrlKey || e.altKey || e.metaKey || $.help.open) return;
+	if (target.matches?.('input[type=search]')) {
+		if (key == 'Enter' && target == $.q && hitList.length) pick(hitList.at((hitList.indexOf(sel) + (shiftKey ? -1 : 1)) % hitList.length), 1);
+		if (key == 'Escape') { target == $.q ? clearSearch() : escape(); target.blur(); }
+		return;
+	}
+	const known = KEYS[key] || MOVES[key] || /^\d$/.test(key);
+	if (!known || target.matches?.('select') && key != 'Escape' || / |Enter/.test(key) && target.matches?.('button,summary,a,input,select,label')) return;
+	if (target.closest?.('#scroll') && MOVES[key] && !/^[.,]$/.test(key)) return;
+	e.preventDefault();
+	press(key, shiftKey ? 10 : 1);
+};
+document.addEventListener('click', e => {
+	const key = e.target.closest?.('[data-key]')?.dataset.key, a = e.target.closest?.('a[href^="#"]');
+	if (key) press(key, 1);
+	// In a frame without an address of its own a link would load the page around it.
+	if (a) {
+		e.preventDefault();
+		go(windowAt(parseFloat(a.hash.slice(3))));
+		if (innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
+	}
+});
+// Keys go on working after a choice.
+$.speed.onchange = () => $.play.focus();
+const resized = () => { drawTime(); fit(view); };
+new ResizeObserver(resized).observe(stage);
+onhashchange = load;
+if ($.open) $.open.hidden = !folded;
+$.notes.hidden = !$.notes.querySelector('li');
+if (innerWidth < 1200) side(false);
+livesOn(innerWidth > 760 && innerHeight > 600);
+if (innerWidth <= 760) side(true);
+// The board draws its own head.
+if ($.boardhead) onSeek.push(() => { for (const k of ['x', 'width']) $.boardhead.setAttribute(k, $.boardhead.dataset[k].split(' ')[now]); });
+load();

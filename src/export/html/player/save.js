@@ -1,0 +1,60 @@
+// What can be taken away: a link that names exactly this view, and the view as a picture.
+let later;
+const escapes = text => encodeURIComponent(text).replace(/%2F/g, '/').replace(/%3A/g, ':');
+function link() {
+	const parts = { t: starts[now], b: base < 0 ? '' : starts[base], sel: sel < 0 ? '' : whole.key(sel), q: $.q.value, table: $.sheet.hidden ? '' : 1 };
+	return '#' + Object.entries(parts).filter(([, value]) => value !== '').map(([key, value]) => key + '=' + escapes(value)).join('&');
+}
+function save() {
+	clearTimeout(later);
+	later = setTimeout(() => { if (!timer) try { history.replaceState(0, '', link()); } catch {} }, 50);
+}
+// A window by its time; an element by its kind and name, or by a name alone: a node before a topic.
+function load() {
+	const to = new URLSearchParams(location.hash.slice(1)), time = parseFloat(to.get('t')), against = parseFloat(to.get('b'));
+	$.q.value = to.get('q') ?? '';
+	base = against >= 0 ? windowAt(against) : -1;
+	now = time >= 0 ? windowAt(time) : data.still;
+	compare(base);
+	const name = to.get('sel'), i = ['', 'node:', 'topic:', 'topics:', 'edge:'].map(kind => whole.keys.get(kind + name)).find(i => i >= 0);
+	firstView();
+	pick(name === null ? -1 : i ?? -1, 1);
+	search();
+	if (to.get('table')) table(true);
+}
+// The stage as it is, with the rules that colour it and the font that it is set in.
+function picture() {
+	const copy = svg().cloneNode(true), wide = stage.clientWidth, high = stage.clientHeight, k = scaleOf(view);
+	const box = [view[0] + view[2] / 2 - wide / k / 2, view[1] + view[3] / 2 - high / k / 2, wide / k, high / k];
+	for (const [key, value] of Object.entries({ xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high, viewBox: box.join(' ') })) copy.setAttribute(key, value);
+	const style = document.createElementNS('http://www.w3.org/2000/svg', 'style'), ground = document.createElementNS('http://www.w3.org/2000/svg', 'rect');
+	style.textContent = [...document.querySelectorAll('style')].map(sheet => sheet.textContent).join('');
+	['x', 'y', 'width', 'height'].forEach((key, n) => ground.setAttribute(key, box[n]));
+	ground.setAttribute('style', `fill:${getComputedStyle(document.body).backgroundColor};stroke:none`);
+	copy.prepend(style, $.signs.querySelector('defs').cloneNode(true), ground);
+	copy.querySelectorAll('.off').forEach(e => e.remove());
+	return new XMLSerializer().serializeToString(copy);
+}
+const fileName = kind => `${document.title.replace(/\.\w+$/, '').replace(/[^\w.-]+/g, '_')}_${clock(starts[now]).replace(/:/g, '-')}.${kind}`;
+function download(href, kind) {
+	const a = make('a', { href, download: fileName(kind) });
+	a.click();
+	say('live', `Saved ${a.download}`);
+}
+async function savePicture(kind) {
+	const url = 'data:image/svg+xml;charset=utf-8,' + encodeURIComponent(picture());
+	if (kind == 'svg') return download(url, kind);
+	const image = new Image(), canvas = make('canvas', { width: stage.clientWidth * 2, height: stage.clientHeight * 2 });
+	image.src = url;
+	await image.decode();
+	canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
+	download(canvas.toDataURL('image/png'), kind);
+}
+$.save.onchange = async () => {
+	const what = $.save.value;
+	$.save.value = '';
+	$.save.blur();
+	if (what != 'link') return savePicture(what);
+	const url = location.href.split('#')[0] + link();
+	try { await navigator.clipboard.writeText(url); say('live', 'Link copied'); } catch { say('live', url); prompt?.('The link', url); }
+};

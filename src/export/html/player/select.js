@@ -1,0 +1,111 @@
+// The selection: who it is, how we know, what happened to it, and whom it is connected to.
+function near_of(i) {
+	if (i < 0) return new Set();
+	const at = shown == whole ? [i] : [...shown.holds.keys()].filter(k => shown.holds[k].includes(i));
+	return new Set(at.flatMap(k => [k, ...shown.ends(k).flatMap(end => end < shown.N ? end : [end, ...shown.ends(end)])]));
+}
+// The element of everything that one of the stage stands for: the same, or the first of those that it holds.
+const wholeOf = i => shown == whole ? i : i < shown.N ? whole.keys.get(shown.key(i)) ?? -1 : -1;
+// Selects an element of everything; `look` brings it into view, `from` says that a list did.
+function pick(i, look, fromList) {
+	sel = i;
+	if (i >= 0 && look && !whole.isThere(i, now) && base < 0) toLife(i);
+	if (i >= 0 && look && shown == folded && !near_of(i).size) show(whole);
+	near = near_of(i);
+	dress();
+	svg().classList.toggle('pinned', i >= 0);
+	$.unfold.hidden = true;
+	if (i < 0) $.follow.ariaPressed = false;
+	card();
+	drawRow();
+	rowNames[rows.findIndex(([k]) => k >= 0 && k == i)]?.scrollIntoView({ block: 'nearest' });
+	if (look && i >= 0) {
+		const mine = shown == whole ? [i] : [...shown.holds.keys()].filter(k => shown.holds[k].includes(i));
+		bring(mine, Math.max(scaleOf(view), TOPIC), 1.5);
+		if (fromList && innerWidth <= 760) stage.scrollIntoView({ block: 'start' });
+	}
+	save();
+}
+// To the nearest window in which an element is there.
+function toLife(i) {
+	for (let far = 1; far < W; far++) for (const w of [now - far, now + far]) {
+		if (w >= 0 && w < W && whole.isThere(i, w)) {
+			go(w);
+			return say('live', `${whole.name(i)} is not there at that time; ${clock(starts[w])} is the nearest at which it is`);
+		}
+	}
+}
+// A folded box: what it holds, and how to see it.
+function pickFolded(i) {
+	const held = shown.holds[i];
+	sel = -1;
+	near = new Set([i, ...shown.ends(i).flatMap(end => [end, ...shown.ends(end)])]);
+	dress();
+	svg().classList.add('pinned');
+	$.card.hidden = false;
+	say('name', shown.name(i));
+	say('state', `${shown.kind(i)} of ${held.length} ${shown.rate(i, now)}`);
+	$.life.replaceChildren();
+	$.facts.replaceChildren();
+	$.story.hidden = true;
+	$.unfold.hidden = false;
+	$.unfold.onclick = () => unfold(held);
+	fill('ends', held, element);
+}
+function unfold(held) {
+	show(whole);
+	svg().classList.remove('pinned');
+	bring(held.filter(i => i < whole.N), TOPIC);
+	say('live', `${held.length} elements, one by one`);
+	$.open.focus();
+}
+const STATES = { active: 'active', silent: 'silent: alive, no message now', latched: 'latched: alive by a message that is kept', declared: 'declared: known from a header only', off: 'not there now' };
+const DEGREES = { stated: 'stated by somebody', inferred: 'inferred by a rule', declared: 'declared only' };
+// What is known of an element in a window, line by line.
+function explain(g, i, w) {
+	const [state, ...rest] = g.classes[g.class(i, w)].split(' '), degree = rest.map(word => DEGREES[word]).find(Boolean) ?? 'measured';
+	const told = g.turn(i, w) || g.rate(i, w), sign = g.marks[g.class(i, w)], lifecycle = g.lifecycle(i, w);
+	const now = [sign == 1 ? 'ended in this window' : STATES[state], sign == 0 && 'began in this window', told && (g.turn(i, w) ? 'rate ' + told : told + ' in this window'), lifecycle && 'state ' + lifecycle, state != 'off' && degree];
+	return [`${g.kind(i) == 'edge' ? 'connection' : g.kind(i)} ${g.name(i)}`, now.filter(Boolean).join(' · '), ...g.facts[i]];
+}
+function card() {
+	if ($.card.hidden = sel < 0) return;
+	const [life] = whole.lives[sel], [title, state, ...facts] = explain(whole, sel, now);
+	say('name', whole.name(sel));
+	$.title.className = 'is-' + whole.kind(sel);
+	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · against window ${base + 1}: ${whole.difference(sel, base, now)[1] || whole.difference(sel, base, now)[0] || 'the same'}`));
+	const bits = [];
+	for (let k = 0; k < life.length && bits.length < 2000; k += 2) if (life[k + 1]) bits.push([whole.classes[life[k + 1]], starts[life[k]], starts[life[k + 2]] ?? total]);
+	$.life.setAttribute('viewBox', `0 0 ${total} 9`);
+	$.life.innerHTML = bits.concat([['head', starts[now], Math.max(ends[now], starts[now] + total / 150)]]).map(([c, from, to]) => `<rect class="${c}" x=${from} width=${to - from} height=9 />`).join('');
+	$.facts.replaceChildren(...facts.map(fact => make('p', { textContent: fact })));
+	const past = told.flatMap(([w, , , lines]) => lines.filter(line => line[2] == sel).map(line => [w, ...line]));
+	$.story.hidden = !past.length;
+	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: clock(Math.floor(s)) + ' ' }), text), 12);
+	fill('ends', whole.ends(sel), element);
+}
+onSeek.push(card);
+$.follow.onclick = () => { $.follow.ariaPressed = $.follow.ariaPressed != 'true'; };
+
+// What the pointer is over.
+function hover(e, [title, ...lines]) {
+	$.tip.replaceChildren(make('b', { textContent: title }), ...lines.filter(Boolean).map(line => make('div', { textContent: line })));
+	$.tip.hidden = false;
+	const { clientWidth: w, clientHeight: h } = document.documentElement, box = $.tip.getBoundingClientRect();
+	$.tip.style.left = Math.max(4, Math.min(e.clientX + 14, w - box.width - 6)) + 'px';
+	$.tip.style.top = (e.clientY + 18 + box.height < h ? e.clientY + 18 : Math.max(4, e.clientY - box.height - 12)) + 'px';
+}
+const elementAt = e => shown.dom.get(e.target.closest?.('.items > g, .arrows > g')) ?? -1;
+stage.addEventListener('pointermove', e => {
+	const i = e.pointerType == 'touch' || e.buttons ? -1 : elementAt(e);
+	if (i < 0) $.tip.hidden = true;
+	else hover(e, explain(shown, i, now));
+});
+stage.addEventListener('pointerleave', () => { $.tip.hidden = true; });
+for (const g of [whole, folded]) if (g?.svg) g.svg.onclick = e => {
+	if (far > 5) return;
+	const i = elementAt(e), same = i < 0 ? -1 : wholeOf(i);
+	if (i >= 0 && same < 0 && shown == folded && i < shown.N) pickFolded(i);
+	else pick(same);
+};
+

@@ -1,0 +1,118 @@
+// The timeline: phases, changes and life lines at their true times, and the head over the present window.
+const ROW = 14, part = s => s / total, percent = s => 100 * part(s) + '%';
+let pitch = ROW;
+phases.forEach(([from, to, name], p) => {
+	const button = make('button', { textContent: `${p + 1} ${name}`, title: `phase ${p + 1}: ${name}, ${clock(from)} – ${clock(to)}`, onclick: () => go(windowAt(from)) });
+	button.style.left = percent(from);
+	button.style.width = percent(to - from);
+	$.band.append(button);
+});
+$.time.classList.toggle('nophases', !phases.length);
+const rowNames = rows.map(([i, label, inside]) => i < 0
+	? make('div', { className: inside ? 'inside' : 'space', textContent: label, title: label })
+	: make('button', { className: inside ? 'inside' : '', textContent: label, title: whole.name(i), onclick: () => pick(i, 1) }));
+$.rownames.append(...rowNames);
+
+const bit = (x, y, w, h) => `M${x.toFixed(1)} ${y.toFixed(1)}h${w.toFixed(1)}v${h.toFixed(1)}h${(-w).toFixed(1)}z`;
+// Draws all in the pixels there are.
+function drawTime() {
+	const small = $.deck.classList.contains('small') || innerWidth <= 760, wide = $.axis.clientWidth, x = s => part(s) * wide;
+	pitch = small ? Math.max(2, Math.min(5, 48 / rows.length)) : ROW;
+	const high = pitch * rows.length, d = { life: '', guess: '', bar: '', hand: '', start: '', end: '' };
+	rows.forEach(([, , , lives, bars], r) => {
+		const y = (r + .5) * pitch, tall = pitch * .8;
+		for (let k = 0; k < lives.length; k += 3) {
+			const [from, to, flags] = lives.slice(k, k + 3);
+			d[flags & 4 ? 'guess' : 'life'] += `M${x(from).toFixed(1)} ${y}H${x(to).toFixed(1)}`;
+			if (flags & 1) d.start += `M${x(from).toFixed(1)} ${y - tall / 2}v${tall}`;
+			if (flags & 2) d.end += `M${(x(to) - tall / 3).toFixed(1)} ${y - tall / 3}l${tall / 1.5} ${tall / 1.5}m0 ${-tall / 1.5}l${-tall / 1.5} ${tall / 1.5}`;
+		}
+		for (let k = 0; k < bars.length; k += 3) {
+			const h = pitch * (.16 + .06 * bars[k + 2]);
+			d.bar += bit(x(bars[k]), y - h / 2, Math.max(.6, x(bars[k + 1]) - x(bars[k])), h);
+		}
+	});
+	for (const [s, a, b] of hands) {
+		const [from, to] = [a, b].map(r => (r + .5) * pitch), tip = Math.sign(to - from) * 4;
+		d.hand += `M${x(s)} ${from}V${to}m-3 ${-tip}l3 ${tip}l3 ${-tip}M${x(s) - 2} ${from}a2 2 0 1 0 4 0a2 2 0 1 0 -4 0`;
+	}
+	$.plot.setAttribute('width', wide);
+	$.plot.setAttribute('height', high);
+	for (const key in d) $.plot.querySelector('.' + key).setAttribute('d', d[key]);
+	drawMarks(x);
+	drawTicks(x, wide);
+	drawRow();
+	drawHead();
+}
+// A plus above, a diamond in the middle, a minus below; those that would cover each other are one.
+function drawMarks(x) {
+	const lanes = ['', '', ''], before = [-9, -9, -9];
+	for (const [, , , lines] of told) for (const [s, sign] of lines) {
+		const at = x(s);
+		if (at - before[sign] < 6) continue;
+		before[sign] = at;
+		lanes[sign] += [`M${at - 3} 5h6m-3 -3v6`, `M${at - 3} 21h6`, `M${at} 9.5l3.5 3.5l-3.5 3.5l-3.5 -3.5z`][sign];
+	}
+	KINDS.forEach((kind, k) => $.marks.querySelector('.' + kind).setAttribute('d', lanes[k]));
+}
+const STEPS = [.001, .002, .005, .01, .02, .05, .1, .2, .5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200, 86400];
+function drawTicks(x, wide) {
+	const least = total * 70 / wide, step = STEPS.find(s => s >= least) ?? Math.ceil(least / 86400) * 86400, ticks = [];
+	for (let k = 0; k * step <= total && k < 400; k++) ticks.push(k * step);
+	const end = clock(total), spans = ticks.filter(s => x(s) < wide - 7 * end.length - 30).map(s => {
+		const tick = make('span', { textContent: clock(+s.toFixed(3)) });
+		tick.style.left = percent(s);
+		return tick;
+	});
+	$.ticks.replaceChildren(...spans, make('span', { className: 'last', textContent: end }));
+}
+function drawHead() {
+	for (const [id, w] of [['head', now], ['base', base]]) {
+		$[id].hidden = w < 0;
+		if (w < 0) continue;
+		$[id].style.left = percent(starts[w]);
+		$[id].style.width = `max(3px, ${percent(ends[w] - starts[w])})`;
+	}
+}
+function drawRow() {
+	const r = rows.findIndex(([i]) => i >= 0 && i == sel), rect = $.plot.firstElementChild;
+	rowNames.forEach((name, k) => name.classList.toggle('picked', k == r));
+	for (const [key, value] of Object.entries({ x: 0, y: r * pitch, width: r < 0 ? 0 : $.axis.clientWidth, height: pitch })) rect.setAttribute(key, value);
+}
+onSeek.push(drawHead);
+
+// A press seeks; one near a mark goes to exactly that change; one on a row picks who lives there.
+const timeAt = e => (e.clientX - $.axis.getBoundingClientRect().left) / $.axis.clientWidth * total;
+function markAt(e) {
+	const s = timeAt(e), near = 7 / $.axis.clientWidth * total;
+	let best = -1, least = near;
+	for (const [w, , , lines] of told) for (const [time] of lines) if (Math.abs(time - s) < least) { least = Math.abs(time - s); best = w; }
+	return best;
+}
+const rowAt = e => pitch < ROW ? -1 : rows[Math.floor((e.clientY - $.plot.getBoundingClientRect().top) / pitch)]?.[0] ?? -1;
+let scrubbed = 0;
+$.axis.onpointerdown = e => {
+	if (e.target.closest('#band button') || e.button) return;
+	scrubbed = 0;
+	if (e.isTrusted) $.axis.setPointerCapture(e.pointerId);
+	const w = e.target.closest('#marks') ? markAt(e) : -1;
+	go(w < 0 ? windowAt(timeAt(e)) : w);
+};
+$.axis.onpointermove = e => {
+	if (e.buttons && $.axis.hasPointerCapture(e.pointerId)) {
+		if (scrubbed++ > 2) go(windowAt(timeAt(e)));
+		return;
+	}
+	const i = e.target.closest('#lives') ? rowAt(e) : -1, w = e.target.closest('#marks') ? markAt(e) : -1;
+	if (i >= 0) hover(e, explain(whole, i, windowAt(timeAt(e))));
+	else if (w >= 0) hover(e, [`${clock(starts[w])} – ${clock(ends[w])}`, ...news.get(w).lines.slice(0, 8).map(line => line[3])]);
+	else $.tip.hidden = true;
+};
+$.axis.onpointerup = e => {
+	const i = e.target.closest('#axis') && document.elementsFromPoint(e.clientX, e.clientY).includes($.lives) ? rowAt(e) : -1;
+	if (i >= 0 && scrubbed < 4) pick(i, 1);
+};
+$.axis.onpointerleave = () => { $.tip.hidden = true; };
+$.lives.onscroll = () => { $.rownames.scrollTop = $.lives.scrollTop; };
+$.rownames.onscroll = () => { $.lives.scrollTop = $.rownames.scrollTop; };
+$.seek.oninput = () => go(+$.seek.value);

@@ -1,0 +1,128 @@
+// Where the stage looks: a gesture moves the picture by X, Y, S; its end draws it anew. Text too small to be read gives way.
+let X = 0, Y = 0, S = 1, idle;
+const READABLE = 9, MOST = 6, pointers = new Map();
+for (const g of [whole, folded]) if (g?.svg) g.home = g.svg.getAttribute('viewBox').split(' ').map(Number);
+const svg = () => shown.svg ?? $.graph;
+const homeOf = () => shown.home ?? (shown.home = $.graph.getAttribute('viewBox').split(' ').map(Number));
+const scaleOf = ([, , w, h]) => Math.min(stage.clientWidth / w, stage.clientHeight / h);
+let view = homeOf();
+const [RATE, TOPIC, NODE] = sizes.map(size => READABLE / size);
+
+function fit(box) {
+	view = [...box];
+	svg().setAttribute('viewBox', view.join(' '));
+	const k = scaleOf(view), list = svg().classList;
+	list.toggle('norates', k < RATE * .99);
+	list.toggle('notopics', k < TOPIC * .89);
+	list.toggle('nonodes', k < NODE * .6);
+	svg().style.setProperty('--space', Math.min(Math.max(sizes[3], 10 / k), 60) + 'px');
+	minimap();
+}
+function zoom(by, dx = 0, dy = 0, x = stage.clientWidth / 2, y = stage.clientHeight / 2) {
+	const k = scaleOf(view) * S, fits = scaleOf(homeOf());
+	by = Math.max(Math.min(fits, k) * .7, Math.min(MOST, k * by)) / k;
+	X = x + (X - x) * by + dx;
+	Y = y + (Y - y) * by + dy;
+	S *= by;
+	svg().style.willChange = 'transform';
+	svg().style.transform = `translate(${X}px,${Y}px) scale(${S})`;
+	clearTimeout(idle);
+	idle = setTimeout(settle, 160);
+}
+// Draws anew what a gesture only moved.
+function settle() {
+	const k = scaleOf(view), left = view[0] - (stage.clientWidth / k - view[2]) / 2, top = view[1] - (stage.clientHeight / k - view[3]) / 2;
+	svg().style.willChange = svg().style.transform = '';
+	fit([left - X / S / k, top - Y / S / k, stage.clientWidth / k / S, stage.clientHeight / k / S]);
+	X = Y = 0;
+	S = 1;
+}
+const boxesOf = all => all.flatMap(i => i < shown.N ? [shown.boxes[i]] : shown.ends(i).map(k => shown.boxes[k])).filter(Boolean);
+function around(boxes) {
+	const low = k => Math.min(...boxes.map(b => b[k])), high = k => Math.max(...boxes.map(b => b[k] + b[k + 2]));
+	return [low(0) - 30, low(1) - 30, high(0) - low(0) + 60, high(1) - low(1) + 60];
+}
+// Looks at some elements, at least so close that text can be read; `most` says how close at most.
+function bring(all, least = RATE, most = 1.5) {
+	const boxes = boxesOf(all);
+	if (!boxes.length) return;
+	const box = around(boxes), k = Math.min(most, Math.max(scaleOf(box), least)), w = stage.clientWidth / k, h = stage.clientHeight / k;
+	let [x, y] = [box[0] + box[2] / 2, box[1] + box[3] / 2];
+	if (box[2] > w * 1.01 || box[3] > h * 1.01) [x, y] = densest(boxes, w, h);
+	fit([x - w / 2, y - h / 2, w, h]);
+}
+// The middle of the window of this size that holds most boxes.
+function densest(boxes, w, h) {
+	let best = [-1, 0, 0];
+	for (const [x, y] of boxes.slice(0, 300)) {
+		for (const [left, top] of [[x - 20, y - 20], [x - w / 2, y - h / 2], [x - 20, y - h / 2], [x - w / 2, y - 20]]) {
+			const inside = boxes.filter(b => b[0] >= left && b[0] + b[2] <= left + w && b[1] >= top && b[1] + b[3] <= top + h);
+			if (inside.length > best[0]) {
+				const [bx, by, bw, bh] = inside.length ? around(inside) : [left, top, w, h];
+				best = [inside.length, bx + bw / 2, by + bh / 2];
+			}
+		}
+	}
+	return best.slice(1);
+}
+// All of it if its names can be read, else the changes of this window.
+function firstView() {
+	if (!shown.svg || scaleOf(homeOf()) >= TOPIC) return fit(homeOf());
+	const all = marked();
+	const some = all.length ? all : [...shown.names.keys()].filter(i => shown.isThere(i, now));
+	bring(some, scaleOf(around(boxesOf(some))) >= RATE ? RATE : TOPIC);
+}
+
+// The minimap: everything small, with a frame around what is seen.
+const outline = boxes => boxes.map(([x, y, w, h]) => `M${x} ${y}h${w}v${h}h-${w}z`).join('');
+function minimap() {
+	const [x, y, w, h] = homeOf(), k = scaleOf(view), seen = [stage.clientWidth / k, stage.clientHeight / k];
+	const hidden = !shown.svg || seen[0] >= w * .98 && seen[1] >= h * .98;
+	$.mini.toggleAttribute('hidden', hidden);
+	if (hidden) return;
+	const [all, changed, frame] = $.mini.children;
+	if ($.mini.of != shown) {
+		$.mini.of = shown;
+		$.mini.setAttribute('viewBox', homeOf().join(' '));
+		all.setAttribute('d', outline(shown.boxes));
+	}
+	changed.setAttribute('d', outline(marked().filter(i => i < shown.N).map(i => shown.boxes[i])));
+	const places = [view[0] + view[2] / 2 - seen[0] / 2, view[1] + view[3] / 2 - seen[1] / 2, ...seen];
+	['x', 'y', 'width', 'height'].forEach((name, i) => frame.setAttribute(name, places[i]));
+}
+onSeek.push(() => $.mini.hasAttribute('hidden') || minimap());
+function lookFromMini(e) {
+	const { left, top, width, height } = $.mini.getBoundingClientRect(), [x, y, w, h] = homeOf(), k = Math.min(width / w, height / h);
+	const cx = x + w / 2 + (e.clientX - left - width / 2) / k, cy = y + h / 2 + (e.clientY - top - height / 2) / k;
+	fit([cx - view[2] / 2, cy - view[3] / 2, view[2], view[3]]);
+}
+$.mini.onpointerdown = e => { e.stopPropagation(); if (e.isTrusted) $.mini.setPointerCapture(e.pointerId); lookFromMini(e); };
+$.mini.onpointermove = e => { if (e.buttons) { e.stopPropagation(); lookFromMini(e); } };
+$.mini.onclick = e => e.stopPropagation();
+
+// Wheel, drag and pinch. A gesture that went somewhere is no click.
+let far = 0;
+const inStage = e => { const { left, top } = stage.getBoundingClientRect(); return [e.clientX - left, e.clientY - top]; };
+const isGraph = e => !e.target.closest?.('#sheet');
+stage.addEventListener('wheel', e => {
+	if (!isGraph(e)) return;
+	e.preventDefault();
+	zoom(Math.exp(Math.max(-240, Math.min(240, e.deltaY)) * -.002), 0, 0, ...inStage(e));
+}, { passive: false });
+stage.addEventListener('pointerdown', e => {
+	if (!isGraph(e)) return;
+	if (!pointers.size) far = 0;
+	pointers.set(e.pointerId, e);
+});
+stage.addEventListener('pointermove', e => {
+	const old = pointers.get(e.pointerId);
+	if (!old || !e.buttons) return pointers.delete(e.pointerId);
+	far += Math.hypot(e.clientX - old.clientX, e.clientY - old.clientY);
+	const other = [...pointers.values()].find(p => p.pointerId != e.pointerId);
+	pointers.set(e.pointerId, e);
+	if (!other) return zoom(1, e.clientX - old.clientX, e.clientY - old.clientY);
+	const apart = p => Math.hypot(p.clientX - other.clientX, p.clientY - other.clientY);
+	const [x, y] = inStage(e), [u, v] = inStage(other);
+	zoom(apart(e) / Math.max(1, apart(old)), (e.clientX - old.clientX) / 2, (e.clientY - old.clientY) / 2, (x + u) / 2, (y + v) / 2);
+});
+for (const end of ['pointerup', 'pointercancel', 'pointerleave']) stage.addEventListener(end, e => pointers.delete(e.pointerId));

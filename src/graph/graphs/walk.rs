@@ -1,0 +1,48 @@
+//! Goes through all elements at once, window by window, and stops only where one of them differs from the window before.
+
+use super::{Column, ColumnCursor, Row};
+use crate::graph::Element;
+
+/// Where the way through all columns is.
+#[derive(Debug)]
+pub(crate) struct ColumnWalk<'a> {
+    /// The next window.
+    window: u64,
+    /// Nodes, topics, publications, subscriptions: of each the window in which it may be another.
+    due: [Vec<u64>; 4],
+    cursors: [Vec<ColumnCursor<'a>>; 4],
+}
+
+/// How an element of each list is called.
+const KINDS: [fn(u32) -> Element; 4] = [
+    Element::Node,
+    Element::Topic,
+    Element::Publish,
+    Element::Subscribe,
+];
+
+impl<'a> ColumnWalk<'a> {
+    pub(super) fn new(columns: [&'a [Column]; 4]) -> Self {
+        Self {
+            window: 0,
+            due: columns.map(|list| vec![0; list.len()]),
+            cursors: columns.map(|list| list.iter().map(Column::cursor).collect()),
+        }
+    }
+
+    /// Tells of every element that may differ in the next window what it says there, if it is there.
+    pub(crate) fn next(&mut self, mut tell: impl FnMut(Element, Option<Row>)) {
+        let lists = self.due.iter_mut().zip(&mut self.cursors);
+        for ((due, cursors), kind) in lists.zip(KINDS) {
+            for (at, due) in due.iter_mut().enumerate() {
+                if *due > self.window {
+                    continue;
+                }
+                let (row, stays) = cursors[at].next_run();
+                *due = self.window.saturating_add(stays);
+                tell(kind(u32::try_from(at).unwrap_or(u32::MAX)), row);
+            }
+        }
+        self.window += 1;
+    }
+}

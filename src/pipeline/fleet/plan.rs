@@ -1,0 +1,332 @@
+//! What is fixed before anything is counted: which bags, whose mission each is part of, and where windows begin.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use regex::Regex;
+
+use crate::bag::{self, Input, OpenOptions};
+use crate::base::error::{Error, Result};
+use crate::base::time::{Period, Stamp};
+use crate::graph::window::Align;
+use crate::pipeline::extract::Bounds;
+use crate::pipeline::survey::recordings;
+
+/// How to make a plan.
+#[derive(Clone, Debug)]
+pub struct Planning {
+    /// The length of a window.
+    pub period: Period,
+    /// Windows on whole periods of UTC, or from the first message of each mission.
+    pub align: Align,
+    /// A regular expression whose first group, or whole match, in a bag's path is its mission.
+    pub mission: Option<String>,
+}
+
+impl Default for Planning {
+    /// Windows of ten seconds by the clock: those of different missions are comparable, and no bag is read to make the
+    /// plan.
+    fn default() -> Self {
+        Self {
+            period: TEN_SECONDS,
+            align: Align::Clock,
+            mission: None,
+        }
+    }
+}
+
+const TEN_SECONDS: Period = match Period::from_nanos(10_000_000_000) {
+    Some(period) => period,
+    None => unreachable!(),
+};
+
+/// How much to know of messages: their times, or only how many there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CountDetail {
+    /// Every message's time, from the index.
+    #[default]
+    Index,
+    /// By chunks: one that lies in one window is counted as a whole, without times. What has no chunks is read by its
+    /// index.
+    Chunks,
+}
+
+impl CountDetail {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Index, Self::Chunks];
+
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Index => "index",
+            Self::Chunks => "chunks",
+        }
+    }
+}
+
+/// One bag of a plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlannedBag {
+    /// Its path, as it was given or found.
+    pub uri: String,
+    /// The mission that it belongs to.
+    pub mission: String,
+    /// A moment at which a window begins: the same for all bags of a mission.
+    pub origin: Stamp,
+}
+
+/// The bags to count, sorted by mission and name, none twice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FleetPlan {
+    /// The length of a window.
+    pub period: Period,
+    /// The bags.
+    pub bags: Vec<PlannedBag>,
+}
+
+impl FleetPlan {
+    /// The missions that are number `index` of `count`, 1.., dealt one by one: equal plans are dealt equally everywhere.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] unless `index` is 1 to `count`.
+    pub fn shard(mut self, index: usize, count: usize) -> Result<Self> {
+        if index == 0 || index > count {
+            return Err(Error::usage(
+                format!("there is no shard {index} of {count}"),
+                "shards are counted from 1: `--shard 1/8` to `--shard 8/8`",
+            ));
+        }
+        let mut place = 0;
+        let mut before: Option<String> = None;
+        self.bags.retain(|bag| {
+            if before
+                .as_ref()
+                .is_some_and(|mission| *mission != bag.mission)
+            {
+                place += 1;
+            }
+            before = Some(bag.mission.clone());
+            place % count == index - 1
+        });
+        Ok(self)
+    }
+}
+
+/// Makes a plan of bags, and of folders with bags below them.
+///
+/// A folder that is one recording of ROS 2 is one bag. Parts of a split recording (`x_0.bag`, `x_1.bag`, …, from 0 on
+/// without a hole) are one mission, `x`; so are the files `x/x_0.mcap`, … of a recording of ROS 2 that are given one by one; every other bag is a
+/// mission of its own, called as its path without the format's ending.
+///
+/// # Errors
+/// Where a folder cannot be listed, or the pattern is none. A bag that cannot be read is found out later.
+pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
+    let mut uris = Vec::new();
+    for source in sources {
+        uris.extend(listed(source)?);
+    }
+    uris.sort();
+    uris.dedup();
+    let missions = missions(&uris, planning.mission.as_deref())?;
+    let mut bags: Vec<PlannedBag> = uris
+        .into_iter()
+        .zip(missions)
+        .map(|(uri, mission)| PlannedBag {
+            uri,
+            mission,
+            origin: Stamp(0),
+        })
+        .collect();
+    bags.sort_by(|a, b| (&a.mission, &a.uri).cmp(&(&b.mission, &b.uri)));
+    if planning.align == Align::Bag {
+        begin_with_missions(&mut bags);
+    }
+    Ok(FleetPlan {
+        period: planning.period,
+        bags,
+    })
+}
+
+/// The bags that a path stands for.
+fn listed(source: &str) -> Result<Vec<String>> {
+    match Input::parse(source) {
+        Input::Path(path) if path.is_dir() => {
+            let text = |path: PathBuf| path.to_string_lossy().into_owned();
+            Ok(recordings(&path)?.into_iter().map(text).collect())
+        }
+        _ => Ok(vec![source.to_owned()]),
+    }
+}
+
+/// What bags are called at the end, the longest first.
+fn endings() -> Vec<String> {
+    let all = bag::FORMATS.iter().flat_map(|format| format.extensions);
+    let mut all: Vec<String> = all.map(|ending| format!(".{ending}")).collect();
+    all.sort_by_key(|ending| std::cmp::Reverse(ending.len()));
+    all
+}
+
+/// The mission of each bag.
+fn missions(uris: &[String], pattern: Option<&str>) -> Result<Vec<String>> {
+    let endings = endings();
+    let stem = |uri: &String| {
+        let stem = endings
+            .iter()
+            .find_map(|ending| uri.strip_suffix(&**ending));
+        stem.unwrap_or(uri).to_owned()
+    };
+    let stems: Vec<String> = uris.iter().map(stem).collect();
+    let Some(pattern) = pattern else {
+        return Ok(split_groups(&stems));
+    };
+    let pattern = Regex::new(pattern).map_err(|error| {
+        Error::usage(
+            format!("`{pattern}` is no regular expression: {error}"),
+            "its first group, or all that it matches, names the mission",
+        )
+    })?;
+    let own = |(uri, stem): (&String, String)| match pattern.captures(uri) {
+        Some(found) => {
+            let part = found.get(1).or_else(|| found.get(0));
+            part.map_or(stem, |part| part.as_str().to_owned())
+        }
+        None => stem,
+    };
+    Ok(uris.iter().zip(stems).map(own).collect())
+}
+
+/// The stems, with those of split recordings cut before the number.
+fn split_groups(stems: &[String]) -> Vec<String> {
+    let mut numbers: BTreeMap<&str, Vec<u32>> = BTreeMap::new();
+    for (name, number) in stems.iter().filter_map(|stem| numbered(stem)) {
+        numbers.entry(name).or_default().push(number);
+    }
+    for numbers in numbers.values_mut() {
+        numbers.sort_unstable();
+    }
+    let is_split = |name: &str| {
+        let parts = numbers.get(name).map_or(&[][..], |parts| parts);
+        parts.len() > 1
+            && parts
+                .iter()
+                .zip(0..)
+                .all(|(number, place)| *number == place)
+    };
+    let mission = |stem: &String| match numbered(stem) {
+        // `run/run_0.mcap` is how ROS 2 names the files of the recording `run`.
+        Some((name, _)) if in_own_folder(name) => {
+            let folder = Path::new(name).parent();
+            folder.map_or(name.into(), |f| f.to_string_lossy().into_owned())
+        }
+        Some((name, _)) if is_split(name) => name.to_owned(),
+        _ => stem.clone(),
+    };
+    stems.iter().map(mission).collect()
+}
+
+/// A name and the number behind it: `run` and 12 of `run_12`.
+fn numbered(stem: &str) -> Option<(&str, u32)> {
+    let (name, number) = stem.rsplit_once('_')?;
+    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then_some(())?;
+    Some((name, number.parse().ok()?))
+}
+
+fn in_own_folder(name: &str) -> bool {
+    let path = Path::new(name);
+    let folder = path.parent().and_then(Path::file_name);
+    folder.is_some() && folder == path.file_name()
+}
+
+/// Lets the windows of each mission begin with its first message. A bag that cannot be read has no say.
+fn begin_with_missions(bags: &mut [PlannedBag]) {
+    for mission in bags.chunk_by_mut(|a, b| a.mission == b.mission) {
+        let mut first: Option<Stamp> = None;
+        for bag in mission.iter() {
+            let own = begins(&Input::parse(&bag.uri)).ok().flatten();
+            first = first.into_iter().chain(own).min();
+        }
+        for bag in mission {
+            bag.origin = first.unwrap_or_default();
+        }
+    }
+}
+
+/// When a bag begins, by its tail if that tells it.
+fn begins(input: &Input) -> Result<Option<Stamp>> {
+    if input.is_pipe() {
+        return Err(Error::usage(
+            "a bag that flows by tells only at its end when it began",
+            "save it to a file first, or take windows by the clock: `--align clock`",
+        ));
+    }
+    let mut reader = bag::open(input, &OpenOptions::default())?;
+    if let Some(span) = reader.span()? {
+        return Ok(Some(span.start));
+    }
+    let mut bounds = Bounds(None);
+    reader.read(None, &mut bounds)?;
+    Ok(bounds.0.map(|span| span.start))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn missions_of(uris: &[&str], pattern: Option<&str>) -> Vec<String> {
+        let uris: Vec<String> = uris.iter().map(|uri| (*uri).to_owned()).collect();
+        missions(&uris, pattern).unwrap()
+    }
+
+    #[test]
+    fn parts_from_zero_on_are_one_mission() {
+        let split = [
+            "d/a_0.bag",
+            "d/a_1.bag",
+            "d/b_1.bag",
+            "d/b_2.bag",
+            "c_0.db3",
+        ];
+        let expected = ["d/a", "d/a", "d/b_1", "d/b_2", "c_0"];
+        assert_eq!(missions_of(&split, None), expected);
+        assert_eq!(
+            missions_of(&["s3://x/run/run_0.mcap"], None),
+            ["s3://x/run"]
+        );
+        assert_eq!(
+            missions_of(&["a.bag.active", "b.db3.zstd", "c"], None),
+            ["a", "b", "c"]
+        );
+    }
+
+    #[test]
+    fn a_pattern_names_missions() {
+        let uris = ["day1/r1/a.bag", "day1/r2/b.bag", "other.bag"];
+        let expected = ["day1", "day1", "other"];
+        assert_eq!(missions_of(&uris, Some("^(day[0-9]+)/")), expected);
+        assert!(missions(&[], Some("(")).is_err());
+    }
+
+    #[test]
+    fn shards_share_the_missions_and_part_none() {
+        let bag = |mission: usize, part: usize| PlannedBag {
+            uri: format!("{mission}_{part}.bag"),
+            mission: mission.to_string(),
+            origin: Stamp(0),
+        };
+        let bags: Vec<PlannedBag> = (0..7).flat_map(|m| [bag(m, 0), bag(m, 1)]).collect();
+        let all = FleetPlan {
+            period: TEN_SECONDS,
+            bags: bags.clone(),
+        };
+        let mut seen: Vec<PlannedBag> = Vec::new();
+        for index in 1..=3 {
+            let shard = all.clone().shard(index, 3).unwrap();
+            assert!(matches!(shard.bags.len(), 4 | 6), "{}", shard.bags.len());
+            seen.extend(shard.bags);
+        }
+        seen.sort_by(|a, b| a.uri.cmp(&b.uri));
+        assert_eq!(seen, bags);
+        assert!(all.clone().shard(0, 3).is_err() && all.shard(4, 3).is_err());
+    }
+}

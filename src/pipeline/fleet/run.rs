@@ -1,0 +1,321 @@
+//! The job of `bagreel tables`: a file per bag and table, each whole or not there, so that engines read a folder and a
+//! killed run is finished by the next one.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::thread;
+use std::time::UNIX_EPOCH;
+
+use super::count::{CountedBag, Tally, count, count_or};
+use super::counts::{SCHEMA_VERSION, bags_table, counts_table};
+use super::plan::{CountDetail, FleetPlan, PlannedBag, Planning, plan};
+use crate::bag::{Input, size_on_disk};
+use crate::base::digest::hex;
+use crate::base::error::{Error, Result};
+use crate::base::table::Batch;
+use crate::export::sink::OutputSink;
+use crate::export::tables::{TableFormat, writer::Writer};
+use crate::export::target::Target;
+use crate::pipeline::{Stage, Watch};
+
+/// What to do about a bag that cannot be read at all.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnError {
+    /// Give it a row in `bags` that says why.
+    #[default]
+    Row,
+    /// Stop.
+    Fail,
+}
+
+/// The whole job of `bagreel tables`.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct FleetJob {
+    /// Bags, and folders with bags below them.
+    pub sources: Vec<String>,
+    /// How to plan.
+    pub planning: Planning,
+    /// How much to know of messages.
+    pub detail: CountDetail,
+    /// Which missions to count: number so of so many, 1...
+    pub shard: Option<(usize, usize)>,
+    /// Whether to leave out bags whose tables are there already, made of the same version of them in the same way.
+    pub skip_existing: bool,
+    /// What to do about a bag that cannot be read.
+    pub on_error: OnError,
+    /// How many bags to count at a time; by default one per processor.
+    pub jobs: Option<NonZeroUsize>,
+    /// Where the folders `counts` and `bags` are made.
+    pub folder: PathBuf,
+}
+
+impl FleetJob {
+    /// These bags into that folder, with every option as the command line has it.
+    pub fn new(sources: Vec<String>, folder: PathBuf) -> Self {
+        Self {
+            sources,
+            planning: Planning::default(),
+            detail: CountDetail::default(),
+            shard: None,
+            skip_existing: false,
+            on_error: OnError::default(),
+            jobs: None,
+            folder,
+        }
+    }
+}
+
+/// What came of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Tabled {
+    /// Bags whose tables were written.
+    pub bags: usize,
+    /// Bags whose tables were there already.
+    pub kept: usize,
+    /// Bags written that could not be read.
+    pub unreadable: usize,
+    /// Bags written of which something was lost.
+    pub incomplete: usize,
+    /// Messages counted.
+    pub messages: u64,
+    /// Rows of `counts`.
+    pub rows: usize,
+}
+
+/// Counts every bag of the job and writes its rows.
+///
+/// # Errors
+/// Where nothing can be listed or written, and for the first bag that cannot be read with [`OnError::Fail`].
+pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
+    watch.stage(Stage::Read);
+    let mut plan = plan(&job.sources, &job.planning)?;
+    if let Some((index, count)) = job.shard {
+        plan = plan.shard(index, count)?;
+    }
+    let work = FleetWork {
+        job,
+        files: FleetFiles::open(&job.folder)?,
+        plan: &plan,
+        next: AtomicUsize::new(0),
+        is_stopped: AtomicBool::new(false),
+    };
+    let (to, from) = channel();
+    thread::scope(|scope| {
+        for _ in 0..jobs(job, &plan) {
+            let (work, to) = (&work, to.clone());
+            scope.spawn(move || work.run(&to));
+        }
+        drop(to);
+        let mut done = Tabled::default();
+        let mut outcome = Ok(());
+        for (at, one) in from.into_iter().enumerate() {
+            watch.progress(at as u64 + 1, plan.bags.len() as u64);
+            outcome = outcome.and(one.map(|one| done.take(one)));
+            if watch.stopped() {
+                outcome = Err(Error::Interrupted);
+            }
+            if outcome.is_err() {
+                work.is_stopped.store(true, Ordering::Relaxed);
+            }
+        }
+        outcome.map(|()| done)
+    })
+}
+
+fn jobs(job: &FleetJob, plan: &FleetPlan) -> usize {
+    let cores = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let jobs = job.jobs.map_or(cores, NonZeroUsize::get);
+    jobs.min(plan.bags.len())
+}
+
+/// What became of one bag.
+enum BagOutcome {
+    Kept,
+    Written { counted: Box<CountedBag> },
+}
+
+impl Tabled {
+    fn take(&mut self, one: BagOutcome) {
+        match one {
+            BagOutcome::Kept => self.kept += 1,
+            BagOutcome::Written { counted } => {
+                self.bags += 1;
+                self.unreadable += usize::from(counted.bag.error.is_some());
+                let is_damaged = counted.bag.error.is_none() && !counted.bag.is_complete;
+                self.incomplete += usize::from(is_damaged);
+                self.messages += counted.bag.messages;
+                self.rows += counted.counts.len();
+            }
+        }
+    }
+}
+
+/// The job, shared by those who work on it.
+struct FleetWork<'a> {
+    job: &'a FleetJob,
+    plan: &'a FleetPlan,
+    files: FleetFiles,
+    next: AtomicUsize,
+    is_stopped: AtomicBool,
+}
+
+impl FleetWork<'_> {
+    /// Takes one bag after the other until none is left.
+    fn run(&self, to: &Sender<Result<BagOutcome>>) {
+        while !self.is_stopped.load(Ordering::Relaxed) {
+            let at = self.next.fetch_add(1, Ordering::Relaxed);
+            let Some(bag) = self.plan.bags.get(at) else {
+                return;
+            };
+            // Nobody listens any more once something has failed.
+            if to.send(self.one(bag)).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn one(&self, bag: &PlannedBag) -> Result<BagOutcome> {
+        let name = self.name(bag);
+        if self.job.skip_existing && self.files.hold(&name) {
+            return Ok(BagOutcome::Kept);
+        }
+        let tally = Tally {
+            period: self.plan.period,
+            detail: self.job.detail,
+            part: None,
+        };
+        let counted = match self.job.on_error {
+            OnError::Row => count(bag, &tally)?,
+            OnError::Fail => count_or(bag, &tally, Err)?,
+        };
+        self.files.write(&name, &counted)?;
+        Ok(BagOutcome::Written {
+            counted: Box::new(counted),
+        })
+    }
+
+    /// What the files of a bag are called: after where it is, then after all that its rows follow from.
+    fn name(&self, bag: &PlannedBag) -> FileName {
+        let path = Path::new(&bag.uri);
+        let bytes = size_on_disk(&Input::parse(&bag.uri));
+        let made_of = format!(
+            "{bytes:?} {:?} {} {} {} {} {SCHEMA_VERSION}",
+            changed(path),
+            bag.mission,
+            bag.origin.0,
+            self.plan.period.nanos(),
+            self.job.detail.word(),
+        );
+        FileName {
+            bag: hex(&bag.uri, DIGITS),
+            made_of: hex(&made_of, DIGITS),
+        }
+    }
+}
+
+/// When a file, or the newest in a folder, was written last, in nanoseconds since 1970.
+fn changed(path: &Path) -> Option<u128> {
+    let of = |path: &Path| {
+        let at = fs::metadata(path).ok()?.modified().ok()?;
+        Some(at.duration_since(UNIX_EPOCH).ok()?.as_nanos())
+    };
+    let inside = fs::read_dir(path).into_iter().flatten().flatten();
+    let newest = inside.filter_map(|file| of(&file.path())).max();
+    of(path).max(newest)
+}
+
+/// 64 bits: among a million bags the chance that two share a name is one in 30 million.
+const DIGITS: usize = 16;
+
+/// What the files of one bag are called.
+struct FileName {
+    bag: String,
+    made_of: String,
+}
+
+impl FileName {
+    fn file(&self) -> String {
+        format!("{}-{}.parquet", self.bag, self.made_of)
+    }
+}
+
+/// The two folders, and what was in them before.
+struct FleetFiles {
+    counts: PathBuf,
+    bags: PathBuf,
+    /// The files in either folder, by the part of their names that stands for the bag.
+    earlier: [BTreeMap<String, Vec<String>>; 2],
+}
+
+impl FleetFiles {
+    fn open(folder: &Path) -> Result<Self> {
+        let (counts, bags) = (folder.join("counts"), folder.join("bags"));
+        for folder in [&counts, &bags] {
+            fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))?;
+        }
+        let earlier = [earlier(&counts)?, earlier(&bags)?];
+        Ok(Self {
+            counts,
+            bags,
+            earlier,
+        })
+    }
+
+    /// Whether both files of this name are there.
+    fn hold(&self, name: &FileName) -> bool {
+        let file = name.file();
+        let holds = |all: &BTreeMap<String, Vec<String>>| {
+            all.get(&name.bag)
+                .is_some_and(|files| files.contains(&file))
+        };
+        self.earlier.iter().all(holds)
+    }
+
+    /// Writes both files, the one with the bag's own row last, and removes those of earlier versions.
+    fn write(&self, name: &FileName, counted: &CountedBag) -> Result<()> {
+        let file = name.file();
+        write(&self.counts.join(&file), &counts_table(&counted.counts))?;
+        let bag = std::slice::from_ref(&counted.bag);
+        write(&self.bags.join(&file), &bags_table(bag))?;
+        for (folder, earlier) in [&self.counts, &self.bags].into_iter().zip(&self.earlier) {
+            let old = earlier.get(&name.bag).into_iter().flatten();
+            for old in old.filter(|old| **old != file) {
+                let path = folder.join(old);
+                match fs::remove_file(&path) {
+                    Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                        return Err(Error::io("replace", &path)(e));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn earlier(folder: &Path) -> Result<BTreeMap<String, Vec<String>>> {
+    let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let files = fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    for file in files.flatten() {
+        let name = file.file_name().to_string_lossy().into_owned();
+        if let Some((bag, _)) = name.split_once('-').filter(|(bag, _)| bag.len() == DIGITS) {
+            all.entry(bag.to_owned()).or_default().push(name);
+        }
+    }
+    Ok(all)
+}
+
+fn write(path: &Path, table: &Batch) -> Result<()> {
+    let sink = OutputSink::create(&Target::Path(path.to_owned()), None)?;
+    let failed = || Error::io("write", path);
+    let mut writer = Writer::new(TableFormat::Parquet, sink, table, &[]).map_err(failed())?;
+    writer.write(table).map_err(failed())?;
+    writer.finish().map_err(failed())?.commit()?;
+    Ok(())
+}

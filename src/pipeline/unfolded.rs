@@ -1,0 +1,46 @@
+//! Everything one by one on a page of a screen's shape: what pages and reports show, whatever the picture folds.
+
+use super::Drawing;
+use crate::base::geometry::Size;
+use crate::draw::figure::course::LifeLines;
+use crate::draw::figure::source::FigureSource;
+use crate::draw::picture::{Measured, PageOptions, Picture};
+use crate::export::Output;
+use crate::mission::Mission;
+use crate::view::{View, view};
+
+/// The part of a screen that the graph of a page has: 3 : 2.
+const SCREEN: Size = Size::new(1200.0, 800.0);
+
+/// The view with everything opened; `None` where no output holds it.
+pub(super) fn opened(mission: &Mission, drawing: &Drawing, outputs: &[Output]) -> Option<View> {
+    let is_asked = outputs.iter().any(|o| o.format.is_unfolded);
+    is_asked.then(|| view(mission, &drawing.view.opened(&mission.elements)).0)
+}
+
+/// What draws it; `None` where no output is a page.
+pub(super) fn drawn<'a>(
+    view: &'a View,
+    drawing: &'a Drawing,
+    outputs: &[Output],
+) -> Option<Picture<'a>> {
+    let is_page = |o: &Output| o.format.word == "html";
+    if !outputs.iter().any(is_page) {
+        return None;
+    }
+    let page = PageOptions {
+        size: SCREEN,
+        bare: true,
+        width_mm: None,
+        course: None,
+        ..drawing.page.clone()
+    };
+    let measured = Measured::new(view, &drawing.style, &drawing.fonts, page);
+    Some(measured.laid_out(drawing.engine))
+}
+
+/// Who lived when.
+pub(super) fn lives(mission: &Mission, drawing: &Drawing) -> LifeLines {
+    let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
+    LifeLines::new(&FigureSource::new(mission, nodes, topics, false))
+}

@@ -1,0 +1,188 @@
+//! All that is shown of one item or arrow: every look once, and from which window on it has which. Memory grows with what
+//! changes, not with how often one looks.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::Shown;
+use crate::evidence::Degree;
+use crate::graph::State;
+
+/// The looks of one item or arrow, window by window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Showing {
+    /// What it looks like, each only once unless it is marked.
+    looks: Vec<Shown>,
+    /// From this window on this look, or [`AWAY`]; sorted.
+    runs: Vec<(u32, u32)>,
+}
+
+/// It is not there.
+const AWAY: u32 = u32::MAX;
+
+impl Showing {
+    /// What is shown in the window at a place; `None` where it is not there.
+    pub fn at(&self, window: usize) -> Option<&Shown> {
+        let after = self.runs.partition_point(|run| run.0 as usize <= window);
+        let (_, look) = self.runs.get(after.checked_sub(1)?)?;
+        self.looks.get(*look as usize)
+    }
+
+    /// Every look that it ever has, in no order.
+    pub fn looks(&self) -> &[Shown] {
+        &self.looks
+    }
+
+    /// From which window on it looks how, in order; before the first of these it is not there.
+    pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {
+        let look = |place: u32| self.looks.get(place as usize);
+        self.runs.iter().map(move |run| (run.0, look(run.1)))
+    }
+
+    /// The places of its looks beside their windows.
+    pub(super) fn places(&self) -> &[(u32, u32)] {
+        &self.runs
+    }
+
+    /// What is shown in each window of a sequence.
+    pub fn of<'a>(windows: impl IntoIterator<Item = Option<&'a Shown>>) -> Self {
+        let mut writer = ShowingWriter::default();
+        for (window, shown) in (0..).zip(windows) {
+            writer.show(window, shown.cloned());
+        }
+        writer.finish()
+    }
+}
+
+/// Takes in what is shown, in order of the windows.
+#[derive(Debug, Default)]
+pub(super) struct ShowingWriter {
+    showing: Showing,
+    places: BTreeMap<LookKey, u32>,
+}
+
+/// What tells one look without a mark from another.
+type LookKey = (
+    (State, Degree, bool),
+    [Option<u64>; 3],
+    (usize, usize),
+    Option<Arc<str>>,
+);
+
+impl ShowingWriter {
+    /// From this window on it looks so, or is not there.
+    pub(super) fn show(&mut self, window: u32, shown: Option<Shown>) {
+        let place = shown.map_or(AWAY, |shown| self.look(shown));
+        self.turn(window, place);
+    }
+
+    /// The place of a look. What is marked has a place of its own each time.
+    pub(super) fn look(&mut self, shown: Shown) -> u32 {
+        let all = &mut self.showing.looks;
+        let next = u32::try_from(all.len()).unwrap_or(AWAY - 1);
+        if shown.mark.is_some() {
+            all.push(shown);
+            return next;
+        }
+        *self.places.entry(key(&shown)).or_insert_with(|| {
+            all.push(shown);
+            next
+        })
+    }
+
+    /// From this window on it has the look at this place.
+    pub(super) fn turn(&mut self, window: u32, place: u32) {
+        let runs = &mut self.showing.runs;
+        if runs.last().map_or(AWAY, |last| last.1) != place {
+            runs.push((window, place));
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Showing {
+        self.showing.runs.shrink_to_fit();
+        self.showing.looks.shrink_to_fit();
+        self.showing
+    }
+}
+
+fn key(shown: &Shown) -> LookKey {
+    let bits = |hz: Option<f64>| hz.map(f64::to_bits);
+    (
+        (shown.state, shown.degree, shown.is_paused),
+        [bits(shown.hz), bits(shown.steady_hz), shown.count],
+        (shown.topics, shown.each),
+        shown.lifecycle.clone(),
+    )
+}
+
+/// The windows in which one of two looks differs from the window before, with both looks.
+pub(crate) fn both<'a>(
+    a: &'a Showing,
+    b: &'a Showing,
+) -> impl Iterator<Item = (Option<&'a Shown>, Option<&'a Shown>)> {
+    let (mut next_a, mut next_b) = (a.runs().peekable(), b.runs().peekable());
+    let (mut now_a, mut now_b) = (None, None);
+    std::iter::from_fn(move || {
+        let starts = [next_a.peek().map(|r| r.0), next_b.peek().map(|r| r.0)];
+        let window = starts.into_iter().flatten().min()?;
+        if let Some((_, shown)) = next_a.next_if(|run| run.0 == window) {
+            now_a = shown;
+        }
+        if let Some((_, shown)) = next_b.next_if(|run| run.0 == window) {
+            now_b = shown;
+        }
+        Some((now_a, now_b))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::Mark;
+
+    #[expect(clippy::unnecessary_wraps, reason = "lists of what is there or not")]
+    fn shown(hz: f64, mark: Option<Mark>) -> Option<Shown> {
+        Some(Shown {
+            hz: Some(hz),
+            mark,
+            ..Shown::plain(7, State::Active, Degree::Measured)
+        })
+    }
+
+    #[test]
+    fn what_is_shown_is_found_again() {
+        let all = [
+            None,
+            shown(1.0, Some(Mark::Added)),
+            shown(1.0, None),
+            shown(2.0, None),
+            shown(1.0, None),
+            None,
+        ];
+        let showing = Showing::of(all.iter().map(Option::as_ref));
+        for (window, want) in all.iter().enumerate() {
+            assert_eq!(showing.at(window), want.as_ref(), "{window}");
+        }
+        assert_eq!(showing.at(99), None);
+        assert_eq!(showing.looks().len(), 3);
+    }
+
+    #[test]
+    fn what_stays_takes_no_room() {
+        let (slow, fast) = (shown(1.0, None), shown(2.0, None));
+        let all = (0..10_000).map(|n| if n < 5000 { &slow } else { &fast });
+        let showing = Showing::of(all.map(Option::as_ref));
+        assert_eq!((showing.looks().len(), showing.places().len()), (2, 2));
+    }
+
+    #[test]
+    fn two_are_told_together() {
+        let (one, two) = (shown(1.0, None), shown(2.0, None));
+        let a = Showing::of([one.as_ref(), one.as_ref(), two.as_ref()]);
+        let b = Showing::of([None, one.as_ref(), one.as_ref()]);
+        let hz = |shown: Option<&Shown>| shown.and_then(|s| s.hz);
+        let told: Vec<_> = both(&a, &b).map(|(a, b)| (hz(a), hz(b))).collect();
+        let want = [(1.0, None), (1.0, Some(1.0)), (2.0, Some(1.0))];
+        assert_eq!(told, want.map(|(a, b)| (Some(a), b)));
+    }
+}

@@ -1,0 +1,517 @@
+//! The tables of many bags: a row for every bag, shards and interrupted runs that make the same whole, parts of a bag
+//! that merge to it, and counts that are those of a mission read on one machine.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+use arrow_array::RecordBatch;
+use arrow_array::cast::AsArray as _;
+use arrow_array::types::Int64Type;
+use bagreel::bag::Tier;
+use bagreel::fleet::{
+    Count, CountDetail, CountedBag, PlannedBag, Planning, Tally, count, finish, merge, plan,
+};
+use bagreel::internals::graph::window::Align;
+use bagreel::internals::mission::write_json;
+use bagreel::values::{Length, Period, Span, Stamp};
+use bagreel::{Mission, Reading, read};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+use proptest::prelude::*;
+
+use crate::support::{self, rosbag1};
+
+const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier");
+/// Of ours in the project: several chunks or one, every storage, damaged ones, empty ones.
+const OURS: &[&str] = &[
+    WAREHOUSE,
+    COURIER,
+    FOLDER,
+    concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/data/hostile/01_escapes.bag"
+    ),
+    concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/data/hostile/08_jump1970.bag"
+    ),
+];
+
+fn bagreel(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command.current_dir(folder).args(args).output().unwrap()
+}
+
+#[track_caller]
+fn ends(folder: &Path, args: &[&str], code: i32) -> String {
+    let output = bagreel(folder, args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
+fn batches(path: &Path) -> Vec<RecordBatch> {
+    let reader = ParquetRecordBatchReader::try_new(File::open(path).unwrap(), 1 << 20).unwrap();
+    reader.map(|batch| batch.unwrap()).collect()
+}
+
+/// Every file of a table, in order of names.
+fn files(folder: &Path, table: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder.join(table)).unwrap();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+/// The rows of a table as text, sorted: whatever the files, the same rows are the same.
+fn rows(folder: &Path, table: &str) -> Vec<String> {
+    let mut all = Vec::new();
+    for batch in files(folder, table).iter().flat_map(|file| batches(file)) {
+        for row in 0..batch.num_rows() {
+            let cell = |column: &arrow_array::ArrayRef| format!("{:?}", column.slice(row, 1));
+            all.push(
+                batch
+                    .columns()
+                    .iter()
+                    .map(cell)
+                    .collect::<Vec<_>>()
+                    .join("|"),
+            );
+        }
+    }
+    all.sort();
+    all
+}
+
+fn texts(folder: &Path, table: &str, column: &str) -> Vec<String> {
+    let batches = files(folder, table)
+        .into_iter()
+        .flat_map(|file| batches(&file));
+    let mut all: Vec<String> = Vec::new();
+    for batch in batches {
+        let column = batch.column_by_name(column).unwrap().as_string::<i32>();
+        all.extend(column.iter().map(|text| text.unwrap_or("").to_owned()));
+    }
+    all
+}
+
+fn sum(folder: &Path, table: &str, column: &str) -> i64 {
+    let batches = files(folder, table)
+        .into_iter()
+        .flat_map(|file| batches(&file));
+    let of = |batch: RecordBatch| -> i64 {
+        let column = batch.column_by_name(column).unwrap();
+        column.as_primitive::<Int64Type>().iter().flatten().sum()
+    };
+    batches.map(of).sum()
+}
+
+/// A folder of bags: good ones, an empty one, a cut one, a foreign file that calls itself a bag.
+fn fleet(folder: &Path) {
+    let bag = rosbag1::write(&support::small(), rosbag1::Pack::None, 4000);
+    let put = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    };
+    put("bags/a.bag", &bag);
+    put("bags/b/run_0.bag", &bag);
+    put("bags/b/run_1.bag", &bag);
+    put("bags/c.mcap", &fs::read(COURIER).unwrap());
+    put("bags/cut.bag", &bag[..bag.len() / 2]);
+    put(
+        "bags/empty.bag",
+        &rosbag1::write(&support::Recording::default(), rosbag1::Pack::None, 4000),
+    );
+    put("bags/foreign.bag", b"no bag at all");
+}
+
+#[test]
+fn every_bag_has_exactly_one_row() {
+    let dir = tempfile::tempdir().unwrap();
+    fleet(dir.path());
+    fs::write(
+        dir.path().join("list"),
+        "bags/a.bag\nbags/gone.bag\r\n\nbags/c.mcap",
+    )
+    .unwrap();
+    let said = ends(
+        dir.path(),
+        &["tables", "bags", "--manifest", "list", "-o", "t"],
+        3,
+    );
+    assert!(said.contains("8 bags (2 unreadable, 1 damaged)"), "{said}");
+    let mut uris = texts(&dir.path().join("t"), "bags", "uri");
+    uris.sort();
+    let expected = [
+        "bags/a.bag",
+        "bags/b/run_0.bag",
+        "bags/b/run_1.bag",
+        "bags/c.mcap",
+        "bags/cut.bag",
+        "bags/empty.bag",
+        "bags/foreign.bag",
+        "bags/gone.bag",
+    ];
+    assert_eq!(uris, expected);
+    let table = dir.path().join("t");
+    assert_eq!(sum(&table, "bags", "messages"), sum(&table, "counts", "n"));
+    let missions: BTreeSet<String> = texts(&table, "bags", "mission").into_iter().collect();
+    assert!(
+        missions.contains("bags/b/run") && missions.len() == 7,
+        "{missions:?}"
+    );
+    let errors = texts(&table, "bags", "error");
+    assert_eq!(errors.iter().filter(|error| !error.is_empty()).count(), 2);
+    ends(
+        dir.path(),
+        &["tables", "bags", "-o", "u", "--on-error", "fail"],
+        1,
+    );
+}
+
+#[test]
+fn columns_are_those_that_are_promised() {
+    let dir = tempfile::tempdir().unwrap();
+    ends(dir.path(), &["tables", WAREHOUSE, "-o", "t"], 0);
+    let names = |table: &str| {
+        let batch = batches(&files(&dir.path().join("t"), table)[0]).remove(0);
+        let schema = batch.schema();
+        let names: Vec<&str> = schema.fields().iter().map(|f| f.name().as_str()).collect();
+        names.join(", ")
+    };
+    let help = bagreel(dir.path(), &["tables", "--help"]);
+    let help = String::from_utf8(help.stdout).unwrap();
+    let told = help.split("counts: ").nth(1).unwrap();
+    let plain = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(plain(told).starts_with(&names("counts")), "{told}");
+    assert!(plain(told).contains(&names("bags")), "{told}");
+}
+
+#[test]
+fn shards_make_the_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    fleet(dir.path());
+    bagreel(dir.path(), &["tables", "bags", "-o", "whole"]);
+    for shard in ["1/3", "2/3", "3/3"] {
+        bagreel(
+            dir.path(),
+            &["tables", "bags", "-o", "parts", "--shard", shard],
+        );
+    }
+    let (whole, parts) = (dir.path().join("whole"), dir.path().join("parts"));
+    for table in ["counts", "bags"] {
+        assert_eq!(rows(&whole, table), rows(&parts, table));
+        let bytes = |folder: &Path| -> BTreeMap<_, _> {
+            let files = files(folder, table).into_iter();
+            files
+                .map(|f| (f.file_name().unwrap().to_owned(), fs::read(&f).unwrap()))
+                .collect()
+        };
+        assert!(
+            bytes(&whole) == bytes(&parts),
+            "the same bags, the same bytes"
+        );
+    }
+}
+
+#[test]
+fn what_is_there_is_kept_and_what_has_changed_is_replaced() {
+    let dir = tempfile::tempdir().unwrap();
+    fleet(dir.path());
+    let args = ["tables", "bags", "-o", "t", "--skip-existing"];
+    ends(dir.path(), &args, 3);
+    let table = dir.path().join("t");
+    let before = rows(&table, "counts");
+    let said = ends(dir.path(), &args, 0);
+    assert!(said.contains("0 bags (7 there already)"), "{said}");
+    assert_eq!(rows(&table, "counts"), before);
+    // Another period is another table, and takes the place of the old one.
+    let said = ends(dir.path(), &[&args[..], &["--period", "5s"]].concat(), 3);
+    assert!(
+        said.contains("7 bags (2 unreadable") || said.contains("7 bags (1 unreadable"),
+        "{said}"
+    );
+    fs::write(
+        dir.path().join("bags/foreign.bag"),
+        fs::read(dir.path().join("bags/a.bag")).unwrap(),
+    )
+    .unwrap();
+    let said = ends(dir.path(), &[&args[..], &["--period", "5s"]].concat(), 0);
+    assert!(said.contains("1 bag (6 there already)"), "{said}");
+    let uris = texts(&table, "bags", "uri");
+    assert_eq!(uris.len(), 7);
+    assert_eq!(uris.iter().collect::<BTreeSet<_>>().len(), 7, "a bag twice");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_killed_run_leaves_whole_files_and_the_next_one_finishes_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let bag = rosbag1::write(&support::small(), rosbag1::Pack::None, 4000);
+    fs::create_dir(dir.path().join("bags")).unwrap();
+    for k in 0..300 {
+        fs::write(dir.path().join(format!("bags/{k}.bag")), &bag).unwrap();
+    }
+    let args = [
+        "tables",
+        "bags",
+        "-o",
+        "t",
+        "--skip-existing",
+        "--jobs",
+        "1",
+    ];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .current_dir(dir.path())
+        .args(args)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let bags = dir.path().join("t/bags");
+    while fs::read_dir(&bags).map_or(0, Iterator::count) < 20 && child.try_wait().unwrap().is_none()
+    {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    // A signal that nobody can catch.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let table = dir.path().join("t");
+    let visible = |table_of: &str| {
+        files(&table, table_of)
+            .into_iter()
+            .filter(|f| !f.file_name().unwrap().to_string_lossy().starts_with('.'))
+    };
+    for file in visible("counts").chain(visible("bags")) {
+        assert_eq!(batches(&file).len(), 1, "{file:?}");
+    }
+    ends(dir.path(), &args, 0);
+    assert_eq!(texts(&table, "bags", "uri").len(), 300);
+    bagreel(dir.path(), &["tables", "bags", "-o", "whole"]);
+    assert_eq!(
+        rows(&table, "counts"),
+        rows(&dir.path().join("whole"), "counts")
+    );
+}
+
+#[test]
+fn parts_of_a_split_recording_share_their_windows() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut halves = [support::small(), support::small()];
+    halves[0]
+        .messages
+        .retain(|m| m.1 < support::ORIGIN + 33_300_000_000);
+    halves[1]
+        .messages
+        .retain(|m| m.1 >= support::ORIGIN + 33_300_000_000);
+    for (k, half) in halves.iter().enumerate() {
+        let bytes = rosbag1::write(half, rosbag1::Pack::None, 4000);
+        fs::write(dir.path().join(format!("run_{k}.bag")), bytes).unwrap();
+    }
+    let planning = Planning {
+        align: Align::Bag,
+        ..Planning::default()
+    };
+    let whole = dir.path().to_string_lossy().into_owned();
+    let plan = plan(&[whole], &planning).unwrap();
+    let origins: BTreeSet<Stamp> = plan.bags.iter().map(|bag| bag.origin).collect();
+    assert_eq!(origins, BTreeSet::from([Stamp(support::ORIGIN)]));
+    let tally = Tally::of(plan.period);
+    let counts = plan
+        .bags
+        .iter()
+        .flat_map(|bag| count(bag, &tally).unwrap().counts);
+    let mission = finish(counts).unwrap();
+    assert_eq!(mission.windows.len(), 6);
+    assert_eq!(mission.messages, support::small().messages.len() as u64);
+}
+
+fn planned(path: &str) -> PlannedBag {
+    PlannedBag {
+        uri: path.to_owned(),
+        mission: "m".to_owned(),
+        origin: Stamp(0),
+    }
+}
+
+fn counted(path: &str, part: Option<Span>, detail: CountDetail) -> CountedBag {
+    let period = Period::parse("10").unwrap();
+    let tally = Tally {
+        part,
+        detail,
+        ..Tally::of(period)
+    };
+    count(&planned(path), &tally).unwrap()
+}
+
+/// The whole of each bag of ours, counted once.
+fn wholes() -> &'static Vec<CountedBag> {
+    static ALL: OnceLock<Vec<CountedBag>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        OURS.iter()
+            .map(|path| counted(path, None, CountDetail::Index))
+            .collect()
+    })
+}
+
+fn json(mission: &Mission) -> Vec<u8> {
+    let mut text = Vec::new();
+    write_json(mission, &mut text).unwrap();
+    text
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Whatever the bag and wherever its time is cut, in whatever order the parts come: the whole, and the mission made
+    /// of it, to the last byte.
+    #[test]
+    fn any_split_merges_to_the_whole(
+        bag in 0..OURS.len(),
+        mut cuts in prop::collection::vec(0.0..1.0_f64, 0..7),
+        turn in 0..8_usize,
+    ) {
+        let whole = &wholes()[bag];
+        let span = whole.bag.span.unwrap();
+        cuts.sort_by(f64::total_cmp);
+        #[expect(clippy::cast_possible_truncation, reason = "inside the span")]
+        let cut = |share: &f64| span.start.plus((span.nanos() as f64 * share) as i64);
+        let mut edges: Vec<Stamp> = vec![Stamp::MIN];
+        edges.extend(cuts.iter().map(cut));
+        edges.push(Stamp::MAX);
+        let parts = edges.windows(2).map(|e| Span { start: e[0], end: e[1] });
+        let mut parts: Vec<Vec<Count>> = parts
+            .map(|part| counted(OURS[bag], Some(part), CountDetail::Index).counts)
+            .collect();
+        let many = parts.len();
+        parts.rotate_left(turn % many);
+        parts.reverse();
+        let merged = merge(parts.into_iter().flatten());
+        prop_assert_eq!(&merged, &merge(whole.counts.clone()));
+        if whole.bag.span.unwrap().nanos() < 3_600_000_000_000 {
+            let (a, b) = (finish(merged).unwrap(), finish(whole.counts.clone()).unwrap());
+            prop_assert!(json(&a) == json(&b));
+        }
+    }
+}
+
+#[test]
+fn merging_a_whole_changes_nothing() {
+    for whole in wholes() {
+        assert_eq!(merge(whole.counts.clone()), whole.counts);
+        let n: u64 = whole.counts.iter().map(|count| count.n).sum();
+        assert_eq!(n, whole.bag.messages);
+    }
+}
+
+/// Counts, rates, bytes and gaps of each topic and publication per window: those of the mission that `render` reads.
+#[test]
+fn the_end_is_the_mission_that_one_machine_reads() {
+    for path in [WAREHOUSE, COURIER, FOLDER] {
+        let mut reading = Reading::of([path]);
+        reading.division.length = Length::Fixed(Period::parse("10").unwrap());
+        reading.division.align = Align::Clock;
+        let read = read(&reading).unwrap();
+        let made = finish(counted(path, None, CountDetail::Index).counts).unwrap();
+        assert_eq!(made.span, read.span);
+        let spans = |m: &Mission| {
+            m.windows
+                .iter()
+                .map(|w| (w.span, w.messages))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(spans(&made), spans(&read));
+        for ((window, a), (_, b)) in made.each().zip(read.each()) {
+            let topics = |m: &Mission, g: &bagreel::Graph| -> BTreeMap<String, String> {
+                let sent = g.topics.iter().filter(|t| t.count > 0);
+                let name = |id: u32| m.elements.topics[id as usize].name.to_string();
+                sent.map(|t| (name(t.id), format!("{:?} {:?}", t.count, t.hz)))
+                    .collect()
+            };
+            assert_eq!(
+                topics(&made, &a),
+                topics(&read, &b),
+                "{path} window {}",
+                window.index
+            );
+            let edges = |m: &Mission, g: &bagreel::Graph| -> BTreeMap<String, String> {
+                let sent = g
+                    .publishes
+                    .iter()
+                    .filter(|e| e.count.is_some_and(|n| n > 0));
+                let all = &m.elements;
+                let name = |id: u32| {
+                    let edge = &all.publishes[id as usize];
+                    let node = all.nodes[edge.node as usize].name.as_str();
+                    format!("{node} {}", all.topics[edge.topic as usize].name.as_str())
+                };
+                sent.map(|e| (name(e.id), format!("{:?} {:?}", e.count, e.hz)))
+                    .collect()
+            };
+            // Of ROS 2, evidence beside the index names publishers.
+            if path == WAREHOUSE {
+                assert_eq!(
+                    edges(&made, &a),
+                    edges(&read, &b),
+                    "window {}",
+                    window.index
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn counts_of_several_missions_are_not_finished_as_one() {
+    let mut counts = counted(WAREHOUSE, None, CountDetail::Index).counts;
+    let mut other = counts[0].clone();
+    other.mission = "other".into();
+    counts.push(other);
+    assert!(
+        finish(counts)
+            .unwrap_err()
+            .to_string()
+            .contains("not one mission")
+    );
+    assert!(finish([]).is_err());
+}
+
+#[test]
+fn whole_chunks_count_the_same_messages() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut paths: Vec<String> = vec![WAREHOUSE.to_owned(), COURIER.to_owned()];
+    for pack in [rosbag1::Pack::None, rosbag1::Pack::Lz4] {
+        let path = dir.path().join(format!("{pack:?}.bag"));
+        fs::write(&path, rosbag1::write(&support::small(), pack, 4000)).unwrap();
+        paths.push(path.to_string_lossy().into_owned());
+    }
+    for path in &paths {
+        let index = counted(path, None, CountDetail::Index);
+        let chunks = counted(path, None, CountDetail::Chunks);
+        assert_eq!(chunks.bag.tier, Some(Tier::Chunks));
+        let of = |counted: &CountedBag| -> Vec<_> {
+            let counts = counted.counts.iter();
+            counts
+                .map(|c| (c.win, c.topic.clone(), c.node.clone(), c.n))
+                .collect()
+        };
+        assert_eq!(of(&index), of(&chunks), "{path}");
+        let lumped = chunks.counts.iter().filter(|c| c.first.is_none()).count();
+        assert!(
+            lumped > 0 || chunks.counts.len() < 50,
+            "{path}: no chunk lies in one window"
+        );
+        let known = chunks
+            .counts
+            .iter()
+            .zip(&index.counts)
+            .filter(|(c, _)| c.first.is_some());
+        for (chunk, index) in known {
+            assert_eq!((chunk.first, chunk.last), (index.first, index.last));
+        }
+    }
+}
