@@ -18,6 +18,6 @@ pub(crate) use difference::{
     DIFF_FORMATS, DiffFormat, DiffSubject, Difference, Side, differences, union,
 };
 pub(crate) use expectation::{Expectation, read};
-pub(crate) use finding::{Kind, Severity};
+pub(crate) use finding::{FindingKind, Severity};
 pub(crate) use judge::{Verdict, judge};
 pub(crate) use report::{FORMATS, Format, Subject, explain};

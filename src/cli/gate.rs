@@ -14,7 +14,7 @@ use crate::base::words;
 use crate::export::Output;
 use crate::export::target::Target;
 use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Severity, explain};
-use crate::pipeline::gate::{self, Baseline, Check, Diff, Report};
+use crate::pipeline::gate::{self, Baseline, Check, DiffJob, ReportJob};
 use crate::pipeline::{Drawing, Reading};
 
 /// Tells what differs between two missions, or between one and an expectation.
@@ -42,7 +42,7 @@ pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> R
     Ok(if is_different { FAILED } else { worst })
 }
 
-fn diff_job(args: &DiffArgs) -> Result<Diff> {
+fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
     let one = |path: &PathBuf| {
         let inputs = Inputs {
             bags: vec![path.clone()],
@@ -77,7 +77,7 @@ fn diff_job(args: &DiffArgs) -> Result<Diff> {
     };
     drawing.page.compares = true;
     drawing.page.title = Some(format!("{} → {}", subject.first, subject.second));
-    Ok(Diff {
+    Ok(DiffJob {
         readings: [one(&args.first)?, one(&args.second)?],
         rate_change: args.rate_change,
         subject,
@@ -197,7 +197,7 @@ pub(super) fn check(args: &CheckArgs, given: &Given, terminal: &mut Terminal) ->
 }
 
 fn unknown_kind(word: &str) -> Error {
-    let words = || crate::gate::Kind::words();
+    let words = || crate::gate::FindingKind::words();
     let near = crate::base::nearest::nearest(word, words());
     let near = near.map_or_else(String::new, |near| format!("; the nearest is `{near}`"));
     let all: Vec<&str> = words().collect();
@@ -223,14 +223,14 @@ fn typed(bags: &[PathBuf]) -> Vec<String> {
 }
 
 /// A report to write: its format by the word before a colon, by its ending, or because a job collects its summary there.
-fn report(output: &OsStr) -> Result<Report> {
+fn report(output: &OsStr) -> Result<ReportJob> {
     let name = output.to_string_lossy();
     let named = |word: &str| Format::from_word(word);
     if let Some((format, path)) = name
         .split_once(':')
         .and_then(|(word, path)| Some((named(word)?, path)))
     {
-        return Ok(Report {
+        return Ok(ReportJob {
             target: Target::parse(path),
             format,
         });
@@ -247,7 +247,7 @@ fn report(output: &OsStr) -> Result<Report> {
             "end it in .md, .xml, .json, .sarif or .txt, or write the format before it: `gitlab:FILE`",
         )
     };
-    Ok(Report {
+    Ok(ReportJob {
         target: Target::parse(output),
         format: format.ok_or_else(unknown)?,
     })

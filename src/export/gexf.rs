@@ -4,7 +4,7 @@
 //! of windows in which it is there, in seconds from the mission's start, and its rate over time.
 
 use super::encoder::AtOnce;
-use super::spells::{Part, parts};
+use super::spells::{SpellOf, parts};
 use super::{Encoder, Sequence};
 use crate::base::error::Result;
 use crate::draw::paint::xml::Xml;
@@ -91,7 +91,7 @@ fn attributes(xml: &mut Xml, class: &str) {
 }
 
 /// Values and spells of a node or edge, and its end.
-fn inside(xml: &mut Xml, mission: &Mission, part: &Part) {
+fn inside(xml: &mut Xml, mission: &Mission, part: &SpellOf) {
     let second = |at| mission.offset(at) as f64 / 1e9;
     let messages = part.messages.map(|n| n.to_string());
     let values = [

@@ -1,7 +1,7 @@
 //! The union of all windows as one graph in `GraphML` (<http://graphml.graphdrawing.org>).
 
 use super::encoder::AtOnce;
-use super::spells::{Part, parts};
+use super::spells::{SpellOf, parts};
 use super::{Encoder, Sequence};
 use crate::base::error::Result;
 use crate::draw::paint::xml::Xml;
@@ -62,7 +62,7 @@ fn text(mission: &Mission) -> String {
 }
 
 /// What is known of a node or edge, and its end.
-fn inside(xml: &mut Xml, mission: &Mission, part: &Part) {
+fn inside(xml: &mut Xml, mission: &Mission, part: &SpellOf) {
     let second = |at| (mission.offset(at) as f64 / 1e9).to_string();
     let values = [
         Some(part.label.clone()),

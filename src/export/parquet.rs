@@ -121,9 +121,9 @@ fn data_type(kind: ColumnKind) -> DataType {
     }
 }
 
-type Made<T> = Result<T, arrow_schema::ArrowError>;
+type ArrowResult<T> = Result<T, arrow_schema::ArrowError>;
 
-fn array(column: &TableColumn) -> Made<ArrayRef> {
+fn array(column: &TableColumn) -> ArrowResult<ArrayRef> {
     let mut array = values(column)?;
     for ends in column.lists.iter().rev() {
         let kind = element(array.data_type().clone());
@@ -132,7 +132,7 @@ fn array(column: &TableColumn) -> Made<ArrayRef> {
     Ok(array)
 }
 
-fn values(column: &TableColumn) -> Made<ArrayRef> {
+fn values(column: &TableColumn) -> ArrowResult<ArrayRef> {
     let known = column.valid.clone().map(NullBuffer::from);
     Ok(match (&column.values, column.kind) {
         (ColumnValues::Flag(v), _) => Arc::new(BooleanArray::new(v.clone().into(), known)),

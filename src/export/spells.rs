@@ -7,7 +7,7 @@ use crate::graph::Edge;
 use crate::mission::{Mission, Window};
 
 /// A node, a topic or an edge.
-pub(super) struct Part {
+pub(super) struct SpellOf {
     /// Its name in the file, which no other one has.
     pub(super) id: String,
     /// What people read.
@@ -29,7 +29,7 @@ pub(super) struct Part {
 }
 
 /// What one window says of an element.
-struct Seen {
+struct SeenInWindow {
     id: u32,
     degree: Degree,
     count: Option<u64>,
@@ -37,7 +37,7 @@ struct Seen {
 }
 
 /// Nodes and topics, then edges, all in the order of the mission's elements.
-pub(super) fn parts(mission: &Mission) -> (Vec<Part>, Vec<Part>) {
+pub(super) fn parts(mission: &Mission) -> (Vec<SpellOf>, Vec<SpellOf>) {
     let elements = &mission.elements;
     let node = |name: &str| format!("node:{}", visible(name));
     let topic = |name: &str| format!("topic:{}", visible(name));
@@ -49,7 +49,7 @@ pub(super) fn parts(mission: &Mission) -> (Vec<Part>, Vec<Part>) {
     };
     let plain = |id: String, name: &str, kind, evidence| {
         let label = visible(name).into_owned();
-        Part::new(id, label, kind, Default::default(), evidence)
+        SpellOf::new(id, label, kind, Default::default(), evidence)
     };
     let nodes = elements.nodes.iter().map(|n| {
         let name = n.name.as_str();
@@ -63,20 +63,20 @@ pub(super) fn parts(mission: &Mission) -> (Vec<Part>, Vec<Part>) {
         let (node, topic) = ends(edge);
         let id = format!("publish:{node} {topic}");
         let label = "publishes".to_owned();
-        Part::new(id, label, "publish", (node, topic), edge.evidence)
+        SpellOf::new(id, label, "publish", (node, topic), edge.evidence)
     });
     let subscribes = elements.subscribes.iter().map(|edge| {
         let (node, topic) = ends(edge);
         let id = format!("subscribe:{topic} {node}");
         let label = "is subscribed by".to_owned();
-        Part::new(id, label, "subscribe", (topic, node), edge.evidence)
+        SpellOf::new(id, label, "subscribe", (topic, node), edge.evidence)
     });
-    let mut nodes: Vec<Part> = nodes.collect();
-    let mut topics: Vec<Part> = topics.collect();
-    let mut publishes: Vec<Part> = publishes.collect();
-    let mut subscribes: Vec<Part> = subscribes.collect();
+    let mut nodes: Vec<SpellOf> = nodes.collect();
+    let mut topics: Vec<SpellOf> = topics.collect();
+    let mut publishes: Vec<SpellOf> = publishes.collect();
+    let mut subscribes: Vec<SpellOf> = subscribes.collect();
     for (window, graph) in mission.each() {
-        let seen = |id, degree, count, hz| Seen {
+        let seen = |id, degree, count, hz| SeenInWindow {
             id,
             degree,
             count,
@@ -117,13 +117,13 @@ pub(super) fn parts(mission: &Mission) -> (Vec<Part>, Vec<Part>) {
     (nodes, publishes)
 }
 
-fn add(parts: &mut [Part], window: &Window, seen: impl Iterator<Item = Seen>) {
+fn add(parts: &mut [SpellOf], window: &Window, seen: impl Iterator<Item = SeenInWindow>) {
     for seen in seen {
         parts[seen.id as usize].add(window.span, &seen);
     }
 }
 
-impl Part {
+impl SpellOf {
     fn new(
         id: String,
         label: String,
@@ -145,7 +145,7 @@ impl Part {
     }
 
     /// It is there in one more window, later than all before.
-    fn add(&mut self, span: Span, seen: &Seen) {
+    fn add(&mut self, span: Span, seen: &SeenInWindow) {
         self.degree = self.degree.min(seen.degree);
         if let Some(count) = seen.count {
             *self.messages.get_or_insert(0) += count;

@@ -14,11 +14,11 @@ use crate::export::sequence::Sequence;
 use crate::export::sink::OutputSink;
 use crate::export::target::{Target, is_special};
 use crate::mission::Mission;
-use mission::{Row, TABLES, Table};
+use mission::{RowTaker, TABLES, Table};
 pub(crate) use writer::TableFormat;
 use writer::Writer;
 
-struct Tables<'a> {
+struct TablesEncoder<'a> {
     mission: &'a Mission,
     target: Target,
     format: TableFormat,
@@ -76,7 +76,7 @@ fn start<'a>(
     format: TableFormat,
 ) -> Result<Box<dyn Encoder + 'a>> {
     check(target)?;
-    Ok(Box::new(Tables {
+    Ok(Box::new(TablesEncoder {
         mission: sequence.data,
         target: target.clone(),
         format,
@@ -84,12 +84,12 @@ fn start<'a>(
     }))
 }
 
-impl Encoder for Tables<'_> {
+impl Encoder for TablesEncoder<'_> {
     fn finish(self: Box<Self>) -> Result<Written> {
         let each = TABLES.iter().zip(files(&self.target, self.format.word()));
         let write = |(table, file): (&Table, Target)| {
             let fill = table.fill_runs.filter(|_| self.has_runs);
-            let rows = |row: Row<'_>| fill.unwrap_or(table.fill)(self.mission, row);
+            let rows = |row: RowTaker<'_>| fill.unwrap_or(table.fill)(self.mission, row);
             write(rows, table, &file, self.format)
         };
         // All of them are whole before the first one gets its name.
@@ -117,7 +117,7 @@ pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
 const MOST_ROWS: usize = 4096;
 
 fn write(
-    rows: impl Fn(Row<'_>),
+    rows: impl Fn(RowTaker<'_>),
     table: &Table,
     target: &Target,
     format: TableFormat,

@@ -33,7 +33,7 @@ pub(crate) struct Expectation {
     pub(crate) nodes: Vec<Named<NodeFacts>>,
     pub(crate) topics: Vec<Named<TopicFacts>>,
     pub(crate) rules: Vec<Rule>,
-    pub(crate) allow: Vec<Allowance>,
+    pub(crate) allow: Vec<AllowedFinding>,
 }
 
 /// What is expected of a name.
@@ -51,15 +51,15 @@ pub(crate) struct Named<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Policy {
     pub(crate) at: YamlPlace,
-    pub(crate) nodes: Closed,
-    pub(crate) topics: Closed,
+    pub(crate) nodes: Unlisted,
+    pub(crate) topics: Unlisted,
     /// Of topics whose publishers are listed.
-    pub(crate) publishers: Closed,
+    pub(crate) publishers: Unlisted,
 }
 
 /// How bad it is that something is not named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Closed {
+pub(crate) enum Unlisted {
     Allow,
     Warn,
     Error,
@@ -194,9 +194,9 @@ impl EventKind {
 
 /// A finding that is known and forgiven.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Allowance {
+pub(crate) struct AllowedFinding {
     pub(crate) at: YamlPlace,
-    pub(crate) finding: super::Kind,
+    pub(crate) finding: super::FindingKind,
     pub(crate) name: Pattern,
     /// It does not hold for bags that begin at this time or later.
     pub(crate) until: Option<At<Stamp>>,

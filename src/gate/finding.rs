@@ -10,7 +10,7 @@ use crate::base::yaml::YamlPlace;
 
 /// A kind of finding: its place in [`KINDS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Kind {
+pub(crate) enum FindingKind {
     NodeMissing,
     NodeForbidden,
     NodeLate,
@@ -36,9 +36,9 @@ pub(crate) enum Kind {
 }
 
 /// All kinds in their order: the word, what it says, and what decides it.
-pub(crate) const KINDS: &[(Kind, &str, &str, &str)] = &[
+pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
-        Kind::NodeMissing,
+        FindingKind::NodeMissing,
         "node-missing",
         "A node that is expected is not in the bag.",
         "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
@@ -46,141 +46,141 @@ pub(crate) const KINDS: &[(Kind, &str, &str, &str)] = &[
          for nothing.",
     ),
     (
-        Kind::NodeForbidden,
+        FindingKind::NodeForbidden,
         "node-forbidden",
         "A node is in the bag that must not be there.",
         "Written as `forbidden: true`, mostly for a pattern such as `/debug/*`.",
     ),
     (
-        Kind::NodeLate,
+        FindingKind::NodeLate,
         "node-late",
         "A node appeared later than it should have.",
         "`present_within: 20s` counts from the first message. Undecidable where the node may have been there earlier for \
          all that the bag tells.",
     ),
     (
-        Kind::NodeGone,
+        FindingKind::NodeGone,
         "node-gone",
         "A node ended before the mission did.",
         "A node that is expected is expected to stay. Its end is told by a rhythm that broke for good, or by something \
          that says so; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go.",
     ),
     (
-        Kind::NodeRestarted,
+        FindingKind::NodeRestarted,
         "node-restarted",
         "A node restarted more or less often than allowed.",
         "`restarts: ..0`. A restart is proved by sequence numbers, a new process, or a new anonymous name of one role.",
     ),
     (
-        Kind::NodeLifecycle,
+        FindingKind::NodeLifecycle,
         "node-lifecycle",
         "A node is in another lifecycle state at the end.",
         "`lifecycle: active`. Undecidable without the node's transition events.",
     ),
     (
-        Kind::TopicMissing,
+        FindingKind::TopicMissing,
         "topic-missing",
         "A topic that is expected is not in the bag.",
         "A topic is there if it has messages or a publisher. `optional: true` asks for nothing.",
     ),
     (
-        Kind::TopicForbidden,
+        FindingKind::TopicForbidden,
         "topic-forbidden",
         "A topic is in the bag that must not be there.",
         "Written as `forbidden: true`, mostly for a pattern.",
     ),
     (
-        Kind::TopicType,
+        FindingKind::TopicType,
         "topic-type",
         "A topic has another type than expected.",
         "`type: sensor_msgs/LaserScan`; the `/msg/` of ROS 2 makes no difference.",
     ),
     (
-        Kind::TopicQos,
+        FindingKind::TopicQos,
         "topic-qos",
         "A topic is offered with another quality of service.",
         "`qos: reliable` asks for each of its words; `latched: true` for a last message that stands. Undecidable where \
          the bag does not tell.",
     ),
     (
-        Kind::TopicRateLow,
+        FindingKind::TopicRateLow,
         "topic-rate-low",
         "A topic had fewer messages per second than expected.",
         "`hz: 13.5..16.5` is judged in every whole window from the topic's first message to the mission's end, `percent: \
          95` of them at least. A message more or less at the edge of a window is none.",
     ),
     (
-        Kind::TopicRateHigh,
+        FindingKind::TopicRateHigh,
         "topic-rate-high",
         "A topic had more messages per second than expected.",
         "As `topic-rate-low`, above the range.",
     ),
     (
-        Kind::TopicGap,
+        FindingKind::TopicGap,
         "topic-gap",
         "A topic was silent for longer than allowed.",
         "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`.",
     ),
     (
-        Kind::PublisherMissing,
+        FindingKind::PublisherMissing,
         "publisher-missing",
         "A node does not publish a topic that it should.",
         "`by: [/a, /b]`. Undecidable where the bag does not tell who publishes the topic.",
     ),
     (
-        Kind::PublisherUnexpected,
+        FindingKind::PublisherUnexpected,
         "publisher-unexpected",
         "A topic has a publisher that is not listed.",
         "`by: [/a]` names all of them; `policy: {unexpected_publishers: warn}` makes it milder. Only publishers that are \
          measured or stated count.",
     ),
     (
-        Kind::SubscriberMissing,
+        FindingKind::SubscriberMissing,
         "subscriber-missing",
         "A node does not subscribe a topic that it should.",
         "`to: [/a]` names some of them. Undecidable unless the bag lists subscribers: by `/rosgraph`, statistics, \
          discovery, or this node's log of its connections.",
     ),
     (
-        Kind::OrderBroken,
+        FindingKind::OrderBroken,
         "order-broken",
         "Nodes did not appear in the expected order.",
         "`appear_in_order: [/a, /b]`. Undecidable where the times that the bag tells overlap.",
     ),
     (
-        Kind::ReactionMissing,
+        FindingKind::ReactionMissing,
         "reaction-missing",
         "Something did not happen that should follow something else.",
         "`when: {removed: /a}, expect: {handed_over: /t, to: /b}, within: 2s`. Each time the first happens, the second \
          must follow; times count as uncertain as they are known.",
     ),
     (
-        Kind::TooManyChanges,
+        FindingKind::TooManyChanges,
         "too-many-changes",
         "There were more, or fewer, reconfigurations than allowed.",
         "`during: -30s.., changes: ..0` counts the entries that `bagreel events` prints.",
     ),
     (
-        Kind::UnexpectedNode,
+        FindingKind::UnexpectedNode,
         "unexpected-node",
         "A node is in the bag that the file does not name.",
         "Only with `policy: {unexpected_nodes: warn}` or `error`. Recorders and players never count.",
     ),
     (
-        Kind::UnexpectedTopic,
+        FindingKind::UnexpectedTopic,
         "unexpected-topic",
         "A topic is in the bag that the file does not name.",
         "Only with `policy: {unexpected_topics: warn}` or `error`. Housekeeping such as `/rosout` never counts.",
     ),
     (
-        Kind::AllowUnused,
+        FindingKind::AllowUnused,
         "allow-unused",
         "An allowance forgave nothing.",
         "Remove it, so that it does not forgive something else later.",
     ),
 ];
 
-impl Kind {
+impl FindingKind {
     /// Its word.
     pub(crate) fn word(self) -> &'static str {
         let row = KINDS.iter().find(|(kind, ..)| *kind == self);
@@ -234,7 +234,7 @@ pub(crate) struct Cause {
 /// One thing found. All its texts are visible: control characters are spelled out.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Finding {
-    pub(crate) kind: Kind,
+    pub(crate) kind: FindingKind,
     pub(crate) severity: Severity,
     /// Where the file says what was expected.
     pub(crate) place: YamlPlace,
@@ -264,7 +264,12 @@ pub(crate) struct Finding {
 
 impl Finding {
     /// A finding about a name, an error until something else is said.
-    pub(crate) fn new(kind: Kind, name: &str, place: YamlPlace, says: impl fmt::Display) -> Self {
+    pub(crate) fn new(
+        kind: FindingKind,
+        name: &str,
+        place: YamlPlace,
+        says: impl fmt::Display,
+    ) -> Self {
         Self {
             kind,
             severity: Severity::Error,
@@ -285,7 +290,7 @@ impl Finding {
 
     /// That the bag does not tell, and why.
     pub(crate) fn unknown(
-        kind: Kind,
+        kind: FindingKind,
         name: &str,
         place: YamlPlace,
         says: impl fmt::Display,
@@ -340,7 +345,7 @@ impl Finding {
     /// What of it stays the same from run to run: who else publishes does, numbers do not.
     fn look(&self) -> String {
         let who = match self.kind {
-            Kind::PublisherUnexpected => self.seen.as_str(),
+            FindingKind::PublisherUnexpected => self.seen.as_str(),
             _ => "",
         };
         let (kind, name, expected) = (self.kind.word(), &self.name, &self.expected);
@@ -366,7 +371,7 @@ mod tests {
     fn every_kind_stands_at_its_place_with_a_word_of_its_own() {
         for (at, (kind, word, ..)) in KINDS.iter().enumerate() {
             assert_eq!(*kind as usize, at, "{word}");
-            assert_eq!(Kind::from_word(word), Some(*kind));
+            assert_eq!(FindingKind::from_word(word), Some(*kind));
             assert_eq!(kind.word(), *word);
         }
     }
@@ -374,9 +379,9 @@ mod tests {
     #[test]
     fn a_fingerprint_does_not_know_lines_or_numbers_seen() {
         let at = |line| YamlPlace { line, column: 1 };
-        let one = Finding::new(Kind::TopicRateLow, "/scan", at(3), "a").saw("7", "9..");
-        let two = Finding::new(Kind::TopicRateLow, "/scan", at(9), "b").saw("6", "9..");
-        let other = Finding::new(Kind::TopicRateLow, "/scan2", at(3), "a").saw("7", "9..");
+        let one = Finding::new(FindingKind::TopicRateLow, "/scan", at(3), "a").saw("7", "9..");
+        let two = Finding::new(FindingKind::TopicRateLow, "/scan", at(9), "b").saw("6", "9..");
+        let other = Finding::new(FindingKind::TopicRateLow, "/scan2", at(3), "a").saw("7", "9..");
         assert_eq!(one.fingerprint(), two.fingerprint());
         assert_ne!(one.fingerprint(), other.fingerprint());
         assert_eq!(one.fingerprint().len(), 12);

@@ -10,7 +10,7 @@ mod topic;
 
 use std::cell::Cell;
 
-use super::expectation::{Closed, Expectation, YamlPlace};
+use super::expectation::{Expectation, Unlisted, YamlPlace};
 use super::facts::Facts;
 use super::finding::{Cause, Finding, Severity, number};
 use super::pattern::Pattern;
@@ -170,7 +170,7 @@ fn absence(name: &str) -> Cause {
     }
 }
 
-impl Closed {
+impl Unlisted {
     /// How bad a finding under this policy is; `None` for no finding at all.
     fn severity(self) -> Option<Severity> {
         match self {

@@ -7,11 +7,11 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Pattern {
     text: String,
-    parts: Vec<Part>,
+    parts: Vec<PatternPart>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Part {
+enum PatternPart {
     This(char),
     One,
     Some,
@@ -24,13 +24,13 @@ impl Pattern {
         let mut parts = Vec::new();
         for c in text.chars() {
             match (c, parts.last()) {
-                ('*', Some(Part::Some | Part::All)) => {
+                ('*', Some(PatternPart::Some | PatternPart::All)) => {
                     parts.pop();
-                    parts.push(Part::All);
+                    parts.push(PatternPart::All);
                 }
-                ('*', _) => parts.push(Part::Some),
-                ('?', _) => parts.push(Part::One),
-                (c, _) => parts.push(Part::This(c)),
+                ('*', _) => parts.push(PatternPart::Some),
+                ('?', _) => parts.push(PatternPart::One),
+                (c, _) => parts.push(PatternPart::This(c)),
             }
         }
         Self {
@@ -46,7 +46,7 @@ impl Pattern {
 
     /// Whether it stands for one name only.
     pub(crate) fn is_name(&self) -> bool {
-        self.parts.iter().all(|p| matches!(p, Part::This(_)))
+        self.parts.iter().all(|p| matches!(p, PatternPart::This(_)))
     }
 
     /// Whether the name is one of those that it stands for. The work is the product of both lengths at most.
@@ -62,10 +62,10 @@ impl Pattern {
             let mut next = vec![false; fits.len()];
             for (at, part) in self.parts.iter().enumerate().filter(|(at, _)| fits[*at]) {
                 match part {
-                    Part::This(own) => next[at + 1] |= *own == c,
-                    Part::One => next[at + 1] |= c != '/',
-                    Part::Some => next[at] |= c != '/',
-                    Part::All => next[at] = true,
+                    PatternPart::This(own) => next[at + 1] |= *own == c,
+                    PatternPart::One => next[at + 1] |= c != '/',
+                    PatternPart::Some => next[at] |= c != '/',
+                    PatternPart::All => next[at] = true,
                 }
             }
             self.skip_blanks(&mut next);
@@ -77,7 +77,7 @@ impl Pattern {
     /// A blank may stand for nothing.
     fn skip_blanks(&self, fits: &mut [bool]) {
         for (at, part) in self.parts.iter().enumerate() {
-            if fits[at] && matches!(part, Part::Some | Part::All) {
+            if fits[at] && matches!(part, PatternPart::Some | PatternPart::All) {
                 fits[at + 1] = true;
             }
         }

@@ -11,7 +11,7 @@ mod text;
 
 use std::collections::BTreeMap;
 
-use super::finding::{Finding, KINDS, Kind, Severity};
+use super::finding::{Finding, FindingKind, KINDS, Severity};
 use super::judge::Verdict;
 use crate::base::words::{self, visible};
 use crate::mission::Mission;
@@ -220,8 +220,8 @@ fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Findin
 }
 
 /// The kinds found, once each, in their order.
-fn kinds(findings: &[&Finding]) -> Vec<Kind> {
-    let mut kinds: Vec<Kind> = findings.iter().map(|f| f.kind).collect();
+fn kinds(findings: &[&Finding]) -> Vec<FindingKind> {
+    let mut kinds: Vec<FindingKind> = findings.iter().map(|f| f.kind).collect();
     kinds.sort_unstable();
     kinds.dedup();
     kinds

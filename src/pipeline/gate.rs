@@ -19,7 +19,7 @@ use crate::graph::window::Length;
 use crate::mission::Mission;
 
 /// One report to write.
-pub(crate) struct Report {
+pub(crate) struct ReportJob {
     pub(crate) target: Target,
     pub(crate) format: &'static Format,
 }
@@ -28,7 +28,7 @@ pub(crate) struct Report {
 pub(crate) struct Check {
     pub(crate) reading: Reading,
     pub(crate) expect: PathBuf,
-    pub(crate) reports: Vec<Report>,
+    pub(crate) reports: Vec<ReportJob>,
     /// The bags as they were typed.
     pub(crate) bags: Vec<String>,
     pub(crate) links: Vec<(String, String)>,
@@ -96,7 +96,7 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
 }
 
 /// The whole job of `bagreel diff`.
-pub(crate) struct Diff {
+pub(crate) struct DiffJob {
     pub(crate) readings: [Reading; 2],
     /// The share by which a rate must differ.
     pub(crate) rate_change: f64,
@@ -119,7 +119,7 @@ pub(crate) struct Compared {
 ///
 /// # Errors
 /// Where a mission cannot be read or an output cannot be written.
-pub(crate) fn diff(job: &Diff, watch: &mut dyn Watch) -> Result<Compared> {
+pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
     let reports = job.reports.iter().map(|(target, _)| target.clone());
     let pictures = job.pictures.iter().map(|output| output.target.clone());
     let targets: Vec<Target> = reports.chain(pictures).collect();
@@ -172,7 +172,7 @@ pub(crate) struct Baseline {
 }
 
 /// What came of it.
-pub(crate) struct Written {
+pub(crate) struct BaselineWritten {
     pub(crate) missions: Vec<Mission>,
     /// Facts that were written anew.
     pub(crate) changed: usize,
@@ -184,7 +184,7 @@ pub(crate) struct Written {
 ///
 /// # Errors
 /// Where the expectation or a run cannot be read, or the output cannot be written.
-pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Written> {
+pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<BaselineWritten> {
     let old = job.update.as_deref().map(|path| {
         let text = file::read_text(path, budget::USER_TEXT)?;
         let expectation = crate::gate::read(&text, path)?;
@@ -223,7 +223,7 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Written>
         }
     };
     put(&target, &text)?;
-    Ok(Written {
+    Ok(BaselineWritten {
         missions,
         changed,
         left,

@@ -66,6 +66,9 @@ impl<G: Grammar> Query<'_, G> {
                 return self.told(&mut stream, Share::Payloads, sink);
             }
             self.told(&mut stream, Share::Whole, sink);
+            if stream.position() == here.start && !matches!(stream.skip(1), Ok(1)) {
+                return;
+            }
         }
     }
 

@@ -12,15 +12,15 @@ use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Mission, Window};
 
 /// Takes a row.
-pub(super) type Row<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
+pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
 
 /// A table: its word in the file's name, its columns, and what fills it.
 pub(super) struct Table {
     pub(super) word: &'static str,
     pub(super) columns: &'static [(&'static str, ColumnKind)],
-    pub(super) fill: fn(&Mission, Row<'_>),
+    pub(super) fill: fn(&Mission, RowTaker<'_>),
     /// The same by runs of equal windows, where it is about windows.
-    pub(super) fill_runs: Option<fn(&Mission, Row<'_>)>,
+    pub(super) fill_runs: Option<fn(&Mission, RowTaker<'_>)>,
 }
 
 /// The first columns of every table about windows.
@@ -172,7 +172,7 @@ pub(super) const TABLES: &[Table] = &[
     },
 ];
 
-fn bags(mission: &Mission, row: Row<'_>) {
+fn bags(mission: &Mission, row: RowTaker<'_>) {
     for bag in &mission.bags {
         row(&[
             TableCell::text(&bag.name),
@@ -186,7 +186,7 @@ fn bags(mission: &Mission, row: Row<'_>) {
     }
 }
 
-fn nodes(mission: &Mission, row: Row<'_>) {
+fn nodes(mission: &Mission, row: RowTaker<'_>) {
     for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
         for state in &graph.nodes {
@@ -210,7 +210,7 @@ fn nodes(mission: &Mission, row: Row<'_>) {
     }
 }
 
-fn topics(mission: &Mission, row: Row<'_>) {
+fn topics(mission: &Mission, row: RowTaker<'_>) {
     for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
         for state in &graph.topics {
@@ -238,7 +238,7 @@ fn topics(mission: &Mission, row: Row<'_>) {
     }
 }
 
-fn edges(mission: &Mission, row: Row<'_>) {
+fn edges(mission: &Mission, row: RowTaker<'_>) {
     let elements = &mission.elements;
     for (window, graph) in mission.each() {
         let [win, start, end, length] = cells_of(window);
@@ -269,7 +269,7 @@ fn edges(mission: &Mission, row: Row<'_>) {
     }
 }
 
-fn changes(mission: &Mission, row: Row<'_>) {
+fn changes(mission: &Mission, row: RowTaker<'_>) {
     for window in &mission.windows {
         for change in &window.changes {
             let (kind, what, at, detail) = told(mission, change);
@@ -354,7 +354,7 @@ fn told<'a>(
     }
 }
 
-fn ledger(mission: &Mission, row: Row<'_>) {
+fn ledger(mission: &Mission, row: RowTaker<'_>) {
     for (id, entry) in mission.ledger.entries.iter().enumerate() {
         let [node, topic] = ends(mission, entry.what);
         let [from_hz, to_hz, from, to] = detail(mission, entry);
@@ -390,7 +390,7 @@ fn detail<'a>(mission: &Mission, entry: &'a Entry) -> DetailCells<'a> {
     }
 }
 
-fn phases(mission: &Mission, row: Row<'_>) {
+fn phases(mission: &Mission, row: RowTaker<'_>) {
     for (at, phase) in mission.ledger.phases.iter().enumerate() {
         row(&[
             TableCell::count(at),

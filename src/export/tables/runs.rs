@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::mission::{Row, text, time, words};
+use super::mission::{RowTaker, text, time, words};
 use crate::base::table::TableCell;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
@@ -11,7 +11,7 @@ use crate::graph::{self, Edge, Element, State};
 use crate::mission::Mission;
 
 /// Neighbouring windows in which an element has one state, and between which the ledger tells no change of its rate.
-struct Run {
+struct StateRun {
     first: usize,
     last: usize,
     state: State,
@@ -23,7 +23,7 @@ struct Run {
     median: Option<f64>,
 }
 
-impl Run {
+impl StateRun {
     fn of(at: usize, row: &graph::Row) -> Self {
         Self {
             first: at,
@@ -84,13 +84,13 @@ fn add(a: Option<u64>, b: Option<u64>) -> Option<u64> {
 }
 
 /// The runs of an element, in order.
-fn runs(mission: &Mission, turns: &BTreeSet<(Element, usize)>, what: Element) -> Vec<Run> {
-    let mut all: Vec<Run> = Vec::new();
+fn runs(mission: &Mission, turns: &BTreeSet<(Element, usize)>, what: Element) -> Vec<StateRun> {
+    let mut all: Vec<StateRun> = Vec::new();
     for (at, row) in mission.graphs.rows(what) {
         let turns = turns.contains(&(what, at));
         match all.last_mut() {
             Some(run) if !turns && run.goes_on(at, &row) => run.take(at, &row),
-            _ => all.push(Run::of(at, &row)),
+            _ => all.push(StateRun::of(at, &row)),
         }
     }
     all
@@ -107,7 +107,7 @@ fn turns(mission: &Mission) -> BTreeSet<(Element, usize)> {
     changes.filter_map(rate).collect()
 }
 
-pub(super) fn nodes(mission: &Mission, row: Row<'_>) {
+pub(super) fn nodes(mission: &Mission, row: RowTaker<'_>) {
     let turns = turns(mission);
     for (id, node) in (0..).zip(&mission.elements.nodes) {
         for run in runs(mission, &turns, Element::Node(id)) {
@@ -132,7 +132,7 @@ pub(super) fn nodes(mission: &Mission, row: Row<'_>) {
     }
 }
 
-pub(super) fn topics(mission: &Mission, row: Row<'_>) {
+pub(super) fn topics(mission: &Mission, row: RowTaker<'_>) {
     let turns = turns(mission);
     for (id, topic) in (0..).zip(&mission.elements.topics) {
         for run in runs(mission, &turns, Element::Topic(id)) {
@@ -161,7 +161,7 @@ pub(super) fn topics(mission: &Mission, row: Row<'_>) {
     }
 }
 
-pub(super) fn edges(mission: &Mission, row: Row<'_>) {
+pub(super) fn edges(mission: &Mission, row: RowTaker<'_>) {
     let turns = turns(mission);
     let all = &mission.elements;
     let publishes = (0..).zip(&all.publishes);
@@ -177,7 +177,7 @@ fn edge_rows(
     mission: &Mission,
     turns: &BTreeSet<(Element, usize)>,
     (what, edge): (Element, &Edge),
-    row: Row<'_>,
+    row: RowTaker<'_>,
 ) {
     let elements = &mission.elements;
     for run in runs(mission, turns, what) {

@@ -140,22 +140,22 @@ fn node(facts: &Facts<'_>, nodes: &[NodeId]) -> NodeLine {
 }
 
 /// A topic in one of the runs.
-struct Seen<'a> {
+struct TopicInRun<'a> {
     facts: &'a Facts<'a>,
     id: TopicId,
 }
 
 fn topics(runs: &[Facts<'_>]) -> BTreeMap<String, TopicLine> {
-    let mut all: BTreeMap<String, Vec<Seen<'_>>> = BTreeMap::new();
+    let mut all: BTreeMap<String, Vec<TopicInRun<'_>>> = BTreeMap::new();
     for facts in runs {
         for id in facts.topics(&Pattern::new("**")) {
             if !facts.is_housekeeping(id) && facts.messages(id) > 0 {
                 let name = facts.topic(id).to_owned();
-                all.entry(name).or_default().push(Seen { facts, id });
+                all.entry(name).or_default().push(TopicInRun { facts, id });
             }
         }
     }
-    let line = |(name, seen): (String, Vec<Seen<'_>>)| {
+    let line = |(name, seen): (String, Vec<TopicInRun<'_>>)| {
         let mut line = topic(&seen);
         line.optional = seen.len() < runs.len();
         (name, line)
@@ -163,21 +163,21 @@ fn topics(runs: &[Facts<'_>]) -> BTreeMap<String, TopicLine> {
     all.into_iter().map(line).collect()
 }
 
-fn topic(seen: &[Seen<'_>]) -> TopicLine {
-    let may_end = seen.iter().any(Seen::ends);
-    let same = |get: &dyn Fn(&Seen<'_>) -> Option<BTreeSet<String>>| {
+fn topic(seen: &[TopicInRun<'_>]) -> TopicLine {
+    let may_end = seen.iter().any(TopicInRun::ends);
+    let same = |get: &dyn Fn(&TopicInRun<'_>) -> Option<BTreeSet<String>>| {
         let first = seen.first().and_then(get)?;
         seen.iter()
             .all(|s| get(s).as_ref() == Some(&first))
             .then_some(first)
     };
     let kinds = same(&|s| Some(s.kinds())).filter(|kinds| kinds.len() == 1);
-    let mut to = seen.first().map(Seen::to).unwrap_or_default();
+    let mut to = seen.first().map(TopicInRun::to).unwrap_or_default();
     for other in seen.iter().skip(1) {
         let other = other.to();
         to.retain(|name| other.contains(name));
     }
-    let judged = |s: &Seen<'_>| s.facts.rates(s.id, may_end, s.facts.mission.span);
+    let judged = |s: &TopicInRun<'_>| s.facts.rates(s.id, may_end, s.facts.mission.span);
     let rates: Vec<Vec<Rate>> = seen.iter().map(judged).collect();
     let is_rated = rates.iter().all(|own| !own.is_empty());
     let is_even = rates.iter().all(|own| Rate::are_even(own));
@@ -192,7 +192,7 @@ fn topic(seen: &[Seen<'_>]) -> TopicLine {
     }
 }
 
-impl Seen<'_> {
+impl TopicInRun<'_> {
     fn ends(&self) -> bool {
         let heard = self.facts.heard(self.id);
         heard.is_some_and(|h| self.facts.mission.span.end.since(h.end) > SHUTDOWN_NS)

@@ -4,12 +4,12 @@ use crate::base::yaml::{BadYaml, YamlData, YamlPart, YamlPlace, parse_placed};
 
 /// A text under way.
 #[derive(Clone, Debug)]
-pub(super) struct Text(pub(super) String);
+pub(super) struct EditedText(pub(super) String);
 
 /// A pair of a mapping.
 type Pair = (String, YamlPlace, YamlPart);
 
-impl Text {
+impl EditedText {
     /// Sets `key` of an entry to `value`, both as YAML; does nothing where there is no such entry.
     pub(super) fn set(
         &mut self,
@@ -302,8 +302,8 @@ topics:
   /null:
 ";
 
-    fn edited(edit: impl Fn(&mut Text) -> Result<(), BadYaml>) -> String {
-        let mut text = Text(FILE.to_owned());
+    fn edited(edit: impl Fn(&mut EditedText) -> Result<(), BadYaml>) -> String {
+        let mut text = EditedText(FILE.to_owned());
         edit(&mut text).unwrap();
         parse_placed(&text.0).unwrap();
         text.0

@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::edit::Text;
+use super::edit::EditedText;
 use super::{Draft, NodeLine, TopicLine, length, list, scalar};
 use crate::base::error::{Error, Result};
 use crate::base::nearest::nearest;
 use crate::base::yaml::BadYaml;
 use crate::gate::facts::Facts;
-use crate::gate::finding::{Finding, Kind, Severity};
+use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::pattern::Pattern;
 use crate::gate::{Expectation, judge, read};
 use crate::mission::Mission;
@@ -36,7 +36,7 @@ pub(crate) fn update(text: &str, path: &Path, runs: &[Mission], only: &[String])
         known(name, &expectation, &draft)?;
     }
     let mut work = Work {
-        text: Text(text.to_owned()),
+        text: EditedText(text.to_owned()),
         expectation: &expectation,
         draft: &draft,
         runs,
@@ -102,31 +102,32 @@ fn broken(expectation: &Expectation, runs: &[Mission]) -> Vec<Finding> {
         .flat_map(|verdict| verdict.checks)
         .flat_map(|check| check.findings);
     let is_broken = |f: &Finding| {
-        matches!(f.severity, Severity::Error | Severity::Warning) && f.kind != Kind::AllowUnused
+        matches!(f.severity, Severity::Error | Severity::Warning)
+            && f.kind != FindingKind::AllowUnused
     };
     findings.filter(is_broken).collect()
 }
 
 /// The key that a finding is about; empty for the element itself.
-fn fact(kind: Kind) -> &'static str {
+fn fact(kind: FindingKind) -> &'static str {
     match kind {
-        Kind::NodeGone => "may_end",
-        Kind::NodeLate => "present_within",
-        Kind::NodeRestarted => "restarts",
-        Kind::NodeLifecycle => "lifecycle",
-        Kind::TopicType => "type",
-        Kind::TopicQos => "qos",
-        Kind::TopicRateLow | Kind::TopicRateHigh => "hz",
-        Kind::TopicGap => "max_gap",
-        Kind::PublisherMissing | Kind::PublisherUnexpected => "by",
-        Kind::SubscriberMissing => "to",
+        FindingKind::NodeGone => "may_end",
+        FindingKind::NodeLate => "present_within",
+        FindingKind::NodeRestarted => "restarts",
+        FindingKind::NodeLifecycle => "lifecycle",
+        FindingKind::TopicType => "type",
+        FindingKind::TopicQos => "qos",
+        FindingKind::TopicRateLow | FindingKind::TopicRateHigh => "hz",
+        FindingKind::TopicGap => "max_gap",
+        FindingKind::PublisherMissing | FindingKind::PublisherUnexpected => "by",
+        FindingKind::SubscriberMissing => "to",
         _ => "",
     }
 }
 
 /// The work under way.
 struct Work<'a> {
-    text: Text,
+    text: EditedText,
     expectation: &'a Expectation,
     draft: &'a Draft,
     runs: &'a [Mission],
@@ -137,23 +138,30 @@ impl Work<'_> {
     fn accept(&mut self, name: &str, finding: &Finding) -> Result<(), BadYaml> {
         let key = fact(finding.kind);
         match finding.kind {
-            Kind::UnexpectedNode => {
+            FindingKind::UnexpectedNode => {
                 let line = self.draft.nodes.get(name).map(NodeLine::text);
                 self.insert("nodes", name, line)
             }
-            Kind::UnexpectedTopic => {
+            FindingKind::UnexpectedTopic => {
                 let line = self.draft.topics.get(name).map(TopicLine::text);
                 self.insert("topics", name, line)
             }
-            Kind::NodeMissing => self.lost("nodes", name, self.draft.nodes.contains_key(name)),
-            Kind::TopicMissing => self.lost("topics", name, self.draft.topics.contains_key(name)),
-            Kind::NodeForbidden => self.text.drop_entry("nodes", name),
-            Kind::TopicForbidden => self.text.drop_entry("topics", name),
-            Kind::NodeGone | Kind::NodeLate | Kind::NodeRestarted | Kind::NodeLifecycle => {
+            FindingKind::NodeMissing => {
+                self.lost("nodes", name, self.draft.nodes.contains_key(name))
+            }
+            FindingKind::TopicMissing => {
+                self.lost("topics", name, self.draft.topics.contains_key(name))
+            }
+            FindingKind::NodeForbidden => self.text.drop_entry("nodes", name),
+            FindingKind::TopicForbidden => self.text.drop_entry("topics", name),
+            FindingKind::NodeGone
+            | FindingKind::NodeLate
+            | FindingKind::NodeRestarted
+            | FindingKind::NodeLifecycle => {
                 let value = self.of_node(name, key);
                 self.write("nodes", name, key, value)
             }
-            Kind::TopicQos => {
+            FindingKind::TopicQos => {
                 self.text.unset("topics", name, "qos")?;
                 self.text.unset("topics", name, "latched")
             }

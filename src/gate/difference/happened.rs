@@ -18,7 +18,7 @@ const MOST: usize = 2000;
 type Key = (Kind, String, usize);
 
 /// An entry, told without the mission.
-struct Told {
+struct ToldEntry {
     key: Key,
     time: Stamp,
     /// How far its time is not sure, in nanoseconds.
@@ -34,7 +34,7 @@ pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>) -> Vec<Difference> {
     all.extend(only(&second, &first, b, Where::Second));
     let place: BTreeMap<&Key, usize> = second.iter().zip(0..).map(|(t, at)| (&t.key, at)).collect();
     let pairs = first.iter().filter_map(|t| Some((t, *place.get(&t.key)?)));
-    let pairs: Vec<(&Told, usize)> = pairs.take(MOST).collect();
+    let pairs: Vec<(&ToldEntry, usize)> = pairs.take(MOST).collect();
     let kept = in_order(&pairs.iter().map(|(_, at)| *at).collect::<Vec<_>>());
     for (at, (one, other)) in pairs.iter().enumerate() {
         let Some(other) = second.get(*other) else {
@@ -51,7 +51,7 @@ pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>) -> Vec<Difference> {
 }
 
 /// The headlines that two runs can have in common.
-fn told(facts: &Facts<'_>) -> Vec<Told> {
+fn told(facts: &Facts<'_>) -> Vec<ToldEntry> {
     let mission = facts.mission;
     let mut many: BTreeMap<(Kind, String), usize> = BTreeMap::new();
     let mut all = Vec::new();
@@ -62,7 +62,7 @@ fn told(facts: &Facts<'_>) -> Vec<Told> {
         let count = many.entry((entry.kind, name.clone())).or_default();
         *count += 1;
         let phases = &mission.ledger.phases;
-        all.push(Told {
+        all.push(ToldEntry {
             key: (entry.kind, name, *count),
             time: entry.time,
             doubt: entry.latest.since(entry.earliest),
@@ -85,7 +85,7 @@ fn about(facts: &Facts<'_>, entry: &Entry) -> Option<String> {
 }
 
 /// What one mission tells and the other does not, of what is in both. Starts and stops there are told of the elements.
-fn only(own: &[Told], other: &[Told], facts: &Facts<'_>, side: Where) -> Vec<Difference> {
+fn only(own: &[ToldEntry], other: &[ToldEntry], facts: &Facts<'_>, side: Where) -> Vec<Difference> {
     let known: BTreeSet<&Key> = other.iter().map(|t| &t.key).collect();
     let wanted = [Kind::HandedOver, Kind::Silent, Kind::Lifecycle];
     let alone = own
@@ -111,8 +111,11 @@ fn name((kind, name, count): &Key) -> String {
 }
 
 /// Whether an entry of both stands at another time of its phase.
-fn moved((a, one): (&Facts<'_>, &Told), (b, other): (&Facts<'_>, &Told)) -> Option<Difference> {
-    let since = |facts: &Facts<'_>, told: &Told| {
+fn moved(
+    (a, one): (&Facts<'_>, &ToldEntry),
+    (b, other): (&Facts<'_>, &ToldEntry),
+) -> Option<Difference> {
+    let since = |facts: &Facts<'_>, told: &ToldEntry| {
         // The first thing of a phase begins it, so that only what follows can be early or late in it.
         let phase = facts.mission.ledger.phases.get(told.phase);
         let start = phase.map_or(facts.mission.span.start, |p| p.span.start);
@@ -121,7 +124,7 @@ fn moved((a, one): (&Facts<'_>, &Told), (b, other): (&Facts<'_>, &Told)) -> Opti
     let apart = since(a, one)
         .saturating_sub(since(b, other))
         .saturating_abs();
-    let whole = |facts: &Facts<'_>, told: &Told| facts.mission.offset(told.time);
+    let whole = |facts: &Facts<'_>, told: &ToldEntry| facts.mission.offset(told.time);
     let overall = whole(a, one)
         .saturating_sub(whole(b, other))
         .saturating_abs();
@@ -129,7 +132,7 @@ fn moved((a, one): (&Facts<'_>, &Told), (b, other): (&Facts<'_>, &Told)) -> Opti
     let apart = apart.min(overall);
     let doubt = one.doubt.saturating_add(other.doubt);
     (apart > APART_NS.saturating_add(doubt)).then(|| {
-        let at = |facts: &Facts<'_>, told: &Told| {
+        let at = |facts: &Facts<'_>, told: &ToldEntry| {
             let phase = told.phase + 1;
             format!(
                 "{} (phase {phase} + {})",

@@ -106,15 +106,15 @@ fn text(subject: &DiffSubject, all: &[Difference]) -> String {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct DifferenceJson<'a> {
     schema: &'static str,
     first: &'a str,
     second: &'a str,
-    differences: Vec<Row<'a>>,
+    differences: Vec<DifferenceRow<'a>>,
 }
 
 #[derive(Serialize)]
-struct Row<'a> {
+struct DifferenceRow<'a> {
     kind: &'static str,
     name: &'a str,
     #[serde(rename = "in")]
@@ -124,8 +124,8 @@ struct Row<'a> {
     known: bool,
 }
 
-fn row(difference: &Difference) -> Row<'_> {
-    Row {
+fn row(difference: &Difference) -> DifferenceRow<'_> {
+    DifferenceRow {
         kind: difference.kind,
         name: &difference.name,
         side: match difference.side {
@@ -140,7 +140,7 @@ fn row(difference: &Difference) -> Row<'_> {
 }
 
 fn json(subject: &DiffSubject, all: &[Difference]) -> String {
-    let report = Report {
+    let report = DifferenceJson {
         schema: "bagreel.diff/1",
         first: &subject.first,
         second: &subject.second,

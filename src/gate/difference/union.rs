@@ -29,7 +29,7 @@ const SECOND: i64 = 1_000_000_000;
 
 /// What one mission has, by role and topic.
 #[derive(Default)]
-struct Seen {
+struct MissionSide {
     nodes: BTreeMap<String, (Degree, Evidence)>,
     topics: BTreeMap<String, TopicSeen>,
     publishes: BTreeMap<(String, String), (Degree, Evidence)>,
@@ -44,7 +44,7 @@ struct TopicSeen {
     hz: Option<f64>,
 }
 
-impl Seen {
+impl MissionSide {
     fn of(mission: &Mission) -> Self {
         let facts = Facts::new(mission);
         let mut seen = Self::default();
@@ -100,14 +100,14 @@ pub(crate) fn union(
     differing: &[Difference],
     side: Side,
 ) -> Mission {
-    let (a, b) = (Seen::of(first), Seen::of(second));
+    let (a, b) = (MissionSide::of(first), MissionSide::of(second));
     let elements = elements(&a, &b);
     let at = Stamp(SECOND);
     let span = |from: i64| Span {
         start: Stamp(from),
         end: Stamp(from + SECOND),
     };
-    let window = |index: usize, span: Span, seen: &Seen| Window {
+    let window = |index: usize, span: Span, seen: &MissionSide| Window {
         index,
         span,
         partial: false,
@@ -137,7 +137,7 @@ pub(crate) fn union(
     let topics = (0..)
         .zip(&elements.topics)
         .map(|(id, t)| (t.name.as_str(), id));
-    let entries = Told {
+    let entries = UnionLedger {
         a: &a,
         b: &b,
         elements: &elements,
@@ -169,7 +169,7 @@ pub(crate) fn union(
     }
 }
 
-fn elements(a: &Seen, b: &Seen) -> Elements {
+fn elements(a: &MissionSide, b: &MissionSide) -> Elements {
     let nodes: BTreeMap<&String, Evidence> = both(&a.nodes, &b.nodes);
     let topics: BTreeSet<&String> = a.topics.keys().chain(b.topics.keys()).collect();
     let node_places: BTreeMap<&String, u32> = nodes.keys().copied().zip(0..).collect();
@@ -240,7 +240,7 @@ fn both<'a, K: Ord>(
     all
 }
 
-fn graph(elements: &Elements, seen: &Seen) -> Graph {
+fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
     let node = |id: u32| elements.nodes[id as usize].name.to_string();
     let topic = |id: u32| elements.topics[id as usize].name.to_string();
     let edge = |id: u32, known: Option<&(Degree, Evidence)>| {
@@ -294,9 +294,9 @@ fn graph(elements: &Elements, seen: &Seen) -> Graph {
 }
 
 /// The ledger under way.
-struct Told<'a> {
-    a: &'a Seen,
-    b: &'a Seen,
+struct UnionLedger<'a> {
+    a: &'a MissionSide,
+    b: &'a MissionSide,
     elements: &'a Elements,
     differing: &'a [Difference],
     turned: Turned<'a>,
@@ -319,7 +319,7 @@ fn turned(differing: &[Difference]) -> Turned<'_> {
         .collect()
 }
 
-impl Told<'_> {
+impl UnionLedger<'_> {
     fn all(mut self) -> Vec<Entry> {
         let mut wholes: BTreeMap<u32, EntryId> = BTreeMap::new();
         for (id, node) in (0..).zip(&self.elements.nodes) {
@@ -401,7 +401,7 @@ impl Told<'_> {
         };
         match (difference.kind, node, topic) {
             ("rate", _, Some(topic)) => {
-                let hz = |seen: &Seen| seen.topics.get(&difference.name).and_then(|t| t.hz);
+                let hz = |seen: &MissionSide| seen.topics.get(&difference.name).and_then(|t| t.hz);
                 if let (Some(from_hz), Some(to_hz)) = (hz(self.a), hz(self.b)) {
                     let rates = Detail::Rates { from_hz, to_hz };
                     self.add(Kind::Rate, Element::Topic(topic), rates, None);

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::fields::{Document, Fields};
 use super::{
-    Allowance, Closed, Demand, Event, EventKind, Expectation, Named, NodeFacts, Policy, Rule,
-    SCHEMA, TopicFacts, While, YamlPlace,
+    AllowedFinding, Demand, Event, EventKind, Expectation, Named, NodeFacts, Policy, Rule, SCHEMA,
+    TopicFacts, Unlisted, While, YamlPlace,
 };
 use crate::base::error::Result;
 use crate::base::time::{Moment, Period, Stamp};
 use crate::base::yaml::{YamlPart, parse_placed};
-use crate::gate::Kind;
+use crate::gate::FindingKind;
 use crate::gate::pattern::Pattern;
 
 /// The keys of the whole file.
@@ -146,19 +146,19 @@ pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
 fn policy(file: &Fields<'_>, top: YamlPlace) -> Result<Policy> {
     let mut policy = Policy {
         at: top,
-        nodes: Closed::Allow,
-        topics: Closed::Allow,
-        publishers: Closed::Error,
+        nodes: Unlisted::Allow,
+        topics: Unlisted::Allow,
+        publishers: Unlisted::Error,
     };
     let Some(part) = file.get("policy") else {
         return Ok(policy);
     };
     let fields = file.document.fields(part, "`policy`", POLICY)?;
-    let closed = |key: &str, usual: Closed| {
+    let closed = |key: &str, usual: Unlisted| {
         let parse = |text: &str| match text {
-            "allow" => Some(Closed::Allow),
-            "warn" => Some(Closed::Warn),
-            "error" => Some(Closed::Error),
+            "allow" => Some(Unlisted::Allow),
+            "warn" => Some(Unlisted::Warn),
+            "error" => Some(Unlisted::Error),
             _ => None,
         };
         let found = fields.read(key, "write `allow`, `warn` or `error`", parse)?;
@@ -382,17 +382,17 @@ fn event(rule: &Fields<'_>, key: &str) -> Result<Event> {
     })
 }
 
-fn allowance(document: Document<'_>, part: &YamlPart) -> Result<Allowance> {
+fn allowance(document: Document<'_>, part: &YamlPart) -> Result<AllowedFinding> {
     let fields = document.fields(part, "an allowance", ALLOW)?;
     let finding = fields.need("finding", "name the finding, such as `topic-rate-low`")?;
     let word = document.text(finding, "`finding`")?;
-    let kind = Kind::from_word(word);
-    let unknown = || document.unknown(finding.at, "finding", word, Kind::words());
+    let kind = FindingKind::from_word(word);
+    let unknown = || document.unknown(finding.at, "finding", word, FindingKind::words());
     let hint = "every allowance says why, for those who come after";
     fields.need("why", hint)?;
     fields.need("name", "name the node or topic")?;
     let date = "write a date: `2027-01-31`, or RFC 3339";
-    Ok(Allowance {
+    Ok(AllowedFinding {
         at: part.at,
         finding: kind.ok_or_else(unknown)?,
         name: fields
@@ -445,7 +445,7 @@ mod tests {
             (all.nodes.len(), all.topics.len(), all.rules.len()),
             (4, 2, 6)
         );
-        assert_eq!(all.policy.nodes, Closed::Warn);
+        assert_eq!(all.policy.nodes, Unlisted::Warn);
         let scan = &all.topics[0];
         assert_eq!((scan.at.line, scan.at.column), (11, 3));
         assert_eq!(scan.facts.hz.as_ref().map(|hz| hz.at.line), Some(11));

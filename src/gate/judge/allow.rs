@@ -3,8 +3,8 @@
 use super::{Checked, Judge};
 use crate::base::time::Stamp;
 use crate::base::words;
-use crate::gate::expectation::Allowance;
-use crate::gate::finding::{Finding, Kind, Severity};
+use crate::gate::expectation::AllowedFinding;
+use crate::gate::finding::{Finding, FindingKind, Severity};
 
 impl Judge<'_> {
     /// Forgives what is allowed, and tells of allowances that forgave nothing.
@@ -16,7 +16,7 @@ impl Judge<'_> {
                 let name = allowance.name.as_str();
                 let word = allowance.finding.word();
                 let says = format!("the allowance of {word} for {name} forgave nothing");
-                let mut finding = Finding::new(Kind::AllowUnused, name, allowance.at, says)
+                let mut finding = Finding::new(FindingKind::AllowUnused, name, allowance.at, says)
                     .saw("nothing", word)
                     .hint("remove it");
                 finding.severity = Severity::Warning;
@@ -30,7 +30,7 @@ impl Judge<'_> {
 }
 
 /// Forgives the findings that an allowance means; answers whether there were any.
-fn forgive(checks: &mut [Checked], allowance: &Allowance, start: Stamp) -> bool {
+fn forgive(checks: &mut [Checked], allowance: &AllowedFinding, start: Stamp) -> bool {
     let mut is_used = false;
     let all = checks.iter_mut().flat_map(|c| &mut c.findings);
     for finding in all.filter(|f| f.kind == allowance.finding && allowance.name.matches(&f.name)) {

@@ -5,7 +5,7 @@ use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{Named, NodeFacts, YamlPlace};
 use crate::gate::facts::SHUTDOWN_NS;
-use crate::gate::finding::{Cause, Finding, Kind};
+use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::graph::NodeId;
 use crate::mission::ledger;
@@ -62,12 +62,12 @@ impl Judge<'_> {
     pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
         let roles = self.facts.nodes(pattern);
         if roles.is_empty() && !self.facts.names_nodes() {
-            return vec![self.unnamed(Kind::NodeForbidden, pattern.as_str(), at)];
+            return vec![self.unnamed(FindingKind::NodeForbidden, pattern.as_str(), at)];
         }
         let found = roles.into_iter().map(|(role, nodes)| {
             let lives = self.facts.lives(nodes);
             let finding = Finding::new(
-                Kind::NodeForbidden,
+                FindingKind::NodeForbidden,
                 role,
                 at,
                 format!("{role} is in the bag, and `{pattern}` is forbidden"),
@@ -96,7 +96,7 @@ impl Judge<'_> {
             return match (facts.optional, self.facts.names_nodes()) {
                 (true, _) => Vec::new(),
                 (false, true) => vec![self.missing(pattern, at)],
-                (false, false) => vec![self.unnamed(Kind::NodeMissing, name, at)],
+                (false, false) => vec![self.unnamed(FindingKind::NodeMissing, name, at)],
             };
         }
         if facts.may_end {
@@ -109,7 +109,7 @@ impl Judge<'_> {
     }
 
     /// That the bag does not tell whether a node is there.
-    fn unnamed(&self, kind: Kind, name: &str, at: YamlPlace) -> Finding {
+    fn unnamed(&self, kind: FindingKind, name: &str, at: YamlPlace) -> Finding {
         let (why, hint) = if self.facts.is_rewritten() {
             (
                 "a tool merged the senders of this bag",
@@ -138,7 +138,7 @@ impl Judge<'_> {
         let name = pattern.as_str();
         let roles = self.facts.roles().map(|(role, _)| role);
         let mut finding = Finding::new(
-            Kind::NodeMissing,
+            FindingKind::NodeMissing,
             name,
             at,
             format!("{name} is not in the bag"),
@@ -159,7 +159,7 @@ impl Judge<'_> {
         }
         let clock = self.facts.clock(end);
         let finding = Finding::new(
-            Kind::NodeGone,
+            FindingKind::NodeGone,
             role,
             at,
             format!("{role} ended at {clock}, expected to stay"),
@@ -199,10 +199,10 @@ impl Judge<'_> {
                 let says = format!(
                     "cannot tell whether {role} appeared {expected}: its first sign is at {clock}"
                 );
-                return Some(Finding::unknown(Kind::NodeLate, role, at, says));
+                return Some(Finding::unknown(FindingKind::NodeLate, role, at, says));
             }
             let says = format!("{role} appeared at {clock}, expected {expected}");
-            let finding = Finding::new(Kind::NodeLate, role, at, says);
+            let finding = Finding::new(FindingKind::NodeLate, role, at, says);
             Some(finding.saw(format!("at {clock}"), &expected).at(Span {
                 start,
                 end: began.time,
@@ -222,8 +222,8 @@ impl Judge<'_> {
             }
             let many = words::count(entries.len(), "time");
             let says = format!("{role} restarted {many}, expected {}", range.value);
-            let mut finding =
-                Finding::new(Kind::NodeRestarted, role, at, says).saw(entries.len(), range.value);
+            let mut finding = Finding::new(FindingKind::NodeRestarted, role, at, says)
+                .saw(entries.len(), range.value);
             for entry in entries.iter().take(6) {
                 let until = entry.until.unwrap_or(entry.time);
                 let away = words::duration(until.since(entry.time).max(0));
@@ -255,11 +255,11 @@ impl Judge<'_> {
                 Some(seen) if *seen == *expected => None,
                 Some(seen) => {
                     let says = format!("{role} ends {seen}, expected {expected}");
-                    Some(Finding::new(Kind::NodeLifecycle, role, at, says).saw(seen, expected))
+                    Some(Finding::new(FindingKind::NodeLifecycle, role, at, says).saw(seen, expected))
                 }
                 None => Some(
                     Finding::unknown(
-                        Kind::NodeLifecycle,
+                        FindingKind::NodeLifecycle,
                         role,
                         at,
                         format!("cannot tell whether {role} is {expected}: this bag has no transition of it"),

@@ -2,7 +2,7 @@
 
 use super::Judge;
 use crate::gate::expectation::Demand;
-use crate::gate::finding::{Finding, Kind};
+use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::pattern::{NamePatterns, Pattern};
 use crate::graph::NodeId;
 
@@ -37,7 +37,7 @@ impl Judge<'_> {
                 format!("{name} (role {role}) is not in {file}")
             };
             let policy = self.expectation.policy;
-            let mut finding = Finding::new(Kind::UnexpectedNode, role, policy.at, says)
+            let mut finding = Finding::new(FindingKind::UnexpectedNode, role, policy.at, says)
                 .saw("present", "not named");
             finding.severity = policy.nodes.severity().unwrap_or(finding.severity);
             finding.accept = Some(role.to_owned());
@@ -75,7 +75,7 @@ impl Judge<'_> {
                 continue;
             }
             let says = format!("{name} is not in {}", self.expectation.file.display());
-            let mut finding = Finding::new(Kind::UnexpectedTopic, name, policy.at, says)
+            let mut finding = Finding::new(FindingKind::UnexpectedTopic, name, policy.at, says)
                 .saw("present", "not named");
             finding.severity = policy.topics.severity().unwrap_or(finding.severity);
             finding.accept = Some(name.to_owned());

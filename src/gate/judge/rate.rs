@@ -5,7 +5,7 @@ use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{TopicFacts, While, YamlPlace};
 use crate::gate::facts::{Rate, TopicSilence};
-use crate::gate::finding::{Finding, Kind};
+use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::range::Range;
 use crate::graph::TopicId;
 
@@ -33,7 +33,10 @@ impl Judge<'_> {
         if (low.len() + high.len()) as f64 <= allowed {
             return Vec::new();
         }
-        let told = [(Kind::TopicRateLow, low), (Kind::TopicRateHigh, high)];
+        let told = [
+            (FindingKind::TopicRateLow, low),
+            (FindingKind::TopicRateHigh, high),
+        ];
         told.iter()
             .filter_map(|(kind, bad)| self.off(topic, *kind, bad, rates.len(), range, at))
             .collect()
@@ -46,7 +49,7 @@ impl Judge<'_> {
         }
         let name = self.facts.topic(topic);
         let says = format!("cannot tell the rate of {name}: no whole window of it can be judged");
-        let finding = Finding::unknown(Kind::TopicRateLow, name, at, says);
+        let finding = Finding::unknown(FindingKind::TopicRateLow, name, at, says);
         vec![finding.hint("take a shorter period: `period: 5s`, or `--period 5`")]
     }
 
@@ -94,7 +97,7 @@ impl Judge<'_> {
     fn off(
         &self,
         topic: TopicId,
-        kind: Kind,
+        kind: FindingKind,
         bad: &[Rate],
         judged: usize,
         range: Range,
@@ -110,7 +113,7 @@ impl Judge<'_> {
         let nanos: i64 = bad.iter().map(|r| r.span.nanos()).sum();
         let hz = words::rate(count as f64 / (nanos.max(1) as f64 / 1e9));
         let by = |a: &&Rate, b: &&Rate| a.hz().total_cmp(&b.hz());
-        let (word, worst) = if kind == Kind::TopicRateLow {
+        let (word, worst) = if kind == FindingKind::TopicRateLow {
             ("lowest", bad.iter().min_by(by)?)
         } else {
             ("highest", bad.iter().max_by(by)?)
@@ -152,7 +155,7 @@ impl Judge<'_> {
         let name = self.facts.topic(topic);
         let (seen, expected) = (words::duration(*nanos), words::duration(most));
         let says = format!("{name} was silent for {seen}, expected at most {expected}");
-        let mut finding = Finding::new(Kind::TopicGap, name, at, says)
+        let mut finding = Finding::new(FindingKind::TopicGap, name, at, says)
             .saw(seen, format!("at most {expected}"))
             .at(*span)
             .detail(format!("within {}", self.facts.stretch(*span)));

@@ -6,7 +6,7 @@ use crate::base::words;
 use crate::gate::expectation::{
     At, Demand, Event, EventKind, NodeFacts, Rule, TopicFacts, YamlPlace,
 };
-use crate::gate::finding::{Cause, Finding, Kind};
+use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::{During, Range};
 use crate::graph::lives::Bound;
@@ -100,7 +100,7 @@ impl Judge<'_> {
             let Some(began) = began.min_by_key(|bound| bound.time) else {
                 let says = format!("{} never appeared, expected in order", name.value);
                 let mut finding =
-                    Finding::new(Kind::OrderBroken, name.value.as_str(), name.at, says)
+                    Finding::new(FindingKind::OrderBroken, name.value.as_str(), name.at, says)
                         .saw("absent", order_of(names));
                 finding.cause = Some(absence(name.value.as_str()));
                 found.push(finding);
@@ -127,7 +127,7 @@ impl Judge<'_> {
         if began.latest >= earlier.earliest {
             let says =
                 format!("cannot tell whether {other} appeared after {one}: the times overlap");
-            return Finding::unknown(Kind::OrderBroken, other, second.at, says);
+            return Finding::unknown(FindingKind::OrderBroken, other, second.at, says);
         }
         let says = format!(
             "{other} appeared at {}, expected after {one} at {}",
@@ -135,7 +135,7 @@ impl Judge<'_> {
             at(earlier)
         );
         let seen = format!("{other} at {}, {one} at {}", at(began), at(earlier));
-        Finding::new(Kind::OrderBroken, other, second.at, says)
+        Finding::new(FindingKind::OrderBroken, other, second.at, says)
             .saw(seen, order_of(names))
             .at(Span {
                 start: began.time,
@@ -184,10 +184,10 @@ impl Judge<'_> {
                 "cannot tell whether {name} {} in time after {what} at {clock}: the times overlap",
                 past(expect)
             );
-            return Finding::unknown(Kind::ReactionMissing, name, at, says);
+            return Finding::unknown(FindingKind::ReactionMissing, name, at, says);
         }
         let says = format!("{what} at {clock}, and {expected} did not follow");
-        let mut finding = Finding::new(Kind::ReactionMissing, name, at, says)
+        let mut finding = Finding::new(FindingKind::ReactionMissing, name, at, says)
             .saw("nothing", expected)
             .at(Span {
                 start: cause.time,
@@ -221,7 +221,7 @@ impl Judge<'_> {
             self.facts.clock(span.start),
             self.facts.clock(span.end)
         );
-        let mut finding = Finding::new(Kind::TooManyChanges, "reconfigurations", at, says)
+        let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, says)
             .saw(entries.len(), many)
             .at(span);
         for (id, entry) in entries.iter().take(TOLD) {

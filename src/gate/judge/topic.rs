@@ -5,7 +5,7 @@ use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::Degree;
 use crate::gate::expectation::{At, Named, TopicFacts, YamlPlace};
-use crate::gate::finding::{Finding, Kind};
+use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::graph::TopicId;
 
@@ -72,7 +72,7 @@ impl Judge<'_> {
             let name = self.facts.topic(topic);
             let says = format!("{name} is in the bag, and `{pattern}` is forbidden");
             let many = usize::try_from(self.facts.messages(topic)).unwrap_or(usize::MAX);
-            Finding::new(Kind::TopicForbidden, name, at, says)
+            Finding::new(FindingKind::TopicForbidden, name, at, says)
                 .saw("present", "absent")
                 .detail(words::count(many, "message"))
         });
@@ -93,7 +93,8 @@ impl Judge<'_> {
         let names = topics.map(|t| t.name.as_str()).filter(|n| *n != name);
         let near = self.near(pattern, names);
         let says = format!("{name} is not in the bag");
-        let mut finding = Finding::new(Kind::TopicMissing, name, at, says).saw("absent", "present");
+        let mut finding =
+            Finding::new(FindingKind::TopicMissing, name, at, says).saw("absent", "present");
         // Where its publisher is missing too, that is why.
         let by = facts.by.iter().flat_map(|by| &by.value);
         let mut lost = by.filter(|by| self.facts.nodes(&by.value).is_empty());
@@ -120,14 +121,14 @@ impl Judge<'_> {
         if types.is_empty() {
             let says =
                 format!("cannot tell whether {name} is a {expected}: this bag tells no type of it");
-            return vec![Finding::unknown(Kind::TopicType, name, at, says)];
+            return vec![Finding::unknown(FindingKind::TopicType, name, at, says)];
         }
         if other.is_empty() {
             return Vec::new();
         }
         let seen = words::some_of(&other, NAMED);
         let says = format!("{name} is a {seen}, expected {expected}");
-        vec![Finding::new(Kind::TopicType, name, at, says).saw(seen, expected)]
+        vec![Finding::new(FindingKind::TopicType, name, at, says).saw(seen, expected)]
     }
 
     fn publishers(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Finding> {
@@ -161,8 +162,8 @@ impl Judge<'_> {
             }
             let role = self.facts.role(*node);
             let says = format!("{name} also from {role}, expected only {expected}");
-            let mut finding =
-                Finding::new(Kind::PublisherUnexpected, name, by.at, says).saw(role, &expected);
+            let mut finding = Finding::new(FindingKind::PublisherUnexpected, name, by.at, says)
+                .saw(role, &expected);
             finding.severity = severity;
             let lives = self.facts.lives(&[*node]);
             if let (Some(first), Some(last)) = (lives.first(), lives.last()) {
@@ -184,7 +185,7 @@ impl Judge<'_> {
     fn no_publisher(&self, topic: TopicId, wanted: &At<Pattern>) -> Finding {
         let name = self.facts.topic(topic);
         let who = wanted.value.as_str();
-        let kind = Kind::PublisherMissing;
+        let kind = FindingKind::PublisherMissing;
         if !self.facts.tells_publishers(topic) {
             let says = format!(
                 "cannot tell whether {who} publishes {name}: this bag does not say who does"
@@ -227,7 +228,7 @@ impl Judge<'_> {
         {
             return None;
         }
-        let kind = Kind::SubscriberMissing;
+        let kind = FindingKind::SubscriberMissing;
         let roles = self.facts.nodes(&wanted.value);
         let nodes: Vec<_> = roles
             .iter()
@@ -262,12 +263,12 @@ impl Judge<'_> {
             Some(seen) if seen == wanted.value => Vec::new(),
             Some(seen) => {
                 let says = format!("{name} is {}, expected {expected}", word(seen));
-                vec![Finding::new(Kind::TopicQos, name, at, says).saw(word(seen), expected)]
+                vec![Finding::new(FindingKind::TopicQos, name, at, says).saw(word(seen), expected)]
             }
             None => {
                 let says =
                     format!("cannot tell whether {name} is {expected}: this bag does not say");
-                vec![Finding::unknown(Kind::TopicQos, name, at, says)]
+                vec![Finding::unknown(FindingKind::TopicQos, name, at, says)]
             }
         }
     }
@@ -282,13 +283,13 @@ impl Judge<'_> {
             let says = format!(
                 "cannot tell whether {name} is {expected}: this bag has no quality of service"
             );
-            return vec![Finding::unknown(Kind::TopicQos, name, at, says)];
+            return vec![Finding::unknown(FindingKind::TopicQos, name, at, says)];
         };
         let has = |word: &str| seen.split_whitespace().any(|own| own == word);
         if expected.split_whitespace().all(has) {
             return Vec::new();
         }
         let says = format!("{name} is {seen}, expected {expected}");
-        vec![Finding::new(Kind::TopicQos, name, at, says).saw(seen, expected)]
+        vec![Finding::new(FindingKind::TopicQos, name, at, says).saw(seen, expected)]
     }
 }

@@ -8,7 +8,7 @@ use crate::gate::judge::{Checked, Judgement, Verdict};
 use crate::mission::info::json;
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct FindingsJson<'a> {
     schema: &'static str,
     bags: &'a [String],
     expectation: &'a str,
@@ -21,11 +21,11 @@ struct Report<'a> {
     unknown: usize,
     allowed: usize,
     kept: usize,
-    rules: Vec<Rule<'a>>,
+    rules: Vec<RuleJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct Rule<'a> {
+struct RuleJson<'a> {
     #[serde(rename = "rule")]
     title: &'a str,
     line: usize,
@@ -56,7 +56,7 @@ struct Found<'a> {
 /// The report; ends in a new line.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let mission = subject.mission;
-    let report = Report {
+    let report = FindingsJson {
         schema: "bagreel.check/1",
         bags: &subject.bags,
         expectation: &subject.file,
@@ -74,8 +74,8 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     json(&report)
 }
 
-fn rule(check: &Checked) -> Rule<'_> {
-    Rule {
+fn rule(check: &Checked) -> RuleJson<'_> {
+    RuleJson {
         title: &check.title,
         line: check.place.line,
         column: check.place.column,

@@ -6,7 +6,7 @@ use super::{Subject, grouped, mermaid};
 use crate::base::words;
 use crate::export::report::escape::{address, code, plain};
 use crate::gate::facts::Facts;
-use crate::gate::finding::{Finding, Kind, Severity};
+use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::judge::{Judgement, Verdict};
 
 /// The most bytes of each part; together with a chart they stay below 256 KiB, a quarter of what a job's summary may hold.
@@ -128,7 +128,7 @@ fn row(facts: &Facts<'_>, finding: &Finding) -> String {
     };
     let when = match finding.when {
         Some(span) => facts.stretch(span),
-        None if finding.kind == Kind::NodeLifecycle => "at the end".to_owned(),
+        None if finding.kind == FindingKind::NodeLifecycle => "at the end".to_owned(),
         None => "–".to_owned(),
     };
     let cell = |text: &str| {

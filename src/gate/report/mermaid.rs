@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use crate::export::mermaid::escaped;
 use crate::gate::facts::Facts;
-use crate::gate::finding::{Finding, Kind};
+use crate::gate::finding::{Finding, FindingKind};
 use crate::graph::Edge;
 
 /// The most edges that are drawn.
@@ -18,11 +18,11 @@ const MOST_BOXES: usize = 36 << 10;
 const LONGEST: usize = 80;
 
 /// A box: whether it is a topic, and its name.
-type Item<'a> = (bool, &'a str);
+type MermaidBox<'a> = (bool, &'a str);
 
 /// What became of a box.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Class {
+enum BoxFate {
     Gone,
     New,
     Changed,
@@ -30,14 +30,14 @@ enum Class {
 
 /// The chart; `None` where nothing that was found has a place in the graph. Ends in a new line.
 pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
-    let mut marked: BTreeMap<Item<'_>, (Class, &str)> = BTreeMap::new();
+    let mut marked: BTreeMap<MermaidBox<'_>, (BoxFate, &str)> = BTreeMap::new();
     for finding in findings {
         if let Some((item, class)) = class(finding) {
             marked.entry(item).or_insert((class, label(finding)));
         }
     }
     let edges = edges(facts, &marked, findings);
-    let mut items: BTreeSet<Item<'_>> = edges.iter().flat_map(|(a, b, _)| [*a, *b]).collect();
+    let mut items: BTreeSet<MermaidBox<'_>> = edges.iter().flat_map(|(a, b, _)| [*a, *b]).collect();
     items.extend(marked.keys().take(MOST_ITEMS));
     if items.is_empty() {
         return None;
@@ -45,27 +45,32 @@ pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> 
     Some(written(&items, &marked, &edges))
 }
 
-fn class(finding: &Finding) -> Option<(Item<'_>, Class)> {
+fn class(finding: &Finding) -> Option<(MermaidBox<'_>, BoxFate)> {
     let class = match finding.kind {
-        Kind::NodeMissing | Kind::NodeGone | Kind::TopicMissing => Class::Gone,
-        Kind::UnexpectedNode
-        | Kind::UnexpectedTopic
-        | Kind::NodeForbidden
-        | Kind::TopicForbidden => Class::New,
-        Kind::OrderBroken | Kind::ReactionMissing | Kind::TooManyChanges | Kind::AllowUnused => {
+        FindingKind::NodeMissing | FindingKind::NodeGone | FindingKind::TopicMissing => {
+            BoxFate::Gone
+        }
+        FindingKind::UnexpectedNode
+        | FindingKind::UnexpectedTopic
+        | FindingKind::NodeForbidden
+        | FindingKind::TopicForbidden => BoxFate::New,
+        FindingKind::OrderBroken
+        | FindingKind::ReactionMissing
+        | FindingKind::TooManyChanges
+        | FindingKind::AllowUnused => {
             return None;
         }
-        _ => Class::Changed,
+        _ => BoxFate::Changed,
     };
     let is_node = matches!(
         finding.kind,
-        Kind::NodeMissing
-            | Kind::NodeGone
-            | Kind::NodeForbidden
-            | Kind::NodeLate
-            | Kind::NodeRestarted
-            | Kind::NodeLifecycle
-            | Kind::UnexpectedNode
+        FindingKind::NodeMissing
+            | FindingKind::NodeGone
+            | FindingKind::NodeForbidden
+            | FindingKind::NodeLate
+            | FindingKind::NodeRestarted
+            | FindingKind::NodeLifecycle
+            | FindingKind::UnexpectedNode
     );
     Some(((!is_node, &finding.name), class))
 }
@@ -73,7 +78,9 @@ fn class(finding: &Finding) -> Option<(Item<'_>, Class)> {
 /// What stands behind the name in its box.
 fn label(finding: &Finding) -> &str {
     match finding.kind {
-        Kind::TopicRateLow | Kind::TopicRateHigh | Kind::NodeLifecycle => &finding.seen,
+        FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle => {
+            &finding.seen
+        }
         _ => "",
     }
 }
@@ -81,20 +88,20 @@ fn label(finding: &Finding) -> &str {
 /// Edges of what is marked, and those that are missing; the latter first, and dotted.
 fn edges<'a>(
     facts: &Facts<'a>,
-    marked: &BTreeMap<Item<'_>, (Class, &str)>,
+    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, &str)>,
     findings: &[&'a Finding],
-) -> Vec<(Item<'a>, Item<'a>, bool)> {
+) -> Vec<(MermaidBox<'a>, MermaidBox<'a>, bool)> {
     let mut all = Vec::new();
     for finding in findings {
         match finding.kind {
-            Kind::PublisherMissing => {
+            FindingKind::PublisherMissing => {
                 all.push((
                     (false, finding.expected.as_str()),
                     (true, finding.name.as_str()),
                     true,
                 ));
             }
-            Kind::SubscriberMissing => {
+            FindingKind::SubscriberMissing => {
                 all.push((
                     (true, finding.name.as_str()),
                     (false, finding.expected.as_str()),
@@ -111,7 +118,7 @@ fn edges<'a>(
             (true, facts.topic(edge.topic)),
         )
     };
-    let touches = |(node, topic): &(Item<'_>, Item<'_>), edge: &Edge| {
+    let touches = |(node, topic): &(MermaidBox<'_>, MermaidBox<'_>), edge: &Edge| {
         let own = marked.contains_key(node) || marked.contains_key(topic);
         let is_named = !edge.evidence.is_guess();
         own && is_named && !facts.is_tool(&[edge.node]) && !facts.is_housekeeping(edge.topic)
@@ -135,14 +142,14 @@ fn edges<'a>(
 }
 
 fn written(
-    items: &BTreeSet<Item<'_>>,
-    marked: &BTreeMap<Item<'_>, (Class, &str)>,
-    edges: &[(Item<'_>, Item<'_>, bool)],
+    items: &BTreeSet<MermaidBox<'_>>,
+    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, &str)>,
+    edges: &[(MermaidBox<'_>, MermaidBox<'_>, bool)],
 ) -> String {
-    let mut place: BTreeMap<&Item<'_>, usize> = BTreeMap::new();
+    let mut place: BTreeMap<&MermaidBox<'_>, usize> = BTreeMap::new();
     let mut out = String::from("flowchart LR\n");
     // What is marked before what it touches.
-    let (mut order, rest): (Vec<&Item<'_>>, Vec<&Item<'_>>) =
+    let (mut order, rest): (Vec<&MermaidBox<'_>>, Vec<&MermaidBox<'_>>) =
         items.iter().partition(|i| marked.contains_key(i));
     order.extend(rest);
     for item in order {
@@ -153,9 +160,9 @@ fn written(
         let more = mark.map_or("", |(_, label)| *label);
         let text = escaped(format!("{name} {more}").trim_end());
         let class = match mark {
-            Some((Class::Gone, _)) => ":::gone",
-            Some((Class::New, _)) => ":::new",
-            Some((Class::Changed, _)) => ":::changed",
+            Some((BoxFate::Gone, _)) => ":::gone",
+            Some((BoxFate::New, _)) => ":::new",
+            Some((BoxFate::Changed, _)) => ":::changed",
             None => "",
         };
         let line = format!("  i{at}{open}\"{text}\"{close}{class}\n");

@@ -26,7 +26,7 @@ const MOST_HELD_IN_ALL: usize = 64 << 20;
 
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
     let range = job.range(watch)?;
-    let mut tables = Tables {
+    let mut tables = FieldTables {
         folder: Folder::create(job.target.path())?,
         format: job.format,
         all: Vec::new(),
@@ -79,7 +79,7 @@ impl Lost {
 }
 
 /// One table: messages of one topic and one type, of any number of publishers and bags.
-struct Table {
+struct FieldTable {
     topic: String,
     type_name: String,
     decoder: Decoder,
@@ -91,20 +91,20 @@ struct Table {
 }
 
 /// All tables.
-struct Tables {
+struct FieldTables {
     folder: Folder,
     format: TableFormat,
-    all: Vec<Table>,
+    all: Vec<FieldTable>,
     /// Names of files, in lower case: some systems know no other.
     names: BTreeSet<String>,
     waiting: usize,
     failed: Option<io::Error>,
 }
 
-impl Tables {
+impl FieldTables {
     /// The place of the table for such messages.
     fn of(&mut self, connection: &Connection, decoder: Decoder) -> usize {
-        let same = |t: &Table| {
+        let same = |t: &FieldTable| {
             t.topic == connection.topic.as_str()
                 && *t.type_name == *connection.type_name
                 && t.decoder == decoder
@@ -113,7 +113,7 @@ impl Tables {
             return at;
         }
         let columns = std::iter::once(TableColumn::full(TIME, ColumnKind::Time, 0));
-        self.all.push(Table {
+        self.all.push(FieldTable {
             topic: connection.topic.as_str().to_owned(),
             type_name: connection.type_name.as_ref().to_owned(),
             batch: Batch::of(columns.chain(decoder.columns(&[TIME]))),
@@ -241,7 +241,7 @@ impl Tables {
 }
 
 /// Where the messages of one connection go.
-struct Source {
+struct MessageTarget {
     topic: String,
     type_name: String,
     /// The table, or why there is none; neither for topics that are not asked for.
@@ -253,9 +253,9 @@ struct Source {
 /// Takes in one bag.
 struct OfBag<'a> {
     job: &'a Extract,
-    tables: &'a mut Tables,
+    tables: &'a mut FieldTables,
     lost: &'a mut Lost,
-    sources: Vec<Source>,
+    sources: Vec<MessageTarget>,
     watch: &'a mut dyn Watch,
 }
 
@@ -291,7 +291,7 @@ impl Sink for OfBag<'_> {
             Some(Ok(_)) => Want::Payload,
             _ => Want::Stamps,
         };
-        self.sources.push(Source {
+        self.sources.push(MessageTarget {
             topic: connection.topic.as_str().to_owned(),
             type_name: connection.type_name.as_ref().to_owned(),
             table,

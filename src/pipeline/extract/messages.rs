@@ -54,7 +54,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
 }
 
 /// Where messages come from: what stands in all rows of one connection.
-struct Source {
+struct RowSource {
     topic: TopicName,
     type_name: Arc<str>,
     publisher: Option<Arc<str>>,
@@ -67,14 +67,14 @@ struct Source {
 struct Taken {
     stamps: Stamps,
     /// By place: the series of this number.
-    sources: Vec<Source>,
+    sources: Vec<RowSource>,
     series: Vec<SeriesId>,
     notices: Notices,
 }
 
 impl Taken {
     fn add(&mut self, connection: &Connection, is_sized: bool) -> SeriesId {
-        self.sources.push(Source {
+        self.sources.push(RowSource {
             topic: connection.topic.clone(),
             type_name: Arc::clone(&connection.type_name),
             publisher: connection.publisher.as_ref().map(NodeName::shared),
@@ -153,7 +153,7 @@ fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Wat
     Ok(rows)
 }
 
-fn row<'a>(source: &'a Source, timed: &Timed) -> [TableCell<'a>; 5] {
+fn row<'a>(source: &'a RowSource, timed: &Timed) -> [TableCell<'a>; 5] {
     [
         TableCell::Time(timed.time),
         TableCell::text(source.topic.as_str()),
