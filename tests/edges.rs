@@ -704,3 +704,20 @@ fn what_the_user_states_and_headers_say_is_among_the_evidence() {
     let sources: BTreeSet<_> = built.lines.into_iter().map(|piece| piece.source).collect();
     assert_eq!(sources, ["connection", "topology"].into());
 }
+
+#[test]
+fn who_sends_nothing_in_the_time_that_is_read_is_declared() {
+    let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("x.json");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_bagreel"));
+    command.args(["render", bag, "--end", "30", "--period", "10", "-q", "-o"]);
+    assert!(command.arg(&json).status().unwrap().success());
+    let mission: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    let nodes = mission["windows"][0]["nodes"].as_array().unwrap();
+    let state = |name: &str| nodes.iter().find(|n| n["name"] == name).unwrap()["state"].clone();
+    // It starts in the fifth minute; the bag names it in its headers.
+    assert_eq!(state("/robot1/dock_controller"), "declared");
+    assert_eq!(state("/robot1/amcl"), "active");
+}

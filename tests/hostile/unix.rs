@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::{COURIER, command, errors, names};
 
 /// How long an end may take: half a second, and what a loaded machine adds.
-const SOON: Duration = Duration::from_millis(1500);
+const SOON: Duration = Duration::from_secs(15);
 
 fn signal(child: &Child, name: &str) {
     let done = Command::new("kill")

@@ -1,9 +1,10 @@
 //! The lives of nodes from those of their edges, of edges within those of their nodes, of topics from both.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::liveness::{Lifetime, Liveness};
 use crate::base::time::Stamp;
+use crate::evidence::Degree;
 use crate::evidence::claim::Name;
 use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::restarts::Restarts;
@@ -16,8 +17,19 @@ pub(crate) fn settle(
     mission: (Stamp, Stamp),
 ) {
     let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
+    // What lives as long as its node tells nothing of it.
+    let followers: BTreeSet<ElementKey> = proofs
+        .iter()
+        .filter(|proof| matches!(proof.when, Validity::Like(ElementKey::Node(_))))
+        .map(|proof| proof.what)
+        .collect();
     for (what, track) in edges(tracks) {
         let (node, topic) = ends(what);
+        if followers.contains(&what) && track.signs.is_empty() && track.degree > Degree::Stated {
+            let node = tracks.entry(ElementKey::Node(node)).or_default();
+            node.evidence = node.evidence.and(track.evidence);
+            continue;
+        }
         let last = closed.entry(node).or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
         tracks

@@ -10,7 +10,7 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::restarts::Restart;
-use crate::evidence::{Evidence, SOURCES};
+use crate::evidence::{Degree, Evidence, SOURCES};
 
 /// What is known about the life of every element.
 pub(crate) type Tracks = BTreeMap<ElementKey, Liveness>;
@@ -36,7 +36,7 @@ pub(crate) fn tracks(
         let track = tracks.entry(proof.what).or_default();
         track.lasts |= lasts(&proof.when);
         track.evidence = track.evidence.and(Evidence::row(proof.source));
-        track.degree = track.degree.min(proof.degree);
+        track.degree = track.degree.min(degree(proof, findings, traffic));
         match &proof.when {
             Validity::Messages(at) => {
                 let stream = &findings.streams[*at];
@@ -91,6 +91,22 @@ pub(crate) fn tracks(
         }
     }
     Ok(tracks)
+}
+
+/// How strongly a proof holds: a connection without a message, or with none in the time that is read, is a header's word.
+fn degree(proof: &Proof, findings: &Findings, traffic: &Traffic) -> Degree {
+    let Validity::Messages(at) = proof.when else {
+        return proof.degree;
+    };
+    let senders = traffic.get(&findings.streams[at].topic);
+    let spoke = senders.and_then(|senders| {
+        let place = senders.streams.iter().position(|s| *s == at)?;
+        senders.traces[place]
+    });
+    match spoke {
+        Some(_) => proof.degree,
+        None => proof.degree.max(Degree::Declared),
+    }
 }
 
 /// The streams whose messages are somebody's: they prove a publication.
