@@ -720,4 +720,9 @@ fn who_sends_nothing_in_the_time_that_is_read_is_declared() {
     // It starts in the fifth minute; the bag names it in its headers.
     assert_eq!(state("/robot1/dock_controller"), "declared");
     assert_eq!(state("/robot1/amcl"), "active");
+    // What follows from a node's name still tells of its topic.
+    let topics = mission["windows"][0]["topics"].as_array().unwrap();
+    let joints = topics.iter().find(|t| t["name"] == "/robot1/joint_states");
+    let evidence = joints.unwrap()["evidence"].as_array().unwrap();
+    assert!(evidence.contains(&"contract".into()), "{evidence:?}");
 }

@@ -65,6 +65,14 @@ pub struct Overview {
     pub title: String,
 }
 
+impl Overview {
+    /// One measure of the head in every window, in tenths of a pixel, with this between two.
+    pub(crate) fn heads_list(&self, of: fn(&Rect) -> f64, between: &str) -> String {
+        let all: Vec<String> = self.heads.iter().map(|h| format!("{:.1}", of(h))).collect();
+        all.join(between)
+    }
+}
+
 impl<'a> Board<'a> {
     /// The board of what passes the filters of `source`. Where `is_sized` is false the page grows until all topics can
     /// be read; what then finds no room is counted.

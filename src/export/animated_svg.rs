@@ -42,14 +42,7 @@ pub(crate) fn start<'a>(
 
 /// An overview over time with a head that goes from window to window.
 fn played(overview: &Overview, frame_ms: u32) -> String {
-    let list = |of: &dyn Fn(&Rect) -> f64| {
-        let all: Vec<String> = overview
-            .heads
-            .iter()
-            .map(|h| format!("{:.1}", of(h)))
-            .collect();
-        all.join(";")
-    };
+    let list = |of: fn(&Rect) -> f64| overview.heads_list(of, ";");
     let seconds = overview.heads.len() as f64 * f64::from(frame_ms) / 1e3;
     let head = overview.heads.first().copied().unwrap_or_default();
     let turn = |name: &str, values: String| {
@@ -64,8 +57,8 @@ fn played(overview: &Overview, frame_ms: u32) -> String {
         head.w,
         head.h,
         overview.color,
-        turn("x", list(&|h| h.x)),
-        turn("width", list(&|h| h.w)),
+        turn("x", list(|h| h.x)),
+        turn("width", list(|h| h.w)),
     );
     let still = svg::write(&overview.scene);
     let open = still.trim_end().strip_suffix("</svg>").unwrap_or(&still);

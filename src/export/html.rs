@@ -270,14 +270,7 @@ fn board(overview: &Overview) -> String {
     let inside = inside.trim_end().strip_suffix("</svg>").unwrap_or(inside);
     // The page has ids of its own.
     let inside = inside.replace(" id=\"", " data-part=\"");
-    let list = |of: &dyn Fn(&Rect) -> f64| {
-        let all: Vec<String> = overview
-            .heads
-            .iter()
-            .map(|h| format!("{:.1}", of(h)))
-            .collect();
-        all.join(" ")
-    };
+    let list = |of: fn(&Rect) -> f64| overview.heads_list(of, " ");
     let (size, head) = (
         overview.scene.size,
         overview.heads.first().copied().unwrap_or_default(),
@@ -287,8 +280,8 @@ fn board(overview: &Overview) -> String {
          <rect id=\"boardhead\" data-x=\"{}\" data-width=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" rx=\"2\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/></svg>",
         size.w,
         size.h,
-        list(&|h| h.x),
-        list(&|h| h.w),
+        list(|h| h.x),
+        list(|h| h.w),
         head.x,
         head.y,
         head.w,

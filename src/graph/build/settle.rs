@@ -17,7 +17,7 @@ pub(crate) fn settle(
     mission: (Stamp, Stamp),
 ) {
     let mut closed: BTreeMap<Name, Option<Stamp>> = BTreeMap::new();
-    // What lives as long as its node tells nothing of it.
+    // What lives as long as its node tells its topic of itself, and nothing of the node.
     let followers: BTreeSet<ElementKey> = proofs
         .iter()
         .filter(|proof| matches!(proof.when, Validity::Like(ElementKey::Node(_))))
@@ -25,17 +25,14 @@ pub(crate) fn settle(
         .collect();
     for (what, track) in edges(tracks) {
         let (node, topic) = ends(what);
-        if followers.contains(&what) && track.signs.is_empty() && track.degree > Degree::Stated {
-            let node = tracks.entry(ElementKey::Node(node)).or_default();
-            node.evidence = node.evidence.and(track.evidence);
-            continue;
-        }
         let last = closed.entry(node).or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
-        tracks
-            .entry(ElementKey::Node(node))
-            .or_default()
-            .learn(&track);
+        let learner = tracks.entry(ElementKey::Node(node)).or_default();
+        if followers.contains(&what) && track.signs.is_empty() && track.degree > Degree::Stated {
+            learner.evidence = learner.evidence.and(track.evidence);
+        } else {
+            learner.learn(&track);
+        }
         tracks
             .entry(ElementKey::Topic(topic))
             .or_default()

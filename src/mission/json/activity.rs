@@ -20,7 +20,7 @@ use super::runs::{self, In, RawElements, WithColumns};
 use super::write::List;
 use crate::base::time::{Span, Stamp};
 use crate::graph::sending::Sending;
-use crate::graph::{Edge, Element, Elements, Graphs};
+use crate::graph::{Edge, Element, Elements, Graphs, GraphsWriter};
 use crate::mission::activity::{Activity, Cell, MOST_CELLS};
 
 /// The activity as it is written.
@@ -32,11 +32,15 @@ pub(super) struct ActivityOf<'a> {
 
 impl<'a> ActivityOf<'a> {
     pub(super) fn new(activity: &'a Activity, elements: &'a Elements) -> Self {
-        let cells = activity.cells.iter();
+        let cells = &activity.cells;
+        let mut graphs = GraphsWriter::new(cells.iter().map(|cell| cell.span).collect());
+        for (at, cell) in cells.iter().enumerate() {
+            graphs.graph(at, &cell.graph);
+        }
         Self {
             activity,
             elements,
-            graphs: cells.map(|cell| (cell.span, cell.graph.clone())).collect(),
+            graphs: graphs.finish(),
         }
     }
 
