@@ -17,7 +17,7 @@ use crate::view::{Mode, View, ViewOptions, outline, view};
 
 /// What the picture of a mission is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Body {
+pub enum Body {
     /// A graph; a board where of most messages nobody knows the publisher.
     #[default]
     Auto,
@@ -43,7 +43,7 @@ impl Body {
 #[non_exhaustive]
 pub struct Drawing {
     /// Graph or board.
-    pub(crate) body: Body,
+    pub body: Body,
     /// What is shown.
     pub view: ViewOptions,
     /// Colours, strokes and fonts.
@@ -54,7 +54,7 @@ pub struct Drawing {
     pub page: PageOptions,
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
-    /// Where it will be seen, if that decides the page.
+    /// Where it will be seen, if that decides the page: see [`Drawing::seen`].
     pub(crate) purpose: Option<Purpose>,
     /// Whether to grow the page and collapse namespaces until the text can be read.
     pub is_fitted: bool,
@@ -86,6 +86,17 @@ impl Drawing {
 }
 
 impl Drawing {
+    /// The same for somebody who sees it there: page, size of text and furniture follow from that, whatever they were.
+    #[must_use]
+    pub fn seen(self, purpose: Purpose) -> Self {
+        Self {
+            page: purpose.page(self.page),
+            is_sized: true,
+            purpose: Some(purpose),
+            ..self
+        }
+    }
+
     /// The smallest text that can be read, in pixels.
     fn readable(&self) -> f64 {
         self.purpose.map_or(READABLE, Purpose::readable)

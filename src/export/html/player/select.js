@@ -81,7 +81,7 @@ function card() {
 	$.facts.replaceChildren(...facts.map(fact => make('p', { textContent: fact })));
 	const past = told.flatMap(([w, , , lines]) => lines.filter(line => line[2] == sel).map(line => [w, ...line]));
 	$.story.hidden = !past.length;
-	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: clock(Math.floor(s)) + ' ' }), text), 12);
+	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : clock(Math.floor(s)) + ' ' }), text), 12);
 	fill('ends', whole.ends(sel), element);
 }
 onSeek.push(card);
