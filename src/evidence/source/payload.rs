@@ -103,7 +103,7 @@ fn publisher(known: &Conclusions<'_>, (topic, publisher): PayloadFlow) -> Option
 /// Goes through all messages in order of time.
 fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     let mut topics: BTreeMap<String, BTreeSet<Name>> = BTreeMap::new();
-    for (at, _) in &known.facts.payloads {
+    for at in known.facts.payloads.keys() {
         let topic = known.streams[*at].topic;
         topics.entry(known.kind(topic)).or_default().insert(topic);
     }
