@@ -1,6 +1,6 @@
 //! How much room everything takes: distances across, columns along, and the boxes around clusters.
 //!
-//! Here x runs along the edges and y across; [`Spacing::turned`] brings sizes there and back.
+//! Here x runs along the edges and y across; [`turned`] brings sizes there and back.
 
 use crate::base::geometry::{Rect, Size};
 use crate::layout::{Component, LayerItem, LayerRows, Layers, Orientation, Plan};

@@ -1,6 +1,6 @@
 //! Life lines: a row per node (or topic), time to the right; what is alive when, how busily it sends, what changed.
 //!
-//! One drawing at three sizes: a figure on paper ([`page`]), and, for whoever has a page already, the rows alone.
+//! One drawing at three sizes: a figure on paper ([`super::page`]), and, for whoever has a page already, the rows alone.
 //! `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` says how much room the rows take, and
 //! `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A canvas in pixels (a timeline below
 //! frames, the topic board) is `Canvas::new(fonts, sizes, scale)` with pixels per millimetre as its scale, and gives

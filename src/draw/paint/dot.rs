@@ -63,7 +63,7 @@ impl<'a> DotView<'a> {
         self
     }
 
-    /// One window, or the [`union`] of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
+    /// One window, or the [`union`](crate::view::union::union()) of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
     /// Only the latter shows the `title`.
     pub(crate) fn write(&self, seen: &SeenWindow, title: &str) -> String {
         match &self.layout {
