@@ -333,7 +333,7 @@ pub struct Headline {
 pub struct Phrase {
     /// The words: `/robot1/planner started`.
     pub text: String,
-    /// How many headlines they tell, 1...
+    /// The number of headlines that they tell; 0 for a return.
     pub headlines: usize,
 }
 
@@ -376,7 +376,8 @@ pub struct Frame {
     pub headlines: Vec<Headline>,
     /// The headlines counted.
     pub counts: Counts,
-    /// The headlines in words, the most important first.
+    /// The headlines in words, the most important first, and behind them who is back from a silence or an absence. That
+    /// is no headline again: an entry counts in the window in which it begins.
     pub caption: Vec<Phrase>,
 }
 

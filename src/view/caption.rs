@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use super::items::Viewed;
 use super::{Headline, ItemKind, Phrase};
 use crate::base::name::last_part;
+use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, EntryId, Kind, Ledger};
+use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger};
 
 /// From here on, things of one kind are told together.
 const MOST_NAMED: usize = 3;
@@ -22,6 +23,8 @@ pub(crate) struct Speaker<'a> {
     ledger: &'a Ledger,
     /// Per headline of a node, how many topics came or went with it.
     topics: BTreeMap<EntryId, usize>,
+    /// The headlines that last, in the order of their ends.
+    lasting: Vec<(Stamp, &'a Entry)>,
 }
 
 impl<'a> Speaker<'a> {
@@ -35,11 +38,17 @@ impl<'a> Speaker<'a> {
                 *topics.entry(whole).or_default() += 1;
             }
         }
+        let entries = mission.ledger.entries.iter();
+        let lasting = entries.filter(|e| e.is_headline() && viewed.sees(e.what));
+        let mut lasting: Vec<(Stamp, &Entry)> =
+            lasting.filter_map(|e| Some((e.until?, e))).collect();
+        lasting.sort_by_key(|(until, _)| *until);
         Self {
             elements: &mission.elements,
             viewed,
             ledger: &mission.ledger,
             topics,
+            lasting,
         }
     }
 
@@ -69,6 +78,29 @@ impl<'a> Speaker<'a> {
             }
         }
         phrases
+    }
+
+    /// A phrase for what is back from a silence or an absence that an earlier window told; it stands for no headline.
+    pub(crate) fn back(&self, window: Span) -> Option<Phrase> {
+        let from = self.lasting.partition_point(|(at, _)| *at < window.start);
+        let to = self.lasting.partition_point(|(at, _)| *at < window.end);
+        let ended = self.lasting[from..to.max(from)].iter();
+        let back: Vec<&Entry> = ended
+            .map(|(_, e)| *e)
+            .filter(|e| e.time < window.start)
+            .collect();
+        let text = match &back[..] {
+            [] => return None,
+            [one] => {
+                let away = words::duration(one.until.unwrap_or(one.time).since(one.time));
+                format!("{} is back after {away}", self.name(one.what))
+            }
+            all => {
+                let names: Vec<String> = all.iter().map(|e| self.short(e.what)).collect();
+                format!("{} are back", words::some_of(&names, MOST_NAMED))
+            }
+        };
+        Some(Phrase { text, headlines: 0 })
     }
 
     /// `4 nodes stopped with 5 topics (planner, costmap, …)`.

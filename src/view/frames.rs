@@ -35,13 +35,15 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
             stage.go_on(at);
         }
         let told = std::mem::take(&mut stage.turn.news.headlines);
+        let mut caption = speaker.caption(&told);
+        caption.extend(speaker.back(window.span));
         list.push(Frame {
             index: window.index,
             span: window.span,
             partial: window.partial,
             messages: window.messages,
             counts: Counts::of(&told),
-            caption: speaker.caption(&told),
+            caption,
             headlines: told,
             rolls: stage.rolls.clone(),
         });
