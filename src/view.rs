@@ -446,6 +446,13 @@ impl View {
         at.since(first.span.start) as f64 / whole
     }
 
+    /// The length of all windows but a partial one; `None` where there is one window, or where they differ.
+    pub(crate) fn window_nanos(&self) -> Option<i64> {
+        let first = self.frames.first()?.span.nanos();
+        let is_equal = |f: &Frame| f.partial || f.span.nanos() == first;
+        (self.frames.len() > 1 && self.frames.iter().all(is_equal)).then_some(first)
+    }
+
     /// Whether window `k` shows a change.
     pub fn is_changed(&self, k: usize) -> bool {
         self.frames

@@ -304,8 +304,8 @@ fn what_the_mission_ended_before_is_not_broken() {
     assert_eq!(check(presence, "25").0, 1);
 }
 
-#[test]
-fn every_exit_code_means_what_the_help_says() {
+/// A run, what is left of it after a cut, and expectations of every outcome.
+fn outcomes() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
@@ -326,6 +326,13 @@ fn every_exit_code_means_what_the_help_says() {
         "rules:\n  - {id: x, node: /lidar, lifecycle: active}\n",
     );
     write("wrong.yaml", "nodes:\n  /lidar: {restart: 0}\n");
+    dir
+}
+
+#[test]
+fn every_exit_code_of_check_means_what_its_help_says() {
+    let dir = outcomes();
+    let here = dir.path();
     let table: [(&[&str], i32, &str); 14] = [
         (&["run.bag", "--expect", "kept.yaml"], 0, "1 rule kept"),
         (
@@ -395,6 +402,18 @@ fn every_exit_code_means_what_the_help_says() {
         assert_eq!(got, code, "{args:?}: {said}");
         assert!(said.contains(says), "{args:?}: {said}");
     }
+    help_begins(
+        here,
+        "check",
+        "0 kept, 1 broken, 2 could not tell",
+        "3 kept but data was skipped",
+    );
+}
+
+#[test]
+fn every_exit_code_of_diff_and_baseline_means_what_their_help_says() {
+    let dir = outcomes();
+    let here = dir.path();
     bag(here, "same.bag", &recording(HEALTHY, 3));
     let halved = Robot {
         scan_ms: 200,
@@ -418,32 +437,29 @@ fn every_exit_code_means_what_the_help_says() {
         let (got, said) = run(here, args);
         assert_eq!(got, code, "{args:?}: {said}");
     }
-    let helps = [
-        (
-            "check",
-            "0 kept, 1 broken, 2 could not tell",
-            "3 kept but data was skipped",
-        ),
-        (
-            "diff",
-            "0 the same, 1 different, 2 could not tell",
-            "3 the same but data was skipped",
-        ),
-        (
-            "baseline",
-            "0 written, 1 failed, 2 usage",
-            "3 written but data was skipped",
-        ),
-    ];
-    for (command, first, last) in helps {
-        let (code, said) = run(here, &[command, "--help"]);
-        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
-        let codes = said.split("Exit codes: ").nth(1).unwrap_or_default();
-        assert!(
-            code == 0 && codes.starts_with(first) && codes.contains(last),
-            "{said}"
-        );
-    }
+    help_begins(
+        here,
+        "diff",
+        "0 the same, 1 different, 2 could not tell",
+        "3 the same but data was skipped",
+    );
+    help_begins(
+        here,
+        "baseline",
+        "0 written, 1 failed, 2 usage",
+        "3 written but data was skipped",
+    );
+}
+
+/// The help of a command tells its exit codes, which begin so and hold that.
+fn help_begins(here: &Path, command: &str, first: &str, holds: &str) {
+    let (code, said) = run(here, &[command, "--help"]);
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    let codes = said.split("Exit codes: ").nth(1).unwrap_or_default();
+    assert!(
+        code == 0 && codes.starts_with(first) && codes.contains(holds),
+        "{said}"
+    );
 }
 
 #[test]

@@ -86,10 +86,8 @@ fn subject(first: &Path, second: &Path) -> DiffSubject {
         let last = path.file_name();
         last.map_or_else(|| whole(path), |name| name.to_string_lossy().into_owned())
     };
-    let name = |path| match last(first) == last(second) {
-        true => whole(path),
-        false => last(path),
-    };
+    let is_alike = last(first) == last(second);
+    let name = |path| if is_alike { whole(path) } else { last(path) };
     DiffSubject {
         first: name(first),
         second: name(second),

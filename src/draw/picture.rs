@@ -11,6 +11,7 @@ pub(crate) use legend::{LegendSign, signs};
 mod measured;
 mod options;
 pub(crate) mod page;
+mod room;
 mod timeline;
 pub(crate) mod title;
 mod tween;
@@ -26,7 +27,7 @@ use self::page::{GraphFit, PageFrame};
 use self::timeline::Timeline;
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
-use crate::base::geometry::Size;
+use crate::base::geometry::{Point, Size};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
 pub use crate::draw::figure::course::Course;
@@ -34,7 +35,7 @@ use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
-use crate::view::{Arrow, ArrowKind, Frame, Item, SeenWindow, View};
+use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, SeenWindow, View};
 
 /// What the user wishes of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -183,7 +184,7 @@ impl<'a> Picture<'a> {
             ..
         } = &measured;
         let fit = page.fit(layout.size);
-        let tracks = tracks(&measured, &layout, fit);
+        let (cards, tracks) = places(&measured, &layout, fit);
         let mut order: Vec<usize> = (0..tracks.len()).collect();
         let is_publish = |at: usize| view.arrows[at].kind == ArrowKind::Publish;
         order.sort_by(|&a, &b| {
@@ -194,7 +195,7 @@ impl<'a> Picture<'a> {
                 .then(a.cmp(&b))
         });
         let mut picture = Self {
-            cards: cards(&measured, &layout, fit),
+            cards,
             tracks,
             order,
             title: Title::new(style, fonts, page, view, &measured.options),
@@ -378,6 +379,21 @@ impl<'a> Picture<'a> {
     }
 }
 
+/// What never changes of items and arrows, with badges where there is room for them.
+fn places(
+    measured: &Measured<'_>,
+    layout: &Layout,
+    fit: GraphFit,
+) -> (Vec<ItemBox>, Vec<ArrowPath>) {
+    let mut cards = cards(measured, layout, fit);
+    let mut tracks = tracks(measured, layout, fit);
+    let kinds: Vec<ItemKind> = measured.view.items.iter().map(|item| item.kind).collect();
+    // A hair beyond the badge's edge.
+    let radius = measured.style.badge.radius * fit.pen + 1.0;
+    room::place_badges((&kinds, &mut cards), &mut tracks, radius, fit.scale);
+    (cards, tracks)
+}
+
 fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox> {
     let tells = measured::tells(measured.view);
     let items = measured.view.items.iter().zip(&layout.boxes);
@@ -389,6 +405,7 @@ fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox
             label: label.clone(),
             tells,
             place: fit.rect(*place),
+            badge: Point::default(),
         })
         .collect()
 }

@@ -137,7 +137,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
                 ..page.clone()
             };
             let attempt = Attempt::new(mission, drawing, &options, &higher);
-            if attempt.text > best.text {
+            if attempt.text > best.text || attempt.layout.is_none() {
                 (page, best) = (higher, attempt);
             }
         }
@@ -145,7 +145,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     if drawing.is_fitted && !best.is_readable(drawing) {
         if !drawing.is_sized && page.width_mm.is_none() {
             page.size = LARGEST;
-            best = Attempt::new(mission, drawing, &options, &page);
+            best = best.grown(mission, drawing, &options, &page);
         }
         collapse(mission, drawing, &page, &mut options, &mut best);
         if best.is_readable(drawing) {
@@ -154,12 +154,16 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
             bundle(mission, drawing, &page, &mut options, &mut best);
         }
     }
+    if best.layout.is_none() {
+        best = Attempt::drawn(mission, drawing, &options, &page);
+    }
     let Attempt {
         view,
         mut notices,
         layout,
         text,
     } = best;
+    let layout = layout.unwrap_or_else(Layout::empty);
     if drawing.is_fitted || drawing.purpose.is_some() {
         let collapsed = &options.collapse[asked..];
         notices.extend(told(drawing, collapsed, &page, text).iter());
@@ -208,15 +212,41 @@ pub(super) fn unseen(drawing: &Drawing) -> Composed {
 
 /// A layout of what some options show.
 struct Attempt {
+    /// Without its windows where there is no layout.
     view: View,
     notices: Notices,
-    layout: Layout,
+    /// `None` where so many boxes cannot be read, however they stand.
+    layout: Option<Layout>,
     /// The size of its smallest text in pixels.
     text: f64,
 }
 
 impl Attempt {
+    /// A layout, if there is hope that it can be read or `--fit none` does not ask.
     fn new(
+        mission: &Mission,
+        drawing: &Drawing,
+        options: &ViewOptions,
+        page: &PageOptions,
+    ) -> Self {
+        let elements = &mission.elements;
+        let boxes = elements.nodes.len() + elements.topics.len();
+        if drawing.is_fitted && is_crowded(boxes, drawing, page) {
+            let view = outline(mission, options);
+            if is_crowded(view.items.len(), drawing, page) {
+                return Self {
+                    view,
+                    notices: Notices::new(),
+                    layout: None,
+                    text: 0.0,
+                };
+            }
+        }
+        Self::drawn(mission, drawing, options, page)
+    }
+
+    /// A layout in any case.
+    fn drawn(
         mission: &Mission,
         drawing: &Drawing,
         options: &ViewOptions,
@@ -234,14 +264,38 @@ impl Attempt {
         Self {
             view,
             notices,
-            layout,
+            layout: Some(layout),
             text,
         }
+    }
+
+    /// The same on a larger page.
+    fn grown(
+        self,
+        mission: &Mission,
+        drawing: &Drawing,
+        options: &ViewOptions,
+        page: &PageOptions,
+    ) -> Self {
+        if self.layout.is_none() && is_crowded(self.view.items.len(), drawing, page) {
+            return self;
+        }
+        Self::new(mission, drawing, options, page)
     }
 
     fn is_readable(&self, drawing: &Drawing) -> bool {
         self.text >= drawing.readable()
     }
+}
+
+/// The least area of a box in squares of its text's height: no box is lower than its text, nor narrower than four
+/// times that.
+const LEAST_BOX: f64 = 4.0;
+
+/// Whether these are more boxes than a page holds with text that can be read.
+fn is_crowded(boxes: usize, drawing: &Drawing, page: &PageOptions) -> bool {
+    let text = drawing.readable();
+    boxes as f64 > page.size.w * page.size.h / (LEAST_BOX * text * text)
 }
 
 /// Collapses namespaces until the text can be read.
@@ -253,7 +307,7 @@ fn collapse(
     best: &mut Attempt,
 ) {
     while !best.is_readable(drawing) {
-        let candidates = outline(mission, options).collapsible(mission, options);
+        let candidates = best.view.collapsible(mission, options);
         let fresh = candidates
             .into_iter()
             .map(|c| c.name)

@@ -122,11 +122,8 @@ impl<'a> Title<'a> {
         if frame.messages == 0 {
             parts.insert(0, "no message".to_owned());
         }
-        if let Some(first) = view.frames.first().filter(|_| view.frames.len() > 1) {
-            parts.push(format!(
-                "{} per window",
-                words::period(whole(first.span.nanos()))
-            ));
+        if let Some(length) = view.window_nanos() {
+            parts.push(format!("{} per window", words::period(whole(length))));
         }
         if frame.partial {
             parts.push("partial".to_owned());

@@ -211,8 +211,10 @@ fn list(findings: &[&Finding], title: &str, out: &mut String) {
             .as_ref()
             .map_or_else(String::new, |why| format!(": {}", plain(why)));
         // What helps with one helps with all of its kind.
-        let help = finding.help.iter().filter(|help| hinted.insert(*help));
-        let help: String = help.map(|help| format!(": {}", plain(help))).collect();
+        let mut help = String::new();
+        for fresh in finding.help.iter().filter(|help| hinted.insert(*help)) {
+            let _ = write!(help, ": {}", plain(fresh));
+        }
         let line = format!("- {}{why}{help}\n", plain(&finding.says));
         if out.len() - start + line.len() > MOST_LISTED {
             let _ = writeln!(out, "- {} more left out", findings.len() - at);

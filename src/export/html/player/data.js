@@ -1,6 +1,6 @@
 // What the page holds, unpacked: any value of any element in any window is one search away. `data.rs` says what it is.
 const $ = new Proxy({}, { get: (_, id) => document.getElementById(id) });
-const say = (id, text) => { $[id].textContent = text; };
+const say = (id, text) => { const element = $[id]; if (element.textContent != text) element.textContent = text; };
 const make = (tag, props, ...inside) => {
 	const element = Object.assign(document.createElement(tag), props);
 	element.append(...inside);
