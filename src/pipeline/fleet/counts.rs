@@ -16,7 +16,7 @@ pub const SCHEMA_VERSION: i64 = 1;
 pub struct Count {
     /// The mission that the bag belongs to.
     pub mission: Arc<str>,
-    /// The bag, as its path was given.
+    /// The bag, as its path or URL was given.
     pub bag: Arc<str>,
     /// The format's word: `rosbag1`, `mcap`, `sqlite3`.
     pub format: Arc<str>,
@@ -157,10 +157,12 @@ pub(crate) fn counts_table(counts: &[Count]) -> Batch {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FleetBag {
-    /// Its path, as it was given or found.
+    /// Its path or URL, as it was given.
     pub uri: String,
     /// The mission that it belongs to.
     pub mission: String,
+    /// What the store says of its version; none for files.
+    pub etag: Option<String>,
     /// Its size in bytes, if that is known.
     pub file_bytes: Option<u64>,
     /// The format's word, if it is a bag.
@@ -186,6 +188,7 @@ pub struct FleetBag {
 const BAGS: &[(&str, ColumnKind)] = &[
     ("uri", ColumnKind::Text),
     ("mission", ColumnKind::Text),
+    ("etag", ColumnKind::Text),
     ("file_bytes", ColumnKind::I64),
     ("format", ColumnKind::Text),
     ("tier", ColumnKind::Text),
@@ -208,6 +211,7 @@ pub(crate) fn bags_table(bags: &[FleetBag]) -> Batch {
         table.push(&[
             TableCell::text(&*bag.uri),
             TableCell::text(&*bag.mission),
+            TableCell::known(bag.etag.as_deref(), TableCell::text),
             TableCell::known(bag.file_bytes, TableCell::count),
             TableCell::known(bag.format.as_deref(), TableCell::text),
             TableCell::known(bag.tier, |tier| TableCell::text(tier.word())),
