@@ -15,7 +15,7 @@ use crate::base::error::{Error, Result};
 pub enum Input {
     /// A file or a folder.
     Path(PathBuf),
-    /// An object in a store or on a web server, `s3://…`, `https://…`: told apart from paths, and not read.
+    /// An object in a store or on a web server: `s3://…`, `gs://…`, `az://…`, `https://…`.
     Url(String),
     /// Standard input: ROS 1 or MCAP.
     Stdin,
@@ -51,10 +51,22 @@ impl Input {
     pub fn name(&self) -> String {
         match self {
             Self::Path(path) => file_name(path),
-            Self::Url(url) => file_name(Path::new(url)),
+            Self::Url(url) => file_name(Path::new(&told_url(url))),
             Self::Stdin => "standard input".to_owned(),
         }
     }
+}
+
+/// A URL as it may be told: that of a web server without a password, and without what stands behind `?`, which may be a
+/// signature that opens the file.
+pub(crate) fn told_url(url: &str) -> String {
+    let Some((scheme, rest)) = url.split_once("://").filter(|_| url.starts_with("http")) else {
+        return url.to_owned();
+    };
+    let rest = rest.split(['?', '#']).next().unwrap_or(rest);
+    let (host, path) = rest.split_once('/').unwrap_or((rest, ""));
+    let host = host.rsplit_once('@').map_or(host, |(_, host)| host);
+    format!("{scheme}://{host}/{path}")
 }
 
 /// The bytes that an input takes on disk, a folder's own files together; `None` for pipes and what cannot be looked at.
@@ -118,7 +130,7 @@ pub(crate) const HEAD: usize = 512;
 pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     let path = match input {
         Input::Path(path) => path,
-        Input::Url(url) => return Err(elsewhere(url)),
+        Input::Url(url) => return Err(elsewhere(&told_url(url))),
         Input::Stdin => {
             let stream = ByteStream::of_reader(io::stdin());
             return Ok(BagPlace::Pipe(input.name(), stream));

@@ -125,6 +125,9 @@ impl Tier {
     }
 }
 
+/// The fact that is the version of an object in a store.
+pub(crate) const ETAG: &str = "etag";
+
 /// What a reader says about its bag when it is done.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {

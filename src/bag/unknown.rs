@@ -21,12 +21,17 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     }
 }
 
-/// The error for an object that is not on this machine.
+/// The error for an object where a file is needed, or where objects cannot be read at all.
 pub(crate) fn elsewhere(url: &str) -> Error {
+    let hint = if cfg!(feature = "remote") {
+        "this takes files: download the bag"
+    } else {
+        "download the bag, or build with the feature `remote`: `cargo install bagreel --features remote`"
+    };
     Error::Unsupported {
         path: url.into(),
         what: "it is not on this machine".to_owned(),
-        hint: "download the bag, or mount its store".to_owned(),
+        hint: hint.to_owned(),
     }
 }
 

@@ -17,6 +17,16 @@ pub enum Error {
         /// What the system said.
         source: io::Error,
     },
+    /// A store or a server refused to give an object, or could not be reached: nothing is wrong with the bag, and what
+    /// was read of it does not count.
+    Remote {
+        /// The object.
+        url: String,
+        /// What the store said.
+        reason: String,
+        /// What to do.
+        hint: String,
+    },
     /// `path` is no bag that we know.
     UnknownBag {
         /// The file or folder.
@@ -124,7 +134,8 @@ impl Error {
         match self {
             Self::Io { source, .. } => io_hint(source).to_owned(),
             Self::Interrupted => String::new(),
-            Self::UnknownBag { hint, .. }
+            Self::Remote { hint, .. }
+            | Self::UnknownBag { hint, .. }
             | Self::Malformed { hint, .. }
             | Self::Unsupported { hint, .. }
             | Self::NoMessages { hint, .. }
@@ -158,6 +169,7 @@ impl fmt::Display for Error {
                 doing,
                 source,
             } => write!(f, "cannot {doing} `{}`: {source}", path.display()),
+            Self::Remote { url, reason, .. } => write!(f, "cannot read `{url}`: {reason}"),
             Self::UnknownBag {
                 path, looks_like, ..
             } => write!(f, "`{}` is no bag: it is {looks_like}", path.display()),
