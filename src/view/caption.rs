@@ -1,4 +1,4 @@
-//! What happened in a window, in words, the most important first.
+//! The caption of a window: its headlines in words, the most important first.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +11,9 @@ use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Mission;
 use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger};
 
-/// From here on, things of one kind are told together.
+/// The largest number of headlines of one kind that are told one by one; more are told together.
 const MOST_NAMED: usize = 3;
-/// Longer names are cut.
+/// The largest length of a name in characters; longer ones are cut.
 const LONGEST_NAME: usize = 48;
 
 /// Puts headlines into words, with full names: what is called alike in two namespaces is told apart.
@@ -21,7 +21,7 @@ pub(crate) struct Speaker<'a> {
     elements: &'a Elements,
     viewed: &'a Viewed,
     ledger: &'a Ledger,
-    /// Per headline of a node, how many topics came or went with it.
+    /// Per headline of a node, the number of topics that came or went with it.
     topics: BTreeMap<EntryId, usize>,
     /// The headlines that last, in the order of their ends.
     lasting: Vec<(Stamp, &'a Entry)>,
@@ -166,7 +166,7 @@ impl<'a> Speaker<'a> {
         }
     }
 
-    /// What a kind of headline says, behind whom it is about.
+    /// The verb of a kind of headline, which follows the name of the element it is about.
     fn verb(&self, kind: Kind) -> &'static str {
         match kind {
             Kind::Silent => "fell silent",
@@ -175,7 +175,7 @@ impl<'a> Speaker<'a> {
         }
     }
 
-    /// `b now subscribes /t`; `None` for a node or topic.
+    /// The phrase for a headline of an edge: `b now subscribes /t`; `None` for one of a node or topic.
     fn edge(&self, headline: &Headline) -> Option<String> {
         let (edge, verb) = match headline.what {
             Element::Publish(id) => (self.elements.publishes.get(id as usize)?, "publishes"),
@@ -244,7 +244,7 @@ impl<'a> Speaker<'a> {
     }
 }
 
-/// What several of a kind are called; `None` for those of which each is worth its name.
+/// The noun for several headlines of a kind; `None` for kinds of which each is told by its name.
 fn together(kind: Kind) -> Option<&'static str> {
     Some(match kind {
         Kind::Started | Kind::Stopped | Kind::Restarted => "nodes ",
