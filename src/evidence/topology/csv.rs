@@ -153,7 +153,7 @@ mod tests {
     fn a_bad_line_is_named() {
         for (row, told) in [
             ("a,[/x],,,", "is not a list"),
-            ("a,,,soon,", "no number"),
+            ("a,,,soon,", "not a number"),
             (",,,,", "empty"),
             ("a,,,5,4", "before"),
         ] {
