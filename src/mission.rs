@@ -48,7 +48,7 @@ pub struct Window {
 pub struct Mission {
     /// The bags it was read from, in order.
     pub bags: Vec<Report>,
-    /// From the first message to the last, plus 1 ns.
+    /// The time from the first message to the last, plus 1 ns.
     pub span: Span,
     /// The number of messages.
     pub messages: u64,

@@ -101,7 +101,7 @@ fn live_like(
     done
 }
 
-/// All edges.
+/// All publications and subscriptions with their tracks.
 fn edges(tracks: &BTreeMap<ElementKey, Liveness>) -> Vec<(ElementKey, Liveness)> {
     let is_edge =
         |what: &ElementKey| matches!(what, ElementKey::Publish(..) | ElementKey::Subscribe(..));
