@@ -8,8 +8,8 @@ pub(crate) const CHOSEN_WINDOWS: i64 = 600;
 /// The most windows that may be asked for: a bag of a day by the second. Each costs about a kilobyte per element.
 pub(crate) const WINDOWS: i64 = 100_000;
 
-/// The longest mission, in days: nobody records for a hundred years, and sums of three such lengths in nanoseconds still
-/// fit a number.
+/// The longest mission, in days: nobody records for a hundred years, and sums of three such lengths in nanoseconds
+/// still fit a number.
 pub(crate) const SPAN_DAYS: i64 = 36_525;
 
 /// The longest style, topology or file of captions, in bytes: a hundred times the largest we know.
@@ -40,8 +40,8 @@ pub(crate) const MISSION_JSON: u64 = 4 << 30;
 /// The longest job summary file, in bytes, to which a report is appended: GitHub takes 1 MiB.
 pub(crate) const SUMMARY: u64 = 16 << 20;
 
-/// The most names, types and states of a mission: five times the topics of the largest robot known. With all that is kept
-/// about each, in the windows of `info` too, they take about 256 MB.
+/// The most names, types and states of a mission: five times the topics of the largest robot known. With all that is
+/// kept about each, in the windows of `info` too, they take about 256 MB.
 pub(crate) const NAMES: usize = 1 << 16;
 
 /// The longest name, type or state of a mission, in bytes: ROS allows 255 for a name, and the quality of service of a
