@@ -1,4 +1,4 @@
-//! The computation graph of one window: which nodes and topics are there, who talks to whom, how often.
+//! The computation graph of one window: its nodes, topics and edges, with their states and rates.
 //!
 //! A graph holds numbers only; names stand once, in the [`Elements`] of the whole mission, sorted, so that an index
 //! is an order and equal graphs are equal bytes.
@@ -38,13 +38,13 @@ pub struct Node {
     pub name: NodeName,
     /// The name with anonymous suffixes folded; equal to the name for most.
     pub role: Arc<str>,
-    /// What proves it.
+    /// The kinds of evidence for it.
     pub evidence: Evidence,
-    /// Its first sign of life in the mission.
+    /// The time of its first sign of life in the mission.
     pub first: Option<Stamp>,
-    /// Its last sign of life.
+    /// The time of its last sign of life in the mission.
     pub last: Option<Stamp>,
-    /// When it is there, in order, half-open; empty where only windows are known.
+    /// The intervals in which it exists, in order, half-open; empty where only windows are known.
     pub runs: Vec<Span>,
 }
 
@@ -53,41 +53,41 @@ pub struct Node {
 pub struct Topic {
     /// The name as recorded.
     pub name: TopicName,
-    /// Its types, sorted; more than one is a mistake of the robot's worth seeing.
+    /// Its types, sorted; more than one is a mistake in the robot's software.
     pub types: Vec<Arc<str>>,
-    /// What proves it.
+    /// The kinds of evidence for it.
     pub evidence: Evidence,
-    /// Its first message or sign of life.
+    /// The time of its first message or sign of life.
     pub first: Option<Stamp>,
-    /// Its last.
+    /// The time of its last message or sign of life.
     pub last: Option<Stamp>,
     /// The quality of service offered, in short words, if known: `reliable transient_local depth 1`.
     pub qos: Option<Arc<str>>,
-    /// When it is there, in order, half-open; empty where only windows are known.
+    /// The intervals in which it exists, in order, half-open; empty where only windows are known.
     pub runs: Vec<Span>,
-    /// How many publishers the bag counts that nobody names, 0..; `None` if it counts none at all. They are no nodes: a
-    /// picture may show them as one small box.
+    /// The number of publishers that the bag counts but does not name, ≥ 0; `None` if it does not count publishers.
+    /// They are not nodes: a picture may show them as one small box.
     pub unknown_publishers: Option<u32>,
 }
 
 /// A publication or a subscription, over the whole mission.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edge {
-    /// Who publishes or subscribes.
+    /// The node that publishes or subscribes.
     pub node: NodeId,
-    /// What.
+    /// The topic.
     pub topic: TopicId,
-    /// What proves it.
+    /// The kinds of evidence for it.
     pub evidence: Evidence,
-    /// Its first message or sign of life.
+    /// The time of its first message or sign of life.
     pub first: Option<Stamp>,
-    /// Its last.
+    /// The time of its last message or sign of life.
     pub last: Option<Stamp>,
-    /// When it is there, in order, half-open; empty where only windows are known.
+    /// The intervals in which it exists, in order, half-open; empty where only windows are known.
     pub runs: Vec<Span>,
 }
 
-/// Everything that ever is in the mission: nodes and topics sorted by name, publications by (node, topic),
+/// All nodes, topics and edges of the mission: nodes and topics sorted by name, publications by (node, topic),
 /// subscriptions by (topic, node).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Elements {
@@ -101,10 +101,10 @@ pub struct Elements {
     pub subscribes: Vec<Edge>,
 }
 
-/// How alive something is in a window.
+/// The state of an element in one window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum State {
-    /// Messages or evidence fall into the window.
+    /// Messages or evidence in the window.
     Active,
     /// Alive without a message.
     Silent,
@@ -115,10 +115,10 @@ pub enum State {
 }
 
 impl State {
-    /// All of them, the liveliest first.
+    /// All states, the liveliest first.
     pub const ALL: [Self; 4] = [Self::Active, Self::Silent, Self::Latched, Self::Declared];
 
-    /// Its word in JSON and in class names.
+    /// The state's word in JSON and in class names.
     pub fn word(self) -> &'static str {
         match self {
             Self::Active => "active",
@@ -129,58 +129,59 @@ impl State {
     }
 }
 
-/// A node in a window.
+/// The state of a node in one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeState {
-    /// Which.
+    /// The node.
     pub id: NodeId,
-    /// How alive.
+    /// The state.
     pub state: State,
-    /// How well known in this window.
+    /// The strength of the evidence for it in this window.
     pub degree: Degree,
-    /// The sum of what it publishes, in messages per second: its intensity. `None` where not known.
+    /// The sum of the rates of its publications, in messages per second; `None` where not known.
     pub hz: Option<f64>,
     /// The lifecycle state, if it has one: `inactive`, `active`, …
     pub lifecycle: Option<Arc<str>>,
 }
 
-/// A topic in a window.
+/// The state of a topic in one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TopicState {
-    /// Which.
+    /// The topic.
     pub id: TopicId,
-    /// How alive.
+    /// The state.
     pub state: State,
-    /// How well known in this window.
+    /// The strength of the evidence for it in this window.
     pub degree: Degree,
-    /// Messages in the window, 0...
+    /// The number of messages in the window, ≥ 0.
     pub count: u64,
-    /// Their payload bytes, if known.
+    /// The payload bytes of these messages, if known.
     pub bytes: Option<u64>,
     /// Messages per second over the window's true length; `None` below 1 ms of length.
     pub hz: Option<f64>,
-    /// The median time between messages in seconds; `None` with fewer than two.
+    /// The median time between messages in seconds; `None` with fewer than two messages.
     pub median_period_s: Option<f64>,
-    /// The longest time between messages in seconds; `None` with fewer than two.
+    /// The longest time between messages in seconds; `None` with fewer than two messages.
     pub max_gap_s: Option<f64>,
 }
 
-/// A publication or subscription in a window.
+/// The state of a publication or subscription in one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EdgeState {
-    /// Which.
+    /// The edge.
     pub id: EdgeId,
-    /// How alive.
+    /// The state.
     pub state: State,
-    /// How well known in this window.
+    /// The strength of the evidence for it in this window.
     pub degree: Degree,
-    /// Messages over this edge in the window, if known.
+    /// The number of messages over this edge in the window, if known.
     pub count: Option<u64>,
-    /// The same per second; `None` where not known.
+    /// The messages per second over this edge; `None` where not known.
     pub hz: Option<f64>,
 }
 
-/// The computation graph of one window. Each list is sorted by id; an element that is not there is not listed.
+/// The computation graph of one window. Each list is sorted by id; an element that does not exist in the window is not
+/// listed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Graph {
     /// Nodes in the window.
@@ -193,7 +194,7 @@ pub struct Graph {
     pub subscribes: Vec<EdgeState>,
 }
 
-/// One element of the mission.
+/// A node, topic or edge of the mission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Element {
     /// A node.
@@ -207,7 +208,7 @@ pub enum Element {
 }
 
 impl Element {
-    /// The word for its kind in JSON: `node`, `topic`, `publish` or `subscribe`.
+    /// The word for the element's kind in JSON: `node`, `topic`, `publish` or `subscribe`.
     pub fn word(self) -> &'static str {
         match self {
             Self::Node(_) => "node",
@@ -230,7 +231,7 @@ impl Elements {
         }
     }
 
-    /// What proves an element.
+    /// The kinds of evidence for an element.
     pub fn evidence(&self, element: Element) -> Evidence {
         match element {
             Element::Node(id) => self.nodes.get(id as usize).map(|n| n.evidence),
@@ -241,7 +242,7 @@ impl Elements {
         .unwrap_or(Evidence::NONE)
     }
 
-    /// When an element is there, in order, half-open; empty where only windows are known.
+    /// The intervals in which an element exists, in order, half-open; empty where only windows are known.
     pub fn runs(&self, element: Element) -> &[Span] {
         let runs = match element {
             Element::Node(id) => self.nodes.get(id as usize).map(|n| &n.runs),
@@ -264,10 +265,10 @@ impl Elements {
     }
 }
 
-/// Windows shorter than this have no rates.
+/// The shortest window that has rates, in nanoseconds.
 const SHORTEST_NS: i64 = 1_000_000;
 
-/// The rate of so many messages in a window; `None` below 1 ms.
+/// The rate of `count` messages in a window, in messages per second; `None` below 1 ms.
 pub(crate) fn per_second(count: u64, window: Span) -> Option<f64> {
     let nanos = window.nanos();
     (nanos >= SHORTEST_NS).then(|| count as f64 / (nanos as f64 / 1e9))

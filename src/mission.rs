@@ -1,4 +1,4 @@
-//! The whole sequence: every window with its graph and what changed; written as JSON and read back as an input.
+//! The mission: every window with its graph and changes; written as JSON and read back as an input.
 
 pub(crate) mod activity;
 pub mod events;
@@ -28,17 +28,17 @@ pub use ledger::Ledger;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Window {
-    /// Its place, 0...
+    /// The place, counted from 0.
     pub index: usize,
-    /// Its time; the last one may be shorter than the period.
+    /// The time; the last window may be shorter than the period.
     pub span: Span,
     /// Whether it is shorter than the period.
     pub partial: bool,
-    /// Messages in it.
+    /// The number of messages in it.
     pub messages: u64,
-    /// What changed against the window before; empty in the first.
+    /// The changes since the window before; empty in the first.
     pub changes: Vec<Change>,
-    /// The place in the ledger of the entry that each of the changes belongs to.
+    /// The places in the ledger of the entries that the changes belong to, one for each change.
     pub entries: Vec<EntryId>,
 }
 
@@ -48,63 +48,64 @@ pub struct Window {
 pub struct Mission {
     /// The bags it was read from, in order.
     pub bags: Vec<Report>,
-    /// From the first message to the last, plus 1 ns.
+    /// The time from the first message to the last, plus 1 ns.
     pub span: Span,
-    /// All messages in it.
+    /// The number of messages.
     pub messages: u64,
     /// The length of a window.
     pub period: Period,
-    /// From the start of one window to the start of the next.
+    /// The time from the start of one window to the start of the next.
     pub step: Period,
-    /// Names, types and evidence, once.
+    /// All nodes, topics and edges, with names, types and evidence.
     pub elements: Elements,
     /// The windows in order; those without a message are there too.
     pub windows: Vec<Window>,
     /// The graph of each window.
     pub graphs: Graphs,
-    /// What happened, in continuous time.
+    /// The events, in continuous time.
     pub ledger: Ledger,
-    /// What was alive and how busy on a grid of its own.
+    /// The activity of all elements on a grid of its own.
     pub activity: Activity,
-    /// Where everything was drawn, if it was.
+    /// The places of the drawing, if one was made.
     pub layout: Option<Places>,
-    /// What went wrong without stopping us.
+    /// Problems that did not stop the reading.
     pub notices: Notices,
-    /// What source code offers and was not drawn, a line each; made when bags are read, not part of a mission's file.
+    /// Edges that source code offers and that were not drawn, a line each; made when bags are read, not part of a
+    /// mission's file.
     pub undrawn: Vec<String>,
 }
 
 /// The places of a drawing, in pixels at scale 1, y down.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Places {
-    /// The width of the whole.
+    /// The width of the whole drawing.
     pub width: f64,
-    /// The height of the whole.
+    /// The height of the whole drawing.
     pub height: f64,
-    /// `LR` or `TB`.
+    /// The direction of the drawing, `LR` or `TB`.
     pub orientation: String,
-    /// A box per node and topic drawn, sorted by (what, name).
+    /// The boxes of the nodes and topics drawn, sorted by (what, name).
     pub boxes: Vec<Place>,
 }
 
 /// The place of one node or topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
-    /// `node` or `topic`.
+    /// The kind of element, `node` or `topic`.
     pub what: String,
-    /// Its full name.
+    /// The full name.
     pub name: String,
-    /// Where it stands.
+    /// The box.
     pub rect: Rect,
 }
 
 impl Mission {
-    /// The windows in order, each with its graph, which is made as it is asked for.
+    /// The windows in order, each with its graph, which is built when it is needed.
     pub fn each(&self) -> impl Iterator<Item = (&Window, Graph)> {
         self.windows.iter().zip(&self.graphs)
     }
 
-    /// Finds what changed from each window to the next, by the ledger.
+    /// Finds the changes from each window to the next, by the ledger.
     pub(crate) fn explain(&mut self) {
         let spans = self.windows.iter().map(|w| w.span);
         let windows = spans.zip(&self.graphs);
@@ -114,9 +115,9 @@ impl Mission {
         }
     }
 
-    /// Finds what changed from each window to the next, and makes the ledger of it: for missions of which nothing but
-    /// windows is known. A rate must change by more than the share `threshold`; `restarts` are nodes that began anew
-    /// under the same name, and when, sorted by time.
+    /// Finds the changes from each window to the next, and makes the ledger from them: for missions of which only the
+    /// windows are known. A rate must change by more than the share `threshold`; `restarts` are nodes that restarted
+    /// under the same name, with the times, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
         let mut changes = Changes::new(&self.elements, threshold);
         for (window, graph) in self.windows.iter_mut().zip(&self.graphs) {
@@ -134,14 +135,14 @@ impl Mission {
         }
     }
 
-    /// Whether it is known when elements lived, not only which windows show them.
+    /// Whether the times of lives are known, not only the windows.
     pub(crate) fn knows_lives(&self) -> bool {
         let all = &self.elements;
         all.topics.iter().any(|t| !t.runs.is_empty())
             || all.nodes.iter().any(|n| !n.runs.is_empty())
     }
 
-    /// The name of its bag, or of the first of several and how many more there are.
+    /// The name of the bag, or of the first of several with the number of the others.
     pub fn title(&self) -> String {
         match &self.bags[..] {
             [] => String::new(),

@@ -170,7 +170,7 @@ impl Gather {
     }
 }
 
-/// The findings of one thread, to be told to a sink on another.
+/// The findings of one thread, to be reported to a sink on another.
 #[derive(Default)]
 struct Delivery {
     runs: Vec<(ConnectionId, usize, bool)>,
@@ -271,8 +271,8 @@ impl Sink for BatchSender {
 /// The number of chunks in one part: handing over to another thread costs more than reading a small index.
 pub(crate) const GROUP: usize = 16;
 
-/// Does `work` on the parts `0..count` on `threads` threads and tells `sink` what they find, in the order of the
-/// parts: the same calls as with one thread. `after` is called when a part has been told.
+/// Does `work` on the parts `0..count` on `threads` threads and reports their findings to `sink` in the order of the
+/// parts: the same calls as with one thread. `after` is called when a part has been reported.
 ///
 /// All connections must have been announced before; `work` cannot announce more.
 pub(crate) fn in_order(

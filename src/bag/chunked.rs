@@ -77,7 +77,7 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// Stored facts worth showing, from the first bytes.
     fn facts(head: &[u8]) -> Vec<(String, String)>;
 
-    /// Tells `sink` everything that an independent reader finds.
+    /// Reports everything that an independent reader finds to `sink`.
     fn verify(
         source: &FileSource,
         plan: &Result<ChunkPlan, Unindexed>,
@@ -91,7 +91,7 @@ pub(crate) struct SecondReading {
     pub(crate) compression: BTreeSet<Compression>,
     /// The reason why it did not get to the end, if so.
     pub(crate) stopped: Option<String>,
-    /// Whether it told nothing at all.
+    /// Whether it reported nothing at all.
     pub(crate) refused: bool,
 }
 

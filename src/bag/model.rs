@@ -49,7 +49,7 @@ pub struct Connection {
 /// The part of a connection's payloads that a sink wants. Stamps come in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Want {
-    /// Nothing: the reader stays at its index.
+    /// No payloads: the reader only needs its index.
     #[default]
     Stamps,
     /// The size of each payload, even if that means reading more than the index.
@@ -109,7 +109,7 @@ pub enum Tier {
     Chunks,
     /// Record by record from the front.
     Forward,
-    /// Everything, a second time, by an independent reader.
+    /// By a second, independent reader of the whole bag.
     Verify,
 }
 
@@ -198,7 +198,7 @@ impl Lumps {
 /// The longest payload, or connection record, that is held in memory, in bytes.
 pub(crate) const MOST_PAYLOAD: usize = 16 << 20;
 
-/// Tells `sink` that data was lost because of an error of the system.
+/// Reports to `sink` that data was lost because of an error of the system.
 pub(crate) fn lost(sink: &mut dyn Sink, what: &str, why: &io::Error) {
     sink.notice(Notice::new(NoticeKind::Damaged, format!("{what}: {why}")));
 }

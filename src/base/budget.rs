@@ -1,22 +1,22 @@
 //! The limits on work done for untrusted input, all in one place: every limit with its unit and its reason. Input past
 //! a limit is counted, reported and left out; what was read before it is kept.
 
-/// The most windows that are chosen for a user who asked for no period, whatever the span: each is a frame of a second,
-/// and nobody watches longer than ten minutes.
+/// The most windows that are chosen where no period is given, whatever the span: each is a frame of a second, and ten
+/// minutes is the longest useful video.
 pub(crate) const CHOSEN_WINDOWS: i64 = 600;
 
 /// The most windows that may be asked for: a bag of a day by the second. Each costs about a kilobyte per element.
 pub(crate) const WINDOWS: i64 = 100_000;
 
-/// The longest mission, in days: nobody records for a hundred years, and sums of three such lengths in nanoseconds still
-/// fit a number.
+/// The longest mission, in days: nobody records for a hundred years, and sums of three such lengths in nanoseconds
+/// still fit a number.
 pub(crate) const SPAN_DAYS: i64 = 36_525;
 
 /// The longest style, topology or file of captions, in bytes: a hundred times the largest we know.
 pub(crate) const USER_TEXT: u64 = 16 << 20;
 
-/// The longest topology, in bytes: twenty times the largest graph that anybody saved from `rqt_graph`. Taken apart it needs
-/// eighty times as much memory at worst.
+/// The longest topology, in bytes: twenty times the largest graph known from `rqt_graph`. Parsing it needs eighty times
+/// as much memory at worst.
 pub(crate) const TOPOLOGY: u64 = 4 << 20;
 
 /// The most nodes and edges that a table may name; no mission holds more.
@@ -40,8 +40,8 @@ pub(crate) const MISSION_JSON: u64 = 4 << 30;
 /// The longest job summary file, in bytes, to which a report is appended: GitHub takes 1 MiB.
 pub(crate) const SUMMARY: u64 = 16 << 20;
 
-/// The most names, types and states of a mission: five times the topics of the largest robot known. With all that is kept
-/// about each, in the windows of `info` too, they take about 256 MB.
+/// The most names, types and states of a mission: five times the topics of the largest robot known. With all that is
+/// kept about each, in the windows of `info` too, they take about 256 MB.
 pub(crate) const NAMES: usize = 1 << 16;
 
 /// The longest name, type or state of a mission, in bytes: ROS allows 255 for a name, and the quality of service of a
@@ -88,7 +88,7 @@ pub(crate) const YAML: usize = 8 << 20;
 /// about a hundred bytes while it is read.
 pub(crate) const YAML_VALUES: usize = 250_000;
 
-/// The most notices of different texts; more of them only add to the count of a last one. Nobody reads more.
+/// The most notices of different texts; any more only add to the count of a last one.
 pub(crate) const NOTICES: usize = 200;
 
 /// The work that is left for a launch file: files include each other, texts repeat each other, and neither may run

@@ -157,8 +157,8 @@ pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>
 }
 
 /// A text as it may stand in a cell: control characters are shown, not obeyed, unless it is a message's own `data`, and
-/// what a spreadsheet would take for a formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none of
-/// these signs.
+/// what a spreadsheet would take for a formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none
+/// of these signs.
 pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
     let is_formula =
         text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();

@@ -107,7 +107,7 @@ impl Notices {
         Self::default()
     }
 
-    /// Adds one; an equal one only counts up.
+    /// Adds a notice; an equal one only counts up.
     pub fn add(&mut self, notice: Notice) {
         let full = self.0.len() >= NOTICES;
         let key = (notice.kind, notice.text);
@@ -124,7 +124,7 @@ impl Notices {
         others.into_iter().for_each(|n| self.add(n));
     }
 
-    /// All of them, in order.
+    /// All notices, in order.
     pub fn iter(&self) -> impl Iterator<Item = Notice> + Clone + '_ {
         self.0.iter().map(|((kind, text), count)| Notice {
             kind: *kind,

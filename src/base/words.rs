@@ -211,7 +211,7 @@ pub fn shorten(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(kept + "…")
 }
 
-/// Some of many names: `a, b and c`, or `a, b, c and 4 more`. At least one and at most `most` are named.
+/// A list of names, shortened: `a, b and c`, or `a, b, c and 4 more`. At least one and at most `most` are named.
 pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
     let told: Vec<&str> = names.iter().take(most.max(1)).map(AsRef::as_ref).collect();
     match (told.as_slice(), names.len() - told.len()) {

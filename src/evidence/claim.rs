@@ -123,7 +123,7 @@ impl Claim {
         }
     }
 
-    /// The same claim by new names.
+    /// The same claim with its names renumbered.
     fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
         match self {
             Self::Node(a) => Self::Node(to(a)),

@@ -346,8 +346,8 @@ pub struct Recorded {
     pub notices: Notices,
     /// The credible times; `None` if all of them are.
     pub(crate) believed: Option<Span>,
-    /// From the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is no
-    /// message.
+    /// The time from the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is
+    /// no message.
     pub span: Option<Span>,
 }
 

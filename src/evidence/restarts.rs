@@ -1,5 +1,5 @@
 //! Restarts of nodes under the same name: their sequence numbers fall back, or their latched messages come again after
-//! a silence of all that they publish.
+//! a silence on all their topics.
 
 use std::collections::BTreeMap;
 use std::io;

@@ -1,5 +1,5 @@
-//! From findings to graphs: the elements of the mission with their lives, once; then for each window who is alive, how,
-//! and how busy.
+//! Graphs from findings: the elements of the mission with their lives, once; then for each window the states and rates
+//! of all elements.
 
 pub(crate) mod assemble;
 pub(crate) mod history;
@@ -25,25 +25,25 @@ pub(crate) use assemble::{Windowed, graphs};
 pub(crate) use history::{History, history};
 pub(crate) use rates::{TopicCount, counts};
 
-/// Everything at once for one division of time: for those who need no more than that.
+/// The result of building all graphs for one division of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Built {
-    /// Everything that ever is in the mission.
+    /// All nodes, topics and edges of the mission.
     pub elements: Elements,
     /// A graph per window.
     pub graphs: Vec<Graph>,
-    /// Messages per window.
+    /// The number of messages of each window.
     pub messages: Vec<u64>,
-    /// When everything lived, and how it sent.
+    /// The lives of all elements, and the sending of each publisher.
     pub lives: Lives,
-    /// What is worth saying about what the user gave.
+    /// Notices about the user's files.
     pub notices: Notices,
-    /// Every piece of evidence on what was asked for.
+    /// Every piece of evidence that was asked for.
     pub lines: Vec<EvidenceLine>,
 }
 
-/// Concludes, and builds the graph of each window. Windows are sorted by start, none inside another; they may overlap.
-/// `grace` is that of `graphs`.
+/// Draws the conclusions and builds the graph of each window. Windows are sorted by start, none inside another; they
+/// may overlap. `grace` is that of `graphs`.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.

@@ -1,4 +1,4 @@
-//! What changed from one graph to the next.
+//! The changes from one graph to the next.
 
 mod changes;
 
@@ -10,64 +10,64 @@ use std::sync::Arc;
 use crate::base::time::Stamp;
 use crate::graph::{EdgeState, Element, Graph, NodeId, NodeState, TopicId, TopicState};
 
-/// One reconfiguration, as JSON and the log of events tell it.
+/// A reconfiguration, as in JSON and the log of events.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Change {
-    /// It was not in the window before.
+    /// An element that was not in the window before.
     Added {
-        /// What.
+        /// The element.
         what: Element,
-        /// Its first sign of life in the window, if known.
+        /// The time of its first sign of life in the window, if known.
         time: Option<Stamp>,
     },
-    /// It was in the window before and is not in this one.
+    /// An element that was in the window before and is not in this one.
     Removed {
-        /// What.
+        /// The element.
         what: Element,
-        /// Its last sign of life, if known.
+        /// The time of its last sign of life, if known.
         time: Option<Stamp>,
     },
     /// The rate of a topic or publication changed by more than the threshold.
     Rate {
-        /// A topic or publication.
+        /// The topic or publication.
         what: Element,
         /// Messages per second in the window before.
         from_hz: f64,
-        /// Messages per second in this one.
+        /// Messages per second in this window.
         to_hz: f64,
     },
     /// A topic lost all its publishers and got others.
     HandedOver {
         /// The topic.
         topic: TopicId,
-        /// Who published it before, sorted.
+        /// The publishers before, sorted.
         from: Vec<NodeId>,
-        /// Who publishes it now, sorted.
+        /// The publishers now, sorted.
         to: Vec<NodeId>,
     },
-    /// A node began anew under the same name.
+    /// A node that restarted under the same name.
     Restarted {
         /// The node.
         node: NodeId,
-        /// When it was first seen again.
+        /// The time at which it was first seen again.
         time: Stamp,
     },
     /// A value of an element changed.
     Value {
-        /// Which value.
+        /// The kind of value.
         kind: ValueKind,
-        /// Of what.
+        /// The element.
         what: Element,
-        /// Before, empty if none.
+        /// The value before, empty if none.
         from: Arc<str>,
-        /// Now, empty if none.
+        /// The value now, empty if none.
         to: Arc<str>,
     },
 }
 
 impl Change {
-    /// The word for its kind in JSON and in the log of events.
+    /// The word for the change's kind in JSON and in the log of events.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Added { .. } => "added",
@@ -80,7 +80,7 @@ impl Change {
     }
 }
 
-/// The values that [`Change::Value`] tells of.
+/// The kinds of values in [`Change::Value`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueKind {
     /// The types of a topic.
@@ -92,7 +92,7 @@ pub enum ValueKind {
 }
 
 impl ValueKind {
-    /// Its word in JSON.
+    /// The kind's word in JSON.
     pub fn word(self) -> &'static str {
         match self {
             Self::Type => "type",
@@ -102,27 +102,27 @@ impl ValueKind {
     }
 }
 
-/// What turns one graph into the next, exactly: [`apply`] of it to the first gives the second.
+/// The exact difference between two graphs: [`apply`] of it to the first gives the second.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Diff {
-    /// Nodes.
+    /// Differences in nodes.
     pub nodes: Delta<NodeState>,
-    /// Topics.
+    /// Differences in topics.
     pub topics: Delta<TopicState>,
-    /// Publications.
+    /// Differences in publications.
     pub publishes: Delta<EdgeState>,
-    /// Subscriptions.
+    /// Differences in subscriptions.
     pub subscribes: Delta<EdgeState>,
 }
 
-/// What happened in one list of a graph. Each part is sorted by id.
+/// The difference between one list of two graphs. Each part is sorted by id.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Delta<T> {
-    /// States of what is new.
+    /// States of new elements.
     pub added: Vec<T>,
-    /// Ids of what is gone.
+    /// Ids of removed elements.
     pub removed: Vec<u32>,
-    /// States before and after of what differs in anything.
+    /// States before and after of elements that differ in anything.
     pub changed: Vec<(T, T)>,
 }
 
@@ -142,7 +142,7 @@ impl Diff {
         *self == Self::default()
     }
 
-    /// Whether an element appeared or vanished.
+    /// Whether an element was added or removed.
     pub fn is_structural(&self) -> bool {
         fn moved<T>(delta: &Delta<T>) -> bool {
             !delta.added.is_empty() || !delta.removed.is_empty()
@@ -154,7 +154,7 @@ impl Diff {
     }
 }
 
-/// What changed from `before` to `after`.
+/// The difference from `before` to `after`.
 pub fn diff(before: &Graph, after: &Graph) -> Diff {
     Diff {
         nodes: delta(&before.nodes, &after.nodes),
@@ -164,7 +164,7 @@ pub fn diff(before: &Graph, after: &Graph) -> Diff {
     }
 }
 
-/// The graph that `diff` makes of `before`.
+/// The result of applying `diff` to `before`.
 pub fn apply(before: &Graph, diff: &Diff) -> Graph {
     Graph {
         nodes: patched(&before.nodes, &diff.nodes),
@@ -174,7 +174,7 @@ pub fn apply(before: &Graph, diff: &Diff) -> Graph {
     }
 }
 
-/// Something with a place in the mission's list of elements.
+/// An element state with a place in the mission's list of elements.
 trait HasId {
     fn place(&self) -> u32;
 }
@@ -184,7 +184,7 @@ macro_rules! placed {
 }
 placed!(NodeState, TopicState, EdgeState);
 
-/// Walks two lists that are sorted by id, in step.
+/// The difference between two lists that are sorted by id.
 fn delta<T: HasId + Clone + PartialEq>(before: &[T], after: &[T]) -> Delta<T> {
     let mut delta = Delta::default();
     let (mut old, mut new) = (before.iter().peekable(), after.iter().peekable());

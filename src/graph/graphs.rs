@@ -1,5 +1,5 @@
 //! The graphs of all windows in little memory: per element the windows in which it stays the same, and differences
-//! where it does not. Memory grows with what changes, not with how often one looks.
+//! where it does not. Memory grows with the changes, not with the number of windows.
 
 mod column;
 mod row;
@@ -17,11 +17,11 @@ use crate::base::time::Span;
 /// A graph per window, in order.
 #[derive(Clone, Debug, Default)]
 pub struct Graphs {
-    /// The windows' times.
+    /// The times of the windows.
     spans: Vec<Span>,
-    /// The lifecycle states that occur; rows name them by place, counted from 1.
+    /// The lifecycle states that occur; rows refer to them by place, counted from 1.
     lifecycles: Vec<Arc<str>>,
-    /// What becomes of each node, by id; those behind the last one that is ever there may be left out.
+    /// The rows of each node, by id; nodes behind the last one that ever exists may be left out.
     nodes: Vec<Column>,
     topics: Vec<Column>,
     publishes: Vec<Column>,
@@ -29,17 +29,17 @@ pub struct Graphs {
 }
 
 impl Graphs {
-    /// How many windows there are.
+    /// The number of windows.
     pub fn len(&self) -> usize {
         self.spans.len()
     }
 
-    /// Whether there is no window.
+    /// Whether there are no windows.
     pub fn is_empty(&self) -> bool {
         self.spans.is_empty()
     }
 
-    /// The graphs in order, each made as it is asked for.
+    /// The graphs in order, each built when it is needed.
     pub fn iter(&self) -> Iter<'_> {
         fn cursors(columns: &[Column]) -> Vec<ColumnCursor<'_>> {
             columns.iter().map(Column::cursor).collect()
@@ -59,7 +59,7 @@ impl Graphs {
         self.iter().nth(window)
     }
 
-    /// What an element says in the windows in which it is there, in order, with their places.
+    /// The rows of an element in the windows in which it exists, in order, with the places of the windows.
     pub(crate) fn rows(&self, what: Element) -> impl Iterator<Item = (usize, Row)> + '_ {
         let (columns, id) = match what {
             Element::Node(id) => (&self.nodes, id),
@@ -75,23 +75,23 @@ impl Graphs {
         (0..self.spans.len()).filter_map(row)
     }
 
-    /// The lifecycle state that a row names.
+    /// The lifecycle state in a row.
     pub(crate) fn lifecycle(&self, row: &Row) -> Option<&str> {
         self.lifecycle_of(row.lifecycle)
     }
 
-    /// The same, to be kept.
+    /// The lifecycle state in a row, as a shared text.
     pub(crate) fn lifecycle_word(&self, row: &Row) -> Option<Arc<str>> {
         let place = (row.lifecycle as usize).checked_sub(1)?;
         self.lifecycles.get(place).map(Arc::clone)
     }
 
-    /// Goes through all windows, telling only what differs from the window before.
+    /// A walk through all windows that yields only differences from the window before.
     pub(crate) fn walk(&self) -> ColumnWalk<'_> {
         ColumnWalk::new([&self.nodes, &self.topics, &self.publishes, &self.subscribes])
     }
 
-    /// The lifecycle state of a place, counted from 1.
+    /// The lifecycle state at a place, counted from 1.
     pub(crate) fn lifecycle_of(&self, place: u32) -> Option<&str> {
         let place = (place as usize).checked_sub(1);
         place
@@ -101,7 +101,7 @@ impl Graphs {
 }
 
 impl PartialEq for Graphs {
-    /// Whether all graphs are equal; the numbers of lifecycle states are nobody's business.
+    /// Whether all graphs are equal; the numbers of lifecycle states do not matter.
     fn eq(&self, other: &Self) -> bool {
         self.spans == other.spans && self.iter().eq(other)
     }
@@ -165,14 +165,14 @@ impl<'a> IntoIterator for &'a Graphs {
     }
 }
 
-/// What is there in the next window, by id.
+/// The states of the elements in the next window, by id.
 fn states<T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(u32, &Row) -> T) -> Vec<T> {
     let rows = (0..).zip(cursors);
     rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?)))
         .collect()
 }
 
-/// Takes in the graphs of windows, state by state: each element's in order of the windows, elements in any order.
+/// A writer of the graphs of windows, state by state: each element's in order of the windows, elements in any order.
 #[derive(Debug, Default)]
 pub(crate) struct GraphsWriter {
     spans: Vec<Span>,
@@ -184,7 +184,7 @@ pub(crate) struct GraphsWriter {
 }
 
 impl GraphsWriter {
-    /// Nothing is there yet in these windows.
+    /// A writer for these windows, without any states.
     pub(crate) fn new(spans: Vec<Span>) -> Self {
         Self {
             spans,
@@ -192,7 +192,7 @@ impl GraphsWriter {
         }
     }
 
-    /// Takes in the state of a node in the window at a place.
+    /// Adds the state of a node in the window at a place.
     pub(crate) fn node(&mut self, at: usize, state: &NodeState) {
         let lifecycle = state
             .lifecycle
@@ -202,37 +202,37 @@ impl GraphsWriter {
         self.node_row(state.id, at, row);
     }
 
-    /// Takes in the state of a topic.
+    /// Adds the state of a topic.
     pub(crate) fn topic(&mut self, at: usize, state: &TopicState) {
         self.topic_row(state.id, at, Row::of_topic(state, self.spans[at]));
     }
 
-    /// Takes in the state of a publication.
+    /// Adds the state of a publication.
     pub(crate) fn publish(&mut self, at: usize, state: &EdgeState) {
         self.publish_row(state.id, at, Row::of_edge(state, self.spans[at]));
     }
 
-    /// Takes in the state of a subscription.
+    /// Adds the state of a subscription.
     pub(crate) fn subscribe(&mut self, at: usize, state: &EdgeState) {
         self.subscribe_row(state.id, at, Row::of_edge(state, self.spans[at]));
     }
 
-    /// Takes in what a node says in the window at a place.
+    /// Adds the row of a node in the window at a place.
     pub(crate) fn node_row(&mut self, id: u32, at: usize, row: Row) {
         column(&mut self.nodes, id).push(at, row);
     }
 
-    /// The same of a topic.
+    /// Adds the row of a topic.
     pub(crate) fn topic_row(&mut self, id: u32, at: usize, row: Row) {
         column(&mut self.topics, id).push(at, row);
     }
 
-    /// The same of a publication.
+    /// Adds the row of a publication.
     pub(crate) fn publish_row(&mut self, id: u32, at: usize, row: Row) {
         column(&mut self.publishes, id).push(at, row);
     }
 
-    /// The same of a subscription.
+    /// Adds the row of a subscription.
     pub(crate) fn subscribe_row(&mut self, id: u32, at: usize, row: Row) {
         column(&mut self.subscribes, id).push(at, row);
     }
@@ -242,7 +242,7 @@ impl GraphsWriter {
         place(&mut self.lifecycles, word)
     }
 
-    /// Takes in everything of the window at a place.
+    /// Adds all states of the window at a place.
     pub(crate) fn graph(&mut self, at: usize, graph: &Graph) {
         graph.nodes.iter().for_each(|state| self.node(at, state));
         graph.topics.iter().for_each(|state| self.topic(at, state));
@@ -252,7 +252,7 @@ impl GraphsWriter {
         subscribes.for_each(|state| self.subscribe(at, state));
     }
 
-    /// The graphs.
+    /// Ends the writing.
     pub(crate) fn finish(self) -> Graphs {
         let columns = |writers: Vec<ColumnWriter>| {
             let columns = writers.into_iter().map(ColumnWriter::finish);
@@ -277,7 +277,7 @@ fn column(columns: &mut Vec<ColumnWriter>, id: u32) -> &mut ColumnWriter {
     &mut columns[at]
 }
 
-/// The place of a word in a short list, counted from 1.
+/// The place of a word in a short list, counted from 1; adds it if it is new.
 fn place(words: &mut Vec<Arc<str>>, word: &Arc<str>) -> u32 {
     let found = words.iter().position(|w| w == word).unwrap_or_else(|| {
         words.push(Arc::clone(word));

@@ -1,6 +1,7 @@
-//! Lives in continuous time: when each element began and ended, where the truth lies, and how every sender sent.
+//! Lives in continuous time: the beginning and end of each element with their uncertainty, and the sending of every
+//! publisher.
 //!
-//! Windows say only when we look; nothing here depends on them.
+//! Nothing here depends on windows.
 
 use std::sync::Arc;
 
@@ -8,40 +9,40 @@ use super::{NodeId, TopicId};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 
-/// A moment, as well as it is known.
+/// A moment with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bound {
-    /// The sign that tells of it.
+    /// The time of the sign that shows it.
     pub time: Stamp,
-    /// The truth does not lie before this.
+    /// The earliest possible time.
     pub earliest: Stamp,
-    /// The truth does not lie after this.
+    /// The latest possible time.
     pub latest: Stamp,
 }
 
 /// One life of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Life {
-    /// When it is there, half-open.
+    /// The interval in which it exists, half-open.
     pub span: Span,
-    /// When it began; `None` if it may have been there before the mission began.
+    /// The beginning; `None` if it may have existed before the mission began.
     pub began: Option<Bound>,
-    /// When it ended; `None` if nothing tells that it did.
+    /// The end; `None` if no end is known.
     pub ended: Option<Bound>,
 }
 
 /// A run of messages of one sender at one rate, without a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stretch {
-    /// The first message.
+    /// The time of the first message.
     pub first: Stamp,
-    /// The last message.
+    /// The time of the last message.
     pub last: Stamp,
-    /// Messages, 1...
+    /// The number of messages, ≥ 1.
     pub count: u64,
-    /// The median time between them in nanoseconds; 0 with fewer than two.
+    /// The median time between messages in nanoseconds; 0 with fewer than two.
     pub period: i64,
-    /// Whether they come at even times.
+    /// Whether the messages come at even intervals.
     pub is_even: bool,
     /// Whether the stretch before it ends where this one begins: a change of rate, not a gap.
     pub is_joined: bool,
@@ -62,49 +63,49 @@ impl Stretch {
     }
 }
 
-/// All that one sender sent on one topic.
+/// All messages of one sender on one topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Voice {
     /// The topic.
     pub topic: TopicId,
-    /// Who sent; `None` where the bag does not say.
+    /// The node that sent; `None` where the bag does not tell.
     pub node: Option<NodeId>,
-    /// Whether its last message stands for it.
+    /// Whether its last message is latched.
     pub is_latched: bool,
-    /// In order, none overlapping.
+    /// The stretches of even sending, in order, none overlapping.
     pub stretches: Vec<Stretch>,
 }
 
-/// A lifecycle state that a node entered.
+/// A transition of a node to a lifecycle state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transition {
     /// The node.
     pub node: NodeId,
-    /// When.
+    /// The time.
     pub time: Stamp,
-    /// The state.
+    /// The new state.
     pub state: Arc<str>,
 }
 
-/// The lives of all elements, by their places in [`super::Elements`], and what was sent.
+/// The lives of all elements, by their places in [`super::Elements`], and all sending.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lives {
-    /// Of each node, in order.
+    /// The lives of each node, in order.
     pub nodes: Vec<Known>,
-    /// Of each topic.
+    /// The lives of each topic.
     pub topics: Vec<Known>,
-    /// Of each publication.
+    /// The lives of each publication.
     pub publishes: Vec<Known>,
-    /// Of each subscription.
+    /// The lives of each subscription.
     pub subscribes: Vec<Known>,
-    /// What every sender sent, sorted by topic and node.
+    /// The messages of every sender, sorted by topic and node.
     pub voices: Vec<Voice>,
-    /// Lifecycle states, sorted by time.
+    /// Transitions of lifecycle states, sorted by time.
     pub transitions: Vec<Transition>,
 }
 
 impl Lives {
-    /// Nodes that came back under the same name, and when; sorted by time.
+    /// Nodes that restarted under the same name, with the times; sorted by time.
     pub fn returns(&self) -> Vec<(NodeId, Stamp)> {
         let lives = (0..).zip(&self.nodes);
         let again = lives.flat_map(|(id, known)| known.lives.iter().skip(1).map(move |l| (id, l)));
@@ -119,24 +120,25 @@ impl Lives {
 /// The lives of one element.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
-    /// How well it is known at its best.
+    /// The strongest degree of evidence for it.
     pub degree: Degree,
-    /// In order, none overlapping.
+    /// The lives, in order, none overlapping.
     pub lives: Vec<Life>,
 }
 
-/// Fewer messages than this before a pause are no rhythm that could break.
+/// The fewest messages before a pause that make a rhythm.
 const FEWEST: u64 = 5;
-/// A rhythm breaks after a silence of so many periods.
+/// The number of periods of silence that break a rhythm.
 const BREAK: i64 = 5;
-/// And of so many nanoseconds: a recorder starts and stops writing topics up to a second apart.
+/// The shortest silence that breaks a rhythm, in nanoseconds: a recorder starts and stops writing topics up to a second
+/// apart.
 const BREAK_NS: i64 = 2_000_000_000;
-/// Somebody who pauses more often than this, and for more than a fifth of the time, speaks when there is something to
-/// say.
+/// The most pauses of a regular sender: one that pauses more often, and for more than a fifth of the time, sends only
+/// when needed.
 const OFTEN: usize = 4;
 
-/// When a sender with a rhythm was silent while it lived (`lives`, half-open): from its last message to the next, or
-/// to no other. What comes in bursts is never silent.
+/// The silences of a sender with a rhythm while it lived (`lives`, half-open): from the last message to the next, or
+/// `None` for no other. A sender of bursts is never silent.
 pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found = Vec::new();
     for life in lives {
@@ -162,7 +164,7 @@ pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Opt
     found
 }
 
-/// When all of several senders are silent, of whom at least one has a rhythm that broke.
+/// The times at which all of several senders are silent, of which at least one has a rhythm that broke.
 pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
     let mut found: Vec<(Stamp, Option<Stamp>)> = Vec::new();
     for sender in senders {

@@ -1,39 +1,39 @@
-//! When messages came: for every publication and topic the stretches without a long silence, in continuous time.
+//! The times of messages: for every publication and topic the intervals without a long silence, in continuous time.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::base::time::{Span, Stamp};
 
-/// The shortest silence that is one, whatever the rhythm.
+/// The shortest silence, whatever the rhythm, in nanoseconds.
 const SILENCE_NS: i64 = 4_000_000_000;
-/// The same as a share of the mission: below it nothing is seen on paper.
+/// The shortest silence as a share of the mission: shorter ones are invisible on paper.
 const SILENCE_SHARE: f64 = 0.012;
-/// Periods that make a silence.
+/// The number of usual periods that make a silence.
 const PERIODS: i64 = 4;
-/// So many pauses are kept of each topic: a stretch of the mission of which somebody asks holds one of them, or none that
-/// is longer than those within windows.
+/// The most pauses that are kept of each topic: any part of the mission contains one of them, or none that is longer
+/// than those within windows.
 const PAUSES: usize = 32;
 
-/// Stretches of sending, sorted and disjoint, both ends at a message (the end 1 ns after it).
+/// The intervals of sending, sorted and disjoint, both ends at a message (the end 1 ns after it).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sending {
-    /// Per publication, by id; empty where its messages are not known from others'.
+    /// Per publication, by id; empty where its messages are not known apart from others'.
     pub publishes: Vec<Vec<Span>>,
     /// Per topic, by id.
     pub topics: Vec<Vec<Span>>,
-    /// Per topic, by id, its longest pauses, at most 32, in order: each from one message to the next.
+    /// The longest pauses per topic, by id, at most 32, in order: each from one message to the next.
     pub pauses: Vec<Vec<Span>>,
 }
 
-/// The shortest silence in a mission of so many nanoseconds: 4 s, or 1.2 % of it.
+/// The shortest silence in a mission of this length, both in nanoseconds: 4 s, or 1.2 % of it.
 pub(crate) fn shortest_silence(mission: i64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "a share of an i64")]
     let share = (mission as f64 * SILENCE_SHARE) as i64;
     SILENCE_NS.max(share)
 }
 
-/// What was heard of one sequence of messages.
+/// The intervals and gaps of one sequence of messages.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SendingRuns {
     first: Option<Stamp>,
@@ -44,7 +44,7 @@ pub(crate) struct SendingRuns {
 }
 
 impl SendingRuns {
-    /// Takes the next message; `least` is the shortest silence.
+    /// Adds the next message; `least` is the shortest silence.
     pub(crate) fn hear(&mut self, time: Stamp, least: i64) {
         if self.first.is_none() {
             self.first = Some(time);
@@ -69,7 +69,7 @@ impl SendingRuns {
         (whole - gaps.iter().sum::<i64>()) / (self.gaps - long).max(1)
     }
 
-    /// The stretches without a silence, which lasts four usual periods and as long as was said.
+    /// The intervals without a silence, which lasts at least four usual periods and `least`.
     pub(crate) fn stretches(&self) -> Vec<Span> {
         let Some(first) = self.first else {
             return Vec::new();
@@ -93,16 +93,16 @@ impl SendingRuns {
     }
 }
 
-/// The longest pauses of one sequence of messages, as it is heard.
+/// The longest pauses of one sequence of messages, collected message by message.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LongestPauses {
     last: Option<Stamp>,
-    /// By length; the shortest is the first to go.
+    /// The longest so far, by length; the shortest is replaced first.
     longest: BinaryHeap<Reverse<(i64, Stamp)>>,
 }
 
 impl LongestPauses {
-    /// Takes the next message.
+    /// Adds the next message.
     pub(crate) fn hear(&mut self, time: Stamp) {
         let Some(last) = self.last.replace(time) else {
             return;
@@ -117,7 +117,7 @@ impl LongestPauses {
         }
     }
 
-    /// All of them in order.
+    /// All pauses in order.
     pub(crate) fn spans(self) -> Vec<Span> {
         let longest = self.longest.into_iter();
         let span = |Reverse((pause, start)): Reverse<(i64, Stamp)>| Span {

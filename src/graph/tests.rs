@@ -1,4 +1,4 @@
-//! Graphs from hand-made streams.
+//! Tests of graphs from hand-made streams.
 
 use super::*;
 use crate::bag::{Connection, ConnectionId, Encoding, Sink as _};
@@ -51,7 +51,7 @@ fn built(talks: &[Talk<'_>], period: i64, options: &ConcludeOptions, grace: usiz
     build(&recorded, &windows, options, grace).unwrap()
 }
 
-/// The state of one node in each window, `-` where there is none.
+/// The state of one node in each window, `-` where it does not exist.
 fn states(built: &Built, node: &str) -> Vec<&'static str> {
     let id = built
         .elements
@@ -253,7 +253,7 @@ fn windows_may_overlap() {
     assert_eq!(all.messages, [20, 20, 20, 10]);
 }
 
-/// A log record of rospy: when it was made in seconds, by whom, and the topics that it lists.
+/// A log record of rospy: its time in seconds, its node, its text, and the topics that it lists.
 type Log<'a> = (i64, &'a str, &'a str, &'a [&'a str]);
 
 /// A record of `rosgraph_msgs/Log`.
@@ -309,7 +309,7 @@ fn logged(talks: &[Talk<'_>], logs: &[Log<'_>], file: &str) -> Built {
     build(&recorded, &windows, &ConcludeOptions::default(), 0).unwrap()
 }
 
-/// The windows in which a node is there.
+/// The windows in which a node exists.
 fn there(built: &Built, node: &str) -> Vec<usize> {
     let states = states(built, node).into_iter().enumerate();
     states

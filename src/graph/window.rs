@@ -1,4 +1,4 @@
-//! Time divided into periods: which windows a mission has.
+//! Division of time into windows.
 
 use crate::base::budget;
 use crate::base::error::{Error, Result};
@@ -6,7 +6,7 @@ use crate::base::time::{Moment, Period, Span, Stamp};
 use crate::base::words;
 
 const SECOND: i64 = 1_000_000_000;
-/// What a bag shorter than five minutes may get, the longest first.
+/// The periods for a bag shorter than five minutes, in nanoseconds, the longest first.
 const SHORT: [i64; 9] = [
     30 * SECOND,
     20 * SECOND,
@@ -18,7 +18,7 @@ const SHORT: [i64; 9] = [
     SECOND / 5,
     SECOND / 10,
 ];
-/// What a bag longer than 600 minutes may get, the shortest first.
+/// The periods for a bag longer than 600 minutes, in nanoseconds, the shortest first.
 const LONG: [i64; 9] = [
     120 * SECOND,
     300 * SECOND,
@@ -31,7 +31,7 @@ const LONG: [i64; 9] = [
     86_400 * SECOND,
 ];
 
-/// The length of a window, as asked for.
+/// The requested length of a window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Length {
     /// Chosen by the length of the bag: [`default_period`].
@@ -39,13 +39,13 @@ pub enum Length {
     Auto,
     /// One window for the whole bag.
     All,
-    /// This many equal windows, 1...
+    /// This many equal windows, ≥ 1.
     Parts(u32),
-    /// This long.
+    /// This length.
     Fixed(Period),
 }
 
-/// Where windows begin.
+/// The alignment of windows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Align {
     /// At the first message.
@@ -55,47 +55,47 @@ pub enum Align {
     Clock,
 }
 
-/// How time is to be divided.
+/// The requested division of time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Division {
     /// The length of a window.
     pub length: Length,
-    /// From one window's start to the next; equal to the length if `None`.
+    /// The time from one window's start to the next; equal to the length if `None`.
     pub step: Option<Period>,
-    /// Leave out what lies before.
+    /// The beginning of the part to divide; the time before is left out.
     pub start: Option<Moment>,
-    /// Leave out what lies after.
+    /// The end of the part to divide; the time after is left out.
     pub end: Option<Moment>,
-    /// Where windows begin.
+    /// The alignment of windows.
     pub align: Align,
-    /// A window from one turn of the mission to the next, instead of equal ones.
+    /// Windows from one turn of the mission to the next, instead of equal ones.
     pub cut: Option<Cut>,
 }
 
-/// Where the windows of a mission begin that are not equally long.
+/// The places where windows of unequal length begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cut {
     /// With each phase.
     Phases,
-    /// With each reconfiguration: what happens within seconds is one.
+    /// With each reconfiguration; changes within seconds of each other are one.
     Changes,
 }
 
-/// The windows of a mission: all as long as the period, a step apart, but for those cut off by its ends.
+/// The windows of a mission: all as long as the period, a step apart, except those cut off by its ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Windows {
-    /// The time that they divide.
+    /// The divided time.
     pub span: Span,
     /// The length of a whole window.
     pub period: Period,
-    /// From one start to the next, never more than the period.
+    /// The time from one window's start to the next, never more than the period.
     pub step: Period,
-    /// Each window's time, in order; at least one.
+    /// The times of the windows, in order; at least one.
     pub spans: Vec<Span>,
 }
 
 impl Windows {
-    /// Whether the window of this place, 0.., is shorter than the period.
+    /// Whether the window at this place, counted from 0, is shorter than the period.
     pub fn partial(&self, index: usize) -> bool {
         self.spans[index].nanos() < self.period.nanos()
     }
@@ -123,8 +123,8 @@ pub fn range(division: &Division, bag: Span) -> Result<Span> {
     ))
 }
 
-/// The period for a bag of this length where none was asked for: a minute; from 30 s down to 0.1 s for a bag below
-/// five minutes, so that it has at least five windows; from 2 min up to a day, then whole days, above 600 windows.
+/// The default period for a bag of this length: a minute; from 30 s down to 0.1 s for a bag below five minutes, so that
+/// it has at least five windows; from 2 min up to a day, then whole days, above 600 windows.
 pub fn default_period(nanos: i64) -> Period {
     let minute = 60 * SECOND;
     let chosen = if nanos < 5 * minute {
@@ -158,7 +158,7 @@ fn parts_of(nanos: i64, parts: u32) -> Period {
     Period::from_nanos(count(nanos, i64::from(parts.max(1)))).unwrap_or(MINUTE)
 }
 
-/// How many windows of `period` it takes to cover `nanos`, both positive.
+/// The number of windows of `period` that cover `nanos`, both positive.
 fn count(nanos: i64, period: i64) -> i64 {
     nanos / period + i64::from(nanos % period > 0)
 }
@@ -255,7 +255,7 @@ pub(crate) fn every(span: Span, step: i64) -> Vec<Span> {
     starts.map(piece).collect()
 }
 
-/// A period as `--period` takes it.
+/// A period in the form that `--period` takes.
 pub fn plain(nanos: i64) -> String {
     if nanos % SECOND == 0 {
         format!("{}s", nanos / SECOND)

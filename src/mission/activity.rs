@@ -1,4 +1,5 @@
-//! What was alive and how busy, on a grid of its own that no `--period` moves: in it phases are found and figures drawn.
+//! The activity of a mission, on a grid of its own that does not depend on `--period`: in it phases are found and
+//! figures drawn.
 
 use std::cmp::Reverse;
 
@@ -9,11 +10,11 @@ use crate::graph::window::every;
 use crate::graph::{Graph, Node};
 use crate::mission::Mission;
 
-/// The most cells of the grid: more is finer than print, and phases cost their square.
+/// The most cells of the grid: more would be finer than print, and the cost of phases grows with the square.
 pub(crate) const MOST_CELLS: i64 = 200;
 
 const SECOND: i64 = 1_000_000_000;
-/// The lengths that a cell may have up to a day; then whole days.
+/// The possible lengths of a cell up to a day, in seconds; longer ones are whole days.
 const STEPS: [i64; 16] = [
     SECOND,
     2 * SECOND,
@@ -36,14 +37,14 @@ const STEPS: [i64; 16] = [
 /// The graph of a short stretch of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
-    /// Its time; cells follow one another without holes.
+    /// The time; cells follow one another without gaps.
     pub span: Span,
-    /// What was alive in it.
+    /// The graph of the elements alive in it.
     pub graph: Graph,
 }
 
 impl Cell {
-    /// Without what only windows tell: sizes, the spacing of messages, the states of lifecycles.
+    /// A cell without the values that only windows have: sizes, the spacing of messages, the states of lifecycles.
     pub(crate) fn new(span: Span, mut graph: Graph) -> Self {
         for topic in &mut graph.topics {
             (topic.bytes, topic.median_period_s, topic.max_gap_s) = (None, None, None);
@@ -60,16 +61,16 @@ impl Cell {
     }
 }
 
-/// The mission as a finely divided sequence; ids are those of the mission's elements.
+/// The mission as a sequence of short cells; ids are those of the mission's elements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Activity {
-    /// In order, 1 to `MOST_CELLS`; none where nothing was read.
+    /// The cells in order, 1 to `MOST_CELLS`; empty where nothing was read.
     pub cells: Vec<Cell>,
-    /// When messages came, to the nanosecond; empty lists where only windows are known.
+    /// The times of messages, to the nanosecond; empty lists where only windows are known.
     pub sending: Sending,
 }
 
-/// The cells that divide `span`: as short as 1 s, as long as it takes for at most [`MOST_CELLS`].
+/// The cells that divide `span`: of 1 s if possible, of longer steps where there would be more than [`MOST_CELLS`].
 pub(crate) fn grid(span: Span) -> Vec<Span> {
     let nanos = span.nanos().max(1);
     let fits = |step: &i64| nanos / step < MOST_CELLS;
@@ -80,8 +81,8 @@ pub(crate) fn grid(span: Span) -> Vec<Span> {
 }
 
 impl Activity {
-    /// The activity of a mission of which only the windows are known: neighbours are put together until few enough are
-    /// left, by the one of them that holds most messages. Cells of windows that overlap end where the next begins.
+    /// The activity of a mission of which only the windows are known: neighbours are joined until few enough are left,
+    /// each with the graph of the window with most messages. Cells of windows that overlap end where the next begins.
     pub fn of_windows(mission: &Mission) -> Self {
         let many = usize::try_from(MOST_CELLS).unwrap_or(1);
         let stride = mission.windows.len().div_ceil(many).max(1);
@@ -104,7 +105,7 @@ impl Activity {
         }
     }
 
-    /// From the first cell's start to the last one's end.
+    /// The time from the first cell's start to the last one's end.
     pub fn span(&self) -> Span {
         let start = self.cells.first().map_or(Stamp(0), |c| c.span.start);
         let end = self.cells.last().map_or(start, |c| c.span.end);
@@ -117,13 +118,13 @@ impl Activity {
     }
 }
 
-/// Whether a node is a recorder or player, by its name or by what it logs.
+/// Whether a node is a recorder or player, by its name or its log records.
 pub(crate) fn records(node: &Node) -> bool {
     let name = node.name.as_str();
     is_recorder(name) || is_player(name) || node.evidence.words().any(|word| word == "recorder")
 }
 
-/// Whether phases and figures leave out this node: housekeeping, recorders, players.
+/// Whether phases and figures leave out a node: housekeeping, recorders, players.
 pub(crate) fn is_hidden_node(node: &Node) -> bool {
     records(node) || is_quiet(node.name.as_str())
 }
@@ -132,7 +133,7 @@ pub(crate) fn is_hidden_node(node: &Node) -> bool {
 mod tests {
     use super::*;
 
-    /// The number of cells and the length of the first in seconds, for a span of so many seconds.
+    /// The number of cells and the length of the first in seconds, for a span of this many seconds.
     fn cells(seconds: i64) -> (usize, i64) {
         let cells = grid(Span {
             start: Stamp(5),

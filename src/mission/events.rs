@@ -1,4 +1,4 @@
-//! The log of a mission: its ledger as lines for people, or as rows for programs. It depends on no window.
+//! The log of a mission: its ledger as lines for people, or as rows for programs. It does not depend on windows.
 
 mod sentence;
 
@@ -14,7 +14,7 @@ use crate::graph::Element;
 use crate::mission::Mission;
 use crate::mission::ledger::{Detail, Entry, EntryId, Phase};
 
-/// How a log is written.
+/// The format of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LogFormat {
     /// A line per entry, for people.
@@ -28,14 +28,14 @@ pub enum LogFormat {
     Markdown,
 }
 
-/// Which entries are told.
+/// Options for the entries of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LogOptions {
-    /// Each headline's parts too, below it.
+    /// Whether to write each headline's parts below it.
     pub parts: bool,
-    /// Housekeeping and the recorder's too.
+    /// Whether to write housekeeping and the recorder's entries.
     pub all: bool,
-    /// A line before the first entry of each phase.
+    /// Whether to write a line before the first entry of each phase.
     pub phases: bool,
 }
 
@@ -46,8 +46,8 @@ enum LogRow<'a> {
     Part(EntryId, &'a Entry),
 }
 
-/// The log of a mission; ends in a new line unless it is empty. Names are made visible: what would steer a terminal or
-/// turn the direction of text is written as an escape.
+/// The log of a mission; ends in a new line unless it is empty. Characters in names that would control a terminal or
+/// change the direction of text are written as escapes.
 pub fn log(mission: &Mission, format: LogFormat, options: LogOptions) -> String {
     let rows = chosen(mission, options);
     match format {
@@ -85,12 +85,13 @@ fn chosen(mission: &Mission, options: LogOptions) -> Vec<LogRow<'_>> {
     rows
 }
 
-/// Less doubt than this is not worth a word, in nanoseconds: a recorder looks for new topics once a second.
+/// The largest uncertainty of a time that is written as exact, in nanoseconds: a recorder looks for new topics once a
+/// second.
 const SURE_NS: i64 = 4_000_000_000;
-/// Up to so much doubt a time is "about", beyond it lies somewhere between two.
+/// The largest uncertainty of a time that is written as "about", in nanoseconds; with more, it is written as a range.
 const ABOUT_NS: i64 = 10_000_000_000;
 
-/// When it happened, counted from the mission's start: `00:37.9`, `~00:37`, or `00:35–00:58`.
+/// The time of an entry, counted from the mission's start: `00:37.9`, `~00:37`, or `00:35–00:58`.
 fn at(mission: &Mission, entry: &Entry) -> String {
     let second = |time: Stamp| words::offset_seconds(mission.offset(time));
     match entry.latest.since(entry.earliest) {
@@ -100,7 +101,7 @@ fn at(mission: &Mission, entry: &Entry) -> String {
     }
 }
 
-/// What a phase is called in the log.
+/// The title of a phase in the log.
 fn title(at: usize, phase: &Phase) -> String {
     format!("phase {}: {}", at + 1, visible(&phase.name))
 }
@@ -147,7 +148,7 @@ fn markdown(mission: &Mission, rows: &[LogRow<'_>]) -> String {
     all
 }
 
-/// Text that Markdown shows as it is.
+/// A text escaped so that Markdown shows it as it is.
 fn escaped(text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for c in text.chars() {
@@ -221,7 +222,7 @@ fn cells(mission: &Mission, id: EntryId, entry: &Entry) -> Vec<String> {
     ]
 }
 
-/// What an entry says of before and after: numbers, names or values.
+/// The values of an entry before and after: numbers, names or texts.
 fn values(mission: &Mission, entry: &Entry) -> (String, String) {
     let names = |nodes: &[u32]| {
         let name =
@@ -277,7 +278,7 @@ fn phase_line(at: usize, phase: &Phase) -> String {
     ))
 }
 
-/// JSON whose texts show what they hold: characters that cannot be seen are escapes.
+/// JSON in which invisible characters are escapes.
 fn harmless(json: &str) -> String {
     let mut all = String::with_capacity(json.len());
     for c in json.chars() {

@@ -1,4 +1,4 @@
-//! What a bag holds, what is known of its graph and by which evidence, and what cannot be known.
+//! The summary of a bag: its contents, the known graph with its evidence, and missing information.
 
 mod advice;
 mod figure;
@@ -25,7 +25,7 @@ use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, NodeId};
 use crate::mission::Mission;
 
-/// All that `bagreel info` tells of one mission. Written as JSON with these names.
+/// The output of `bagreel info` for one mission. Written as JSON with these names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Info {
     /// Always `bagreel.info/1`.
@@ -36,37 +36,37 @@ pub struct Info {
     pub start_ns: i64,
     /// The last log time + 1 ns.
     pub end_ns: i64,
-    /// From the first to the last message in seconds.
+    /// The time from the first to the last message in seconds.
     pub duration_s: f64,
-    /// All messages.
+    /// The number of messages.
     pub messages: u64,
-    /// How many nodes are known how well.
+    /// The number of nodes by degree of evidence.
     pub nodes_by_degree: DegreeCounts,
-    /// How many publications are known how well.
+    /// The number of publications by degree of evidence.
     pub publishes_by_degree: DegreeCounts,
-    /// How many subscriptions are known how well.
+    /// The number of subscriptions by degree of evidence.
     pub subscribes_by_degree: DegreeCounts,
-    /// Topics that carry messages and of which no publisher is known.
+    /// The number of topics with messages and without a known publisher.
     pub topics_without_publisher: usize,
-    /// Topics that carry messages and of which no subscriber is known; the recorder is none.
+    /// The number of topics with messages and without a known subscriber, not counting the recorder.
     pub topics_without_subscriber: usize,
-    /// Each kind of evidence found, with what it proves.
+    /// Each kind of evidence found, with the number of elements it proves.
     pub evidence: Vec<EvidenceInfo>,
     /// Topics, sorted by name.
     pub topics: Vec<TopicInfo>,
     /// Nodes, sorted by name.
     pub nodes: Vec<NodeInfo>,
-    /// What would have told more, and how to record it; empty if nothing is missing.
+    /// Advice on recording more information; empty if nothing is missing.
     pub advice: Vec<String>,
-    /// The figures for a paper that fit, the best first.
+    /// The suitable figures for a paper, the best first.
     pub figures: Vec<FigureInfo>,
-    /// What source code offers and was not drawn, and what else it tells; a line each.
+    /// Edges that source code offers and that were not drawn, and remarks on the code; a line each.
     pub undrawn: Vec<String>,
-    /// What went wrong without stopping us.
+    /// Problems that did not stop the reading.
     pub notices: Vec<String>,
 }
 
-/// One of the bags.
+/// A bag of the mission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[expect(missing_docs, reason = "the names say what `bag::Report` documents")]
 pub struct BagInfo {
@@ -80,7 +80,7 @@ pub struct BagInfo {
     pub facts: Vec<(String, String)>,
 }
 
-/// How many elements are known how well at their best.
+/// The numbers of elements by their best degree of evidence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "the names are those of `Degree`")]
 pub struct DegreeCounts {
@@ -100,7 +100,7 @@ impl DegreeCounts {
         }
     }
 
-    /// All of them together.
+    /// The sum of all degrees.
     pub fn total(&self) -> usize {
         self.measured + self.stated + self.inferred + self.declared
     }
@@ -114,68 +114,68 @@ impl FromIterator<Degree> for DegreeCounts {
     }
 }
 
-/// A kind of evidence and how much it proves.
+/// A kind of evidence and the number of elements it proves.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct EvidenceInfo {
-    /// Its word in JSON.
+    /// The source's word in JSON.
     pub source: &'static str,
-    /// Nodes that it proves.
+    /// The number of nodes that it proves.
     pub nodes: usize,
-    /// Publications that it proves.
+    /// The number of publications that it proves.
     pub publishes: usize,
-    /// Subscriptions that it proves.
+    /// The number of subscriptions that it proves.
     pub subscribes: usize,
 }
 
 /// A topic over the whole mission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TopicInfo {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Its types, sorted.
+    /// The types, sorted.
     pub types: Vec<String>,
-    /// Messages.
+    /// The number of messages.
     pub count: u64,
-    /// Messages per second from the first message to the last; `None` with fewer than two.
+    /// Messages per second from the first message to the last; `None` with fewer than two messages.
     pub hz: Option<f64>,
-    /// Payload bytes, if known.
+    /// The number of payload bytes, if known.
     pub bytes: Option<u64>,
-    /// Who publishes it.
+    /// The publishers.
     pub publishers: Vec<String>,
-    /// Who subscribes it, as far as known.
+    /// The known subscribers.
     pub subscribers: Vec<String>,
-    /// Publishers that the bag counts and nobody names; `None` if it counts none.
+    /// The number of publishers that the bag counts but does not name; `None` if it does not count them.
     pub unknown_publishers: Option<u32>,
     /// Quality of service, if known.
     pub qos: Option<String>,
-    /// Messages per equal part of the mission.
+    /// The number of messages in each equal part of the mission.
     pub activity: Vec<u64>,
 }
 
 /// A node over the whole mission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NodeInfo {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// How well it is known at its best.
+    /// The word of the best degree of evidence.
     pub degree: &'static str,
-    /// What proves it.
+    /// The kinds of evidence for it.
     pub evidence: Vec<&'static str>,
-    /// First sign of life, ns since 1970.
+    /// The time of the first sign of life, ns since 1970.
     pub first_ns: Option<i64>,
-    /// Last sign of life.
+    /// The time of the last sign of life, ns since 1970.
     pub last_ns: Option<i64>,
-    /// How many topics it publishes.
+    /// The number of topics that it publishes.
     pub publishes: usize,
-    /// How many topics it is known to subscribe.
+    /// The number of topics that it is known to subscribe.
     pub subscribes: usize,
-    /// Messages that it sent, where publishers are known.
+    /// The number of messages that it sent, where publishers are known.
     pub sent: Option<u64>,
-    /// Messages on the topics that it is known to subscribe; `None` if it is known to subscribe none.
+    /// The number of messages on the topics that it is known to subscribe; `None` if there are none.
     pub received: Option<u64>,
 }
 
-/// Tells of a mission; its windows become the parts of each topic's activity.
+/// The summary of a mission; its windows become the parts of each topic's activity.
 pub fn info(mission: &Mission) -> Info {
     let elements = &mission.elements;
     let best = BestDegrees::of(mission);
@@ -228,7 +228,7 @@ pub fn info(mission: &Mission) -> Info {
     info
 }
 
-/// Whether the bags come from ROS 1, in whatever format; `None` for a mission that nobody recorded.
+/// Whether the bags come from ROS 1, in whatever format; `None` for a mission that was not recorded.
 fn is_ros1(mission: &Mission) -> Option<bool> {
     let bag = mission.bags.first()?;
     let mut facts = bag.facts.iter();
@@ -238,7 +238,7 @@ fn is_ros1(mission: &Mission) -> Option<bool> {
 
 /// Any part of this module as JSON, ending in a new line.
 pub fn json(value: &impl Serialize) -> String {
-    // Only maps with keys that are no strings fail, and there are none.
+    // Only maps with keys that are not strings fail, and there are none.
     let json = serde_json::to_string_pretty(value).unwrap_or_default();
     visible_json(&json).into_owned() + "\n"
 }
@@ -294,14 +294,14 @@ fn better(best: &mut Degree, degree: Degree) {
     *best = degree.min(*best);
 }
 
-/// The word of what stands for publishers that are counted, not named: the summary counts them with their topics.
+/// The word of the evidence for publishers that are counted, not named: the summary counts them with their topics.
 const UNNAMED: &str = "unknown";
 
 fn is_unnamed(evidence: Evidence) -> bool {
     evidence == Evidence::of(UNNAMED)
 }
 
-/// How well each element is known, without those that stand for nodes without a name.
+/// The degree of each element, without stand-ins for nodes without a name.
 fn known(
     degrees: &[Degree],
     evidence: impl Iterator<Item = Evidence>,
@@ -311,7 +311,7 @@ fn known(
         .map(|(degree, _)| degree)
 }
 
-/// Subscriptions with their ids, without those of the recorder, who is no part of the robot.
+/// Subscriptions with their ids, without those of the recorder, which is not part of the robot.
 fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
     let elements = &mission.elements;
     let is_recorder = |edge: &Edge| {
@@ -322,7 +322,7 @@ fn listeners(mission: &Mission) -> impl Iterator<Item = (usize, &Edge)> {
     edges.filter(move |(_, edge)| !is_recorder(edge))
 }
 
-/// How many topics with messages none of these edges is known to lead to.
+/// The number of topics with messages to which none of these edges is known to lead.
 fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usize {
     let known = edges.filter(|edge| !edge.evidence.is_guess());
     let known: BTreeSet<usize> = known.map(|edge| edge.topic as usize).collect();
@@ -330,18 +330,18 @@ fn lacking(topics: &[TopicInfo], edges: &mut dyn Iterator<Item = &Edge>) -> usiz
     spoken.filter(|(id, _)| !known.contains(id)).count()
 }
 
-/// The edges of one node and its messages.
+/// The numbers of edges and messages of one node.
 #[derive(Clone, Default)]
 struct NodeTraffic {
     publishes: usize,
     subscribes: usize,
-    /// `None` where no count is known.
+    /// The number of messages sent; `None` where not known.
     sent: Option<u64>,
-    /// `None` for a node that subscribes nothing.
+    /// The number of messages received; `None` for a node without subscriptions.
     received: Option<u64>,
 }
 
-/// The traffic of every node, in one pass over the edges.
+/// The traffic of every node, computed in one pass over the edges.
 fn traffic(mission: &Mission, topics: &[TopicInfo]) -> Vec<NodeTraffic> {
     let elements = &mission.elements;
     let mut traffic = vec![NodeTraffic::default(); elements.nodes.len()];

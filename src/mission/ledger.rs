@@ -1,6 +1,7 @@
-//! What happened in a mission, in continuous time: one list, made once on the full graph, before any window or view.
+//! The events of a mission, in continuous time: one list, made once on the full graph, before any window or view.
 //!
-//! Windows only say when we look. Whatever tells a change (chips, captions, marks, tables, pages, the log) reads this.
+//! It does not depend on windows. All outputs that show a change (chips, captions, marks, tables, pages, the log) read
+//! this.
 
 mod changes;
 mod from_changes;
@@ -21,15 +22,16 @@ use crate::mission::Window;
 pub(crate) use changes::{explain, places};
 pub(crate) use make::{LedgerInput, make, sorted};
 
-/// A launch file brings its nodes up one after the other, each within this time.
+/// The longest time between headlines of one turn, in nanoseconds: a launch file starts its nodes one after the other,
+/// each within this time.
 const CLOSE_NS: i64 = 2_000_000_000;
-/// Nobody looks at more turns of a mission than windows are chosen for it.
+/// The most turns of a mission: as many as windows are chosen for it.
 const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
 
 /// An entry's place in [`Ledger::entries`].
 pub type EntryId = u32;
 
-/// Everything that happened, and the phases in which it did.
+/// All events of a mission, and its phases.
 ///
 /// ```
 /// use bagreel::values::Kind;
@@ -49,14 +51,14 @@ pub type EntryId = u32;
 pub struct Ledger {
     /// Sorted by time, then kind, then name: the log never runs backwards.
     pub entries: Vec<Entry>,
-    /// Stretches that one graph describes, in order and without holes; empty where they were not looked for.
+    /// The phases, in order and without gaps; empty where they were not searched.
     pub phases: Vec<Phase>,
-    /// Whether it tells how a mission, B, differs from another, A: what started or appeared is only in B, what stopped or
-    /// vanished only in A, and times mean nothing.
+    /// Whether it is the comparison of a mission, B, with another, A: elements that started or appeared are only in B,
+    /// elements that stopped or vanished only in A, and times have no meaning.
     pub(crate) compares: bool,
 }
 
-/// What kind of thing happened. Ordered as entries of one time are told.
+/// The kind of an event. Ordered as entries of one time are listed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Kind {
@@ -66,7 +68,7 @@ pub enum Kind {
     Stopped,
     /// A node, or an anonymous role, was gone from [`Entry::time`] to [`Entry::until`] and is back.
     Restarted,
-    /// A node or topic with a rhythm paused from [`Entry::time`] to [`Entry::until`]; nothing proves a restart.
+    /// A node or topic with a rhythm paused from [`Entry::time`] to [`Entry::until`]; there is no proof of a restart.
     Silent,
     /// A topic of unknown publisher, or an edge of a living node, began.
     Appeared,
@@ -85,7 +87,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them, in their order.
+    /// All kinds, in their order.
     pub const ALL: [Self; 11] = [
         Self::Started,
         Self::Stopped,
@@ -100,7 +102,7 @@ impl Kind {
         Self::Qos,
     ];
 
-    /// Its word in JSON and in the log.
+    /// The kind's word in JSON and in the log.
     pub fn word(self) -> &'static str {
         match self {
             Self::Started => "started",
@@ -118,68 +120,68 @@ impl Kind {
     }
 }
 
-/// What an entry says beside its kind and its time.
+/// The values of an entry besides its kind and time.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Detail {
-    /// Nothing more.
+    /// No values.
     #[default]
     None,
     /// Messages per second before and after; both above 0.
     Rates {
-        /// Before.
+        /// The rate before.
         from_hz: f64,
-        /// After.
+        /// The rate after.
         to_hz: f64,
     },
-    /// Who sent before and who sends after, sorted.
+    /// The senders before and after, sorted.
     Senders {
-        /// Before.
+        /// The senders before.
         from: Vec<NodeId>,
-        /// After.
+        /// The senders after.
         to: Vec<NodeId>,
     },
     /// A value before and after; empty for none.
     Values {
-        /// Before.
+        /// The value before.
         from: Arc<str>,
-        /// After.
+        /// The value after.
         to: Arc<str>,
     },
 }
 
-/// One thing that happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Entry {
-    /// What kind of thing.
+    /// The kind.
     pub kind: Kind,
-    /// To whom or what. Where an anonymous role restarted, its new node.
+    /// The element. Where an anonymous role restarted, its new node.
     pub what: Element,
-    /// When, as well as we know.
+    /// The best estimate of the time.
     pub time: Stamp,
-    /// The truth does not lie before this.
+    /// The earliest possible time.
     pub earliest: Stamp,
-    /// The truth does not lie after this.
+    /// The latest possible time.
     pub latest: Stamp,
-    /// When it was over, of what lasts: a restart, a silence.
+    /// The end of an event that lasts: a restart, a silence.
     pub until: Option<Stamp>,
-    /// What more there is to say.
+    /// The values of the event.
     pub detail: Detail,
-    /// How well it is known.
+    /// The strength of the evidence for it.
     pub degree: Degree,
-    /// What proves it.
+    /// The kinds of evidence for it.
     pub evidence: Evidence,
     /// The entry that this one is a part of: an edge of a node that started. Parts have no parts.
     pub part_of: Option<EntryId>,
-    /// Whether it is housekeeping or the recorder's, which is told only when asked for.
+    /// Whether it is housekeeping or the recorder's, which is shown only when asked for.
     pub quiet: bool,
-    /// How many elements it moved, itself and its parts, 1...
+    /// The number of elements in it, itself and its parts, ≥ 1.
     pub weight: u32,
 }
 
 impl Entry {
-    /// Whether it is told by itself: neither quiet nor part of another.
+    /// Whether it is shown by itself: neither quiet nor part of another.
     pub fn is_headline(&self) -> bool {
         !self.quiet && self.part_of.is_none()
     }
@@ -189,28 +191,28 @@ impl Entry {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Phase {
-    /// From when to when, half-open.
+    /// The interval, half-open.
     pub span: Span,
-    /// What it is called: the user's name, or what began in it: `+4 nodes: controller, costmap and 2 more`.
+    /// The name: the user's, or the elements that began in it: `+4 nodes: controller, costmap and 2 more`.
     pub name: Arc<str>,
-    /// Nodes (roles; topics where publishers are unknown) that are there and were not in the phase before; in the first
-    /// phase all that are there.
+    /// The number of nodes (roles; topics where publishers are unknown) that are in it and were not in the phase
+    /// before; in the first phase, the number of all nodes.
     pub nodes_added: u32,
-    /// Nodes that were in the phase before and are not there.
+    /// The number of nodes that were in the phase before and are not in this one.
     pub nodes_removed: u32,
     /// Whether it stands for many short phases in a row that only added or only removed.
     pub is_ramp: bool,
-    /// The earlier phase, by place, that has the same configuration.
+    /// The place of the earlier phase that has the same configuration.
     pub same_as: Option<u32>,
 }
 
 impl Ledger {
-    /// What the changes from window to window say, where nothing finer is known.
+    /// The ledger from the changes between windows, where nothing finer is known.
     pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Self {
         from_changes::from_changes(elements, windows)
     }
 
-    /// What is said of whatever an entry of this kind is about.
+    /// The word for the element of an entry of this kind.
     pub(crate) fn word(&self, kind: Kind) -> &'static str {
         match kind {
             Kind::Started | Kind::Appeared if self.compares => "only in B",
@@ -233,7 +235,8 @@ impl Ledger {
         self.inside(span).filter(|(_, e)| e.is_headline())
     }
 
-    /// When the mission reconfigured inside `span`: the first headline of each run of them that are close together.
+    /// The times at which the mission reconfigured inside `span`: the first headline of each run of them that are close
+    /// together.
     pub fn turns(&self, span: Span) -> Vec<Stamp> {
         let close = CLOSE_NS.max(span.nanos() / MOST_TURNS);
         let mut turns = Vec::new();
@@ -247,7 +250,7 @@ impl Ledger {
         turns
     }
 
-    /// The places of all entries' parts, in order, by the places of those entries.
+    /// The places of the parts of all entries, in order, by the places of those entries.
     pub fn all_parts(&self) -> BTreeMap<EntryId, Vec<EntryId>> {
         let mut parts: BTreeMap<EntryId, Vec<EntryId>> = BTreeMap::new();
         for (id, entry) in (0..).zip(&self.entries) {

@@ -1,8 +1,8 @@
-//! Phases: stretches of a mission that one graph describes, found by an optimal partition of its activity.
+//! Phases: parts of a mission that one graph describes, found by an optimal partition of its activity.
 //!
-//! A boundary must save enough *element-seconds* of wrongly drawn graph, so that crashes, restarts and slow topics cut
-//! nothing, and the majority graph of a phase is the configuration that the mission was in. The result depends on the
-//! mission alone, never on `--period`.
+//! A boundary must save enough *element-seconds* of wrongly drawn graph, so that crashes, restarts and slow topics do
+//! not cause boundaries, and the majority graph of a phase is the configuration that the mission was in. The result
+//! depends on the mission alone, never on `--period`.
 
 mod name;
 mod partition;
@@ -20,19 +20,20 @@ use crate::graph::{Elements, TopicId};
 use crate::mission::activity::{Activity, Cell};
 use crate::mission::ledger::Phase;
 
-/// A boundary is looked for this far around its cell, in nanoseconds and as a share of the mission.
+/// The distance from a boundary's cell within which its exact time is searched, in nanoseconds and as a part of the
+/// mission (one in so many).
 const AROUND: (i64, i64) = (6_000_000_000, 33);
 
-/// What describes one phase: its majority graph.
+/// The configuration of a phase: its majority graph.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Configuration {
-    /// Nodes by role, topics by name where publishers are unknown: there for at least half of the time.
+    /// Nodes by role, topics by name where publishers are unknown: those that exist for at least half of the time.
     pub(crate) names: BTreeSet<Arc<str>>,
     /// Topics with a role that sends more than half of their messages.
     pub(crate) senders: BTreeMap<TopicId, Arc<str>>,
 }
 
-/// The phases of a mission, in order and without holes: one for a mission that does not change, none for one without
+/// The phases of a mission, in order and without gaps: one for a mission that does not change, none for one without
 /// activity.
 pub fn phases(elements: &Elements, activity: &Activity) -> Vec<Phase> {
     let present = presences(elements, activity);
@@ -59,7 +60,7 @@ pub fn phases(elements: &Elements, activity: &Activity) -> Vec<Phase> {
     told(&spans, &found, &ramps, unit)
 }
 
-/// Phases that somebody else cut, such as the user: what each changes, by majority.
+/// The phases for intervals chosen elsewhere, such as by the user, with the changes between them, by majority.
 pub(crate) fn of_spans(elements: &Elements, activity: &Activity, spans: &[Span]) -> Vec<Phase> {
     let present = presences(elements, activity);
     let found: Vec<Configuration> = spans
@@ -73,7 +74,7 @@ pub(crate) fn of_spans(elements: &Elements, activity: &Activity, spans: &[Span])
     told(spans, &found, &vec![false; spans.len()], unit)
 }
 
-/// The majority graph of a phase that was found, or of any other stretch of time, by the cells whose middle lies in it.
+/// The majority graph of a phase or of any other interval, by the cells whose middle lies in it.
 pub(crate) fn configuration_of(
     elements: &Elements,
     activity: &Activity,
@@ -106,7 +107,7 @@ fn configuration(
     }
 }
 
-/// What is there in at least half of these cells.
+/// The elements that exist in at least half of these cells.
 fn majority(
     activity: &Activity,
     present: &[Presence],
@@ -125,7 +126,7 @@ fn majority(
     names.map(|p| p.subject.name()).collect()
 }
 
-/// Who sends more than half of a topic's messages in these cells.
+/// The senders of more than half of a topic's messages in these cells.
 fn senders(elements: &Elements, cells: &[Cell]) -> BTreeMap<TopicId, Arc<str>> {
     let mut all = vec![0_u64; elements.topics.len()];
     let mut counts = vec![0_u64; elements.publishes.len()];
@@ -156,7 +157,8 @@ fn senders(elements: &Elements, cells: &[Cell]) -> BTreeMap<TopicId, Arc<str>> {
     sent.into_iter().filter_map(main).collect()
 }
 
-/// Where phases begin and end: at the median of the exact starts and stops of what differs, near the cell's start.
+/// The boundaries of phases: at the median of the exact starts and stops of the elements that differ, near the cell's
+/// start.
 fn boundaries(
     elements: &Elements,
     activity: &Activity,
@@ -176,7 +178,7 @@ fn boundaries(
     bounds
 }
 
-/// The median of the exact times at which what differs between two phases began or ended, near `cell`.
+/// The median of the exact times at which the elements that differ between two phases began or ended, near `cell`.
 fn differing(
     elements: &Elements,
     activity: &Activity,
@@ -222,7 +224,7 @@ fn told(spans: &[Span], found: &[Configuration], ramps: &[bool], unit: &str) -> 
     (0..spans.len()).map(phase).collect()
 }
 
-/// Whether two phases have the same nodes, and no topic another main sender.
+/// Whether two phases have the same nodes, and each topic the same main sender.
 fn is_same(a: &Configuration, b: &Configuration) -> bool {
     let agree = |(topic, sender): (&TopicId, &Arc<str>)| {
         b.senders.get(topic).is_none_or(|other| other == sender)

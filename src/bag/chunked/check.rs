@@ -1,4 +1,4 @@
-//! The messages found in a chunk, held until the index behind it has told how many there were.
+//! The messages found in a chunk, held until the index behind it has been read.
 
 use crate::bag::adapters::Gather;
 use crate::bag::model::{ConnectionId, Sink};
@@ -16,7 +16,7 @@ pub(super) struct Behind {
 #[derive(Default)]
 pub(super) struct ToldMessages {
     gather: Gather,
-    /// The number of messages of the bag that have been told, or will be.
+    /// The number of messages of the bag that have been reported, or will be.
     pub(super) messages: u64,
     /// Whether the chunk is damaged, so that its index is believed instead.
     doubtful: bool,
@@ -72,8 +72,8 @@ impl ToldMessages {
         }
     }
 
-    /// Tells all messages; returns the number of those that only the index has. Where chunk and index disagree, the
-    /// index is believed if the chunk is damaged or has lost more messages than it has in excess.
+    /// Reports all messages to `sink`; returns the number of those that only the index has. Where chunk and index
+    /// disagree, the index is believed if the chunk is damaged or has lost more messages than it has in excess.
     pub(super) fn settle(&mut self, sink: &mut dyn Sink) -> u64 {
         let believed = self.doubtful || self.missing > self.surplus;
         let mut witnessed = 0;

@@ -15,7 +15,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
 impl<G: Grammar> Query<'_, G> {
-    /// Tells `sink` all stamps of `chunk` and the wanted parts of its messages.
+    /// Reports all stamps of `chunk` and the wanted parts of its messages to `sink`.
     pub(super) fn read(&self, chunk: &Chunk, sink: &mut dyn Sink) {
         // Without an index here the bag has said elsewhere that the chunk is empty.
         let Some(promised) = &chunk.promised else {
@@ -126,7 +126,7 @@ impl<G: Grammar> Query<'_, G> {
         self.body(&here).ok().flatten()
     }
 
-    /// Tells `sink` of the chunk at the position of `stream`, record by record, and reports damage in it.
+    /// Reports the chunk at the position of `stream` to `sink`, record by record, and damage in it.
     fn told(&self, stream: &mut ByteStream<'_>, what: Share, sink: &mut dyn Sink) {
         if let Err(why) = self.walk(stream, what, sink) {
             let text = format!("a chunk is damaged inside: {why}");
@@ -159,11 +159,11 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-/// The part of a chunk that is told.
+/// The part of a chunk that is reported.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Share {
     Whole,
-    /// Only the wanted payloads: the stamps are told by an index elsewhere.
+    /// Only the wanted payloads: the stamps are reported by an index elsewhere.
     Payloads,
 }
 

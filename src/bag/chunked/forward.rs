@@ -213,7 +213,7 @@ impl<G: Grammar> Forward<'_, G> {
         pass(stream, len)
     }
 
-    /// Tells the messages of the last chunk, once everything behind it has been read.
+    /// Reports the messages of the last chunk, once everything behind it has been read.
     fn settle(&mut self) {
         let mended = self.told.settle(self.sink);
         if mended > 0 {

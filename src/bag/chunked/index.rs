@@ -1,4 +1,4 @@
-//! The index behind a chunk, told to a sink; and wanted messages, picked out of the chunk's bytes.
+//! The index behind a chunk, reported to a sink; and wanted messages, picked out of the chunk's bytes.
 
 use std::io;
 use std::marker::PhantomData;
@@ -106,7 +106,7 @@ pub(super) struct Query<'a, G> {
 }
 
 impl<G: Grammar> Query<'_, G> {
-    /// Tells `sink` the stamps of `index`, and the wanted messages from `body`.
+    /// Reports the stamps of `index` to `sink`, and the wanted messages from `body`.
     pub(super) fn tell(
         &self,
         index: &Index,
@@ -193,7 +193,7 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-/// Tells `sink` one wanted message; returns its size, or `None` if it is not there.
+/// Reports one wanted message to `sink`; returns its size, or `None` if it is not there.
 fn pick<G: Grammar>(
     stream: &mut ByteStream<'_>,
     base: u64,

@@ -26,7 +26,7 @@ struct Crate<'s> {
     gather: Gather,
 }
 
-/// Tells `sink` everything that the crate finds.
+/// Reports everything that the crate finds to `sink`.
 ///
 /// # Errors
 /// The reason why it did not get to the end: a wrong checksum, a cut, or another breach of the format.

@@ -21,8 +21,8 @@ use crate::base::time::Stamp;
 /// The largest chunk that the crate may unpack into memory, in bytes.
 const LARGEST_CHUNK: u32 = 256 << 20;
 
-/// Tells `sink` everything that the crate finds. `plan` holds the place of the index: without one the crate does not
-/// read.
+/// Reports everything that the crate finds to `sink`. `plan` holds the place of the index: without one the crate does
+/// not read.
 pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -> SecondReading {
     let mut verified = SecondReading::default();
     let bag = bound(source, plan, &mut verified).and_then(|()| {

@@ -24,7 +24,7 @@ pub(super) struct RowReader<'a> {
     /// The query without payloads.
     bare: String,
     wants: &'a [Want],
-    /// Whether the sizes of all payloads are told.
+    /// Whether the sizes of all payloads are reported.
     sized: bool,
     /// Whether rows come in the order of their ids: not by the index of times, which a range may use.
     in_order: bool,
@@ -32,7 +32,7 @@ pub(super) struct RowReader<'a> {
     allowance: Arc<Allowance>,
 }
 
-/// The numbers of rows that could not be told, or not fully.
+/// The numbers of rows that could not be reported, or not fully.
 #[derive(Default)]
 struct LostRows {
     orphans: u64,
@@ -50,9 +50,9 @@ enum Direction {
 /// A part that is being read.
 struct RowReading<'a, 's> {
     rows: &'a RowReader<'a>,
-    /// The rows that have not been told.
+    /// The rows that have not been reported.
     left: RowRange,
-    /// Whether a row came that had been told: the pages of a damaged table can form a ring.
+    /// Whether a row came that had been reported: the pages of a damaged table can form a ring.
     repeated: bool,
     lost: LostRows,
     gather: Gather,
@@ -63,7 +63,7 @@ struct RowReading<'a, 's> {
 const MOST_RETRIES: u64 = 1000;
 
 impl RowReading<'_, '_> {
-    /// Tells the remaining rows, starting from one end. Of a row whose payload is damaged the time is told.
+    /// Reports the remaining rows, starting from one end. Of a row whose payload is damaged the time is reported.
     fn on(&mut self, way: Direction) -> Result<(), String> {
         let order = match way {
             // SQLite goes through the rows in their order unless there is a range, which has an index.
@@ -93,7 +93,7 @@ impl RowReading<'_, '_> {
         }
     }
 
-    /// Tells the rows of a query, and narrows the range of remaining rows.
+    /// Reports the rows of a query, and narrows the range of remaining rows.
     fn some(&mut self, db: &Db, sql: &str, way: Direction) -> Result<(), Refusal> {
         let in_order = self.rows.in_order;
         self.repeated = false;
@@ -138,7 +138,7 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    /// Tells `sink` the rows of a part. Where a page is damaged, the rows behind it are read from the other end.
+    /// Reports the rows of a part to `sink`. Where a page is damaged, the rows behind it are read from the other end.
     pub(super) fn read(&self, part: RowRange, sink: &mut dyn Sink) {
         let mut gather = Gather::default();
         gather.sizeless = !self.sized;
@@ -225,7 +225,7 @@ fn sql(bag: &Sqlite3Bag, which: &str, range: Option<Span>) -> String {
     )
 }
 
-/// Tells `sink` a payload, unpacked if it is packed; returns its length.
+/// Reports a payload to `sink`, unpacked if it is packed; returns its length.
 fn tell_payload(
     data: &[u8],
     (connection, time): (ConnectionId, Stamp),

@@ -1,7 +1,7 @@
 //! The code of the recording's day from git: the one place that runs a program.
 //!
 //! Code changes between a recording and its analysis; with the code of the day two thirds more edges are found. Git's
-//! own program reads the objects, which knows packs, alternates and object formats. It is asked for the commit, the
+//! own program reads the objects, for it knows packs, alternates and object formats. It is asked for the commit, the
 //! files and their bytes, by commands that run no hook, filter, pager or file-system monitor, prompt for nothing and
 //! fetch nothing. It inherits the environment, without variables that would point it at another repository.
 

@@ -349,8 +349,8 @@ fn draw(
     true
 }
 
-/// Whether a topic may have a publisher that is not known yet: its messages do not name theirs, and more publishers were
-/// offered than are known.
+/// Whether a topic may have a publisher that is not known yet: its messages do not name theirs, and more publishers
+/// were offered than are known.
 fn has_room(known: &Conclusions<'_>, recorded: &RecordedTopics, topic: Name) -> bool {
     let publishers = known.publishers(topic).count();
     let offered = known.offers(topic).map_or(1, |n| n.max(1) as usize);

@@ -3,7 +3,7 @@
 //!
 //! A topic of exactly this name and type that one place of the whole workspace publishes (or subscribes) is that
 //! place's in 135 of 141 cases (96 %), if its node declares mostly topics that were recorded, and no launch file, log
-//! record or known publisher speaks against it. Where several places are possible, 27 % are right.
+//! record or known publisher contradicts it. Where several places are possible, 27 % are right.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -18,11 +18,11 @@ pub(crate) struct MessageLayout {
 /// The degree to which a connection fits a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LayoutFit {
-    /// It has another type or encoding.
+    /// The connection has another type or encoding.
     OtherType,
-    /// It has the type, but not its fields.
+    /// The connection has the type, but not its fields.
     OtherFields,
-    /// It has the layout, as far as the bag tells.
+    /// The connection has the layout, as far as the bag tells.
     Same,
 }
 

@@ -1,5 +1,5 @@
-//! Actions: whoever publishes status, feedback or result is the server and takes goals; whoever publishes goals is a
-//! client and takes the rest. The goals' ids name clients of ROS 1 (`/client-N-time`).
+//! Actions: the publisher of status, feedback or result is the server and subscribes goals; a publisher of goals is a
+//! client and subscribes the rest. The goals' ids name clients of ROS 1 (`/client-N-time`).
 
 use super::SourceContext;
 use crate::bag::Encoding;

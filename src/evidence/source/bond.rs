@@ -1,4 +1,4 @@
-//! Bonds: whoever publishes a bond topic (`bond/Status`) also subscribes it.
+//! Bonds: a node that publishes a bond topic (`bond/Status`) also subscribes it.
 
 use crate::evidence::claim::SourceId;
 use crate::evidence::proof::Conclusions;

@@ -1,4 +1,4 @@
-//! Diagnostics: the name of a status begins with its node (`ns/node: …`); whoever publishes `/diagnostics_agg`
+//! Diagnostics: the name of a status begins with its node (`ns/node: …`); a node that publishes `/diagnostics_agg`
 //! subscribes `/diagnostics`.
 
 use super::SourceContext;

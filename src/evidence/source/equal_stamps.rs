@@ -178,7 +178,7 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize>
 }
 
 /// The input among flows that one publisher sends with one stamp: the one of the output's type, else the only one that
-/// is not a `CameraInfo`; `None` if that cannot be told.
+/// is not a `CameraInfo`; `None` if that is not clear.
 fn without_siblings(
     flows: &Flows,
     output: &StampFlow,

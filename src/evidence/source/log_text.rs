@@ -1,5 +1,5 @@
-//! Log texts in which a node names a topic that it publishes or subscribes: of rclcpp and rclpy about incompatible quality
-//! of service, of Gazebo's plugins, its bridge and rosserial about their endpoints.
+//! Log texts in which a node names a topic that it publishes or subscribes: of rclcpp and rclpy about incompatible
+//! quality of service, of Gazebo's plugins, its bridge and rosserial about their endpoints.
 
 use super::SourceContext;
 use crate::evidence::claim::{Claim, Degree, SourceId};

@@ -1,4 +1,5 @@
-//! A topic whose messages name no publisher, and which only one node is known to publish: its messages are that node's.
+//! The publisher of a topic whose messages name none: where only one node is known to publish it, the messages are from
+//! that node.
 
 use crate::evidence::claim::{Degree, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};

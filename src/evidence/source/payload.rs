@@ -1,8 +1,8 @@
 //! Messages passed on byte by byte (relay, throttle, mux, drop, republish): the node that publishes the copies
 //! subscribes the topic that had them first.
 //!
-//! Compared are length and the first bytes, by a hash; a content that comes again in its own topic (an empty message, a
-//! constant) says nothing and is counted once.
+//! The length and the first bytes are compared, by a hash; a content that is repeated in its own topic (an empty
+//! message, a constant) shows nothing and is counted once.
 
 use std::collections::hash_map::DefaultHasher;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
@@ -228,8 +228,8 @@ fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
         .sum()
 }
 
-/// Of two inputs that have the same messages, which lie on one path, the one with clearly less spread of lag; neither
-/// if that cannot be told.
+/// The nearer of two inputs that have the same messages, which lie on one path: the one with clearly less spread of
+/// lag; neither if that is not clear.
 fn nearest(matches: &Matches, output: usize, inputs: &[usize]) -> Vec<usize> {
     let pair = |input: usize| matches.pairs[&(input, output)];
     let together = |a: usize, b: usize| -> u64 {

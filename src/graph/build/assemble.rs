@@ -1,4 +1,4 @@
-//! The graph of each window: who is there, in which state, how busy.
+//! The graph of each window: the elements in it, their states and rates.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -23,12 +23,12 @@ use crate::graph::{
 pub(crate) struct Windowed {
     /// A graph per window.
     pub graphs: Graphs,
-    /// Messages per window.
+    /// The number of messages of each window.
     pub messages: Vec<u64>,
 }
 
-/// The graph of each window. Windows are sorted by start, none inside another; they may overlap. Somebody who never
-/// speaks again counts as gone after `grace` windows of silence.
+/// Builds the graph of each window. Windows are sorted by start, none inside another; they may overlap. An element
+/// without any later sign counts as gone after `grace` windows of silence.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -64,15 +64,15 @@ struct GraphAssembly<'a> {
     graphs: GraphsWriter,
     messages: Vec<u64>,
     windows: SortedWindows<'a>,
-    /// Windows of silence before somebody who never speaks again counts as gone.
+    /// The number of windows of silence after which an element without later signs counts as gone.
     grace: usize,
     findings: &'a Findings,
     history: &'a History,
-    /// Messages of each known publisher on each topic, in windows with any.
+    /// The number of messages of each known publisher on each topic, in windows with any.
     published: BTreeMap<(Name, Name), Column>,
-    /// Messages of each known publisher per window.
+    /// The number of messages of each known publisher per window.
     sent: BTreeMap<Name, Vec<u64>>,
-    /// The states of each topic in the windows in which it is there.
+    /// The states of each topic in the windows in which it exists.
     topics: BTreeMap<u32, Column>,
 }
 
@@ -193,7 +193,7 @@ impl GraphAssembly<'_> {
         }
     }
 
-    /// A subscription is as lively as its topic.
+    /// Adds the subscriptions: each has the state of its topic.
     fn subscribes(&mut self) {
         let edges = self.history.elements.subscribes.iter();
         for ((id, edge), course) in (0..).zip(edges).zip(&self.history.subscribes) {
@@ -214,7 +214,7 @@ impl GraphAssembly<'_> {
         }
     }
 
-    /// Whether an element is seen in a window.
+    /// Whether an element exists in a window.
     fn sees(&self, course: &ElementHistory, window: Span) -> bool {
         let last = course.lives.len().saturating_sub(1);
         course.lives.iter().enumerate().any(|(at, life)| {

@@ -1,5 +1,4 @@
-//! The elements of the mission with all that holds whatever the windows: when each lived, how it sent, when it was
-//! silent.
+//! The elements of the mission with everything that does not depend on windows: their lives, sending and silences.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -24,22 +23,22 @@ use crate::graph::lives::{
 use crate::graph::sending::Sending;
 use crate::graph::{Edge, Elements, Node, NodeId, State, Topic, TopicId};
 
-/// The elements of a mission, and what holds of them whatever the windows.
+/// The elements of a mission, with everything that does not depend on windows.
 #[derive(Debug, Default)]
 pub(crate) struct History {
-    /// Everything that ever is in it.
+    /// All nodes, topics and edges of the mission.
     pub elements: Elements,
-    /// When everything lived, and how it sent.
+    /// The lives of all elements, and the sending of each publisher.
     pub lives: Lives,
-    /// When messages came, as figures show it.
+    /// The times of messages, as figures show them.
     pub sending: Sending,
-    /// Of each node, in order.
+    /// The history of each node, in order.
     pub(crate) nodes: Vec<ElementHistory>,
-    /// Of each topic.
+    /// The history of each topic.
     pub(crate) topics: Vec<ElementHistory>,
-    /// Of each publication.
+    /// The history of each publication.
     pub(crate) publishes: Vec<ElementHistory>,
-    /// Of each subscription.
+    /// The history of each subscription.
     pub(crate) subscribes: Vec<ElementHistory>,
     pub(crate) node_ids: BTreeMap<Name, NodeId>,
     pub(crate) topic_ids: BTreeMap<Name, TopicId>,
@@ -47,16 +46,16 @@ pub(crate) struct History {
     pub(crate) streams: BTreeMap<Name, Vec<usize>>,
 }
 
-/// How one element looks over the mission but for its messages.
+/// The history of one element over the mission, without its messages.
 #[derive(Clone, Debug)]
 pub(crate) struct ElementHistory {
     pub(crate) lives: Vec<Lifetime>,
     pub(crate) degree: Degree,
-    /// The state that nothing changes while it lives: declared or latched.
+    /// The state that it always has while it lives: declared or latched.
     fixed: Option<State>,
     /// Whether it is silent without a message in the window.
     needs_messages: bool,
-    /// When it was silent although it lived.
+    /// The times at which it was silent although it lived; `None` for a silence to the end.
     silences: Vec<(Stamp, Option<Stamp>)>,
 }
 
@@ -76,7 +75,7 @@ impl ElementHistory {
         }
     }
 
-    /// Its state in a window where it lives, with messages of its own or without.
+    /// The state in a window where it lives, with messages of its own or without.
     pub(crate) fn state(&self, window: Span, has_messages: bool) -> State {
         let covers = |(from, to): &(Stamp, Option<Stamp>)| {
             *from < window.start && to.is_none_or(|to| window.end <= to)
@@ -89,13 +88,13 @@ impl ElementHistory {
         }
     }
 
-    /// Whether nothing but a header or a file tells of it.
+    /// Whether it is known from a header or a file only.
     pub(crate) fn is_declared(&self) -> bool {
         self.fixed == Some(State::Declared)
     }
 }
 
-/// Works out who lived when, and how it sent.
+/// Computes the lives of all elements, and the sending of each publisher.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -145,7 +144,7 @@ fn assembled(tracks: &Tracks, traffic: &Traffic, findings: &Findings) -> History
     all.history
 }
 
-/// What each node sends, but for what is latched.
+/// The messages that each node sends, without latched ones.
 fn sent(traffic: &Traffic) -> BTreeMap<Name, Vec<&[Stretch]>> {
     let mut sent: BTreeMap<Name, Vec<&[Stretch]>> = BTreeMap::new();
     let senders = traffic.values().flat_map(|of| &of.list);
@@ -161,14 +160,14 @@ struct Assembly<'a> {
     history: History,
     findings: &'a Findings,
     traffic: &'a Traffic,
-    /// How many nodes are known to publish each topic.
+    /// The number of known publishers of each topic.
     publishers: BTreeMap<Name, u32>,
-    /// What each node sends, but for what is latched.
+    /// The messages that each node sends, without latched ones.
     sent: BTreeMap<Name, Vec<&'a [Stretch]>>,
 }
 
 impl Assembly<'_> {
-    /// Tells what every sender sent.
+    /// Adds the messages of every sender.
     fn voices(&mut self) {
         for (topic, of) in self.traffic {
             let Some(id) = self.history.topic_ids.get(topic) else {
@@ -186,7 +185,7 @@ impl Assembly<'_> {
         }
     }
 
-    /// Tells when nodes changed their lifecycle states.
+    /// Adds the times at which nodes changed their lifecycle states.
     fn transitions(&mut self) {
         for (node, id) in &self.history.node_ids {
             let states = self.findings.values.transitions(*node);
@@ -259,7 +258,7 @@ impl Assembly<'_> {
         all.topics.push(ElementHistory::new(track, silent));
     }
 
-    /// How many publishers of a topic the bag counts beyond those that are known.
+    /// The number of publishers of a topic that the bag counts beyond the known ones.
     fn unknown_publishers(&self, topic: Name) -> Option<u32> {
         let counted = *self.findings.offers.get(&topic)?;
         let known = self.publishers.get(&topic).copied().unwrap_or(0);
@@ -305,7 +304,7 @@ impl Assembly<'_> {
         }
     }
 
-    /// When all are silent who send on a topic.
+    /// The times at which all senders of a topic are silent.
     fn topic_silences(&self, topic: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
         let Some(of) = self.traffic.get(&topic) else {
             return Vec::new();
@@ -314,14 +313,14 @@ impl Assembly<'_> {
         all_silent(&of, lives)
     }
 
-    /// When all is silent that a node sends.
+    /// The times at which a node is silent on all its topics.
     fn node_silences(&self, node: Name, lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
         let of = self.sent.get(&node).map_or(&[][..], Vec::as_slice);
         all_silent(of, lives)
     }
 }
 
-/// When an element is there, half-open.
+/// The intervals in which an element exists, half-open.
 fn spans(track: &Liveness) -> Vec<Span> {
     let span = |life: &Lifetime| Span {
         start: life.from,
@@ -330,7 +329,7 @@ fn spans(track: &Liveness) -> Vec<Span> {
     track.lives.iter().map(span).collect()
 }
 
-/// What is known of an element's lives, inside the mission.
+/// The known lives of an element, inside the mission.
 fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Known {
     let within = |bound: Bound| Bound {
         earliest: bound.earliest.max(mission.0),

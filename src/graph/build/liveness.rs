@@ -1,30 +1,33 @@
-//! When something is alive: from its first sign to its last, held on by latched messages, ended by proofs of an end.
+//! The lives of elements: from the first sign to the last, extended by latched messages, ended by proofs of an end.
 
 use crate::base::time::Stamp;
 use crate::evidence::restarts::Restart;
 use crate::evidence::{Degree, Evidence};
 use crate::graph::lives::{Bound, Stretch};
 
-/// A node has registered its topics this long after its first sign, in nanoseconds.
+/// The time after its first sign in which a node has registered its topics, in nanoseconds.
 const REGISTRATION_NS: i64 = 1_000_000_000;
-/// From a node's start to the first of its messages in the bag: a recorder looks for new topics once a second, and a
-/// node needs as long to come up. Measured on real missions: 0.8 to 1.3 s, at most 2.4 s.
+/// The longest time from a node's start to the first of its messages in the bag, in nanoseconds: a recorder looks for
+/// new topics once a second, and a node needs as long to come up. Measured on real missions: 0.8 to 1.3 s, at most 2.4
+/// s.
 const DISCOVERY_NS: i64 = 2_500_000_000;
-/// A recorder has found the topics that are there when it starts so soon, in nanoseconds; their messages come a period
-/// later at the latest.
+/// The time in which a recorder has found the topics that exist when it starts, in nanoseconds; their messages come a
+/// period later at the latest.
 const FOUND_NS: i64 = 2_000_000_000;
-/// What a node first sends this long after its start, it advertised at its start.
+/// The longest time from a node's start to its first message on a topic that counts as advertised at the start, in
+/// nanoseconds.
 const ADVERTISED_NS: i64 = 5_000_000_000;
-/// A rhythm is broken by a silence of so many periods, one or two messages are lost now and then.
+/// The number of periods of silence that break a rhythm; one or two messages are lost now and then.
 const BREAK: i64 = 5;
-/// And of so many nanoseconds: a recorder that is stopped writes its topics up to a second apart.
+/// The shortest silence that breaks a rhythm, in nanoseconds: a recorder that is stopped writes its topics up to a
+/// second apart.
 const BREAK_NS: i64 = 2_000_000_000;
-/// Fewer messages than this are no rhythm.
+/// The fewest messages of a rhythm.
 const FEWEST: u64 = 5;
-/// A rhythm with pauses is broken by a silence this many times as long as the longest of them.
+/// The silence that breaks a rhythm with pauses, as a multiple of the longest of them.
 const UNUSUAL: i64 = 3;
 
-/// How far a life reaches.
+/// The extent of a life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Extent {
     /// As far as its signs.
@@ -35,7 +38,7 @@ pub(crate) enum Extent {
     Always,
 }
 
-/// One stretch of being alive, both ends included.
+/// A period of being alive, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lifetime {
     pub(crate) from: Stamp,
@@ -44,14 +47,14 @@ pub(crate) struct Lifetime {
     pub(crate) ended: Option<Bound>,
 }
 
-/// A rhythm in what an element sends: how it sent last.
+/// The rhythm in the messages of an element: of the last stretch of sending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pulse {
     first: Stamp,
     last: Stamp,
-    /// Between two messages, in nanoseconds.
+    /// The time between two messages, in nanoseconds.
     period: i64,
-    /// The longest pause between two stretches of sending; 0 for none.
+    /// The longest pause between two stretches of sending, in nanoseconds; 0 for none.
     pause: i64,
     is_even: bool,
 }
@@ -76,17 +79,17 @@ impl Pulse {
         })
     }
 
-    /// When it beat last.
+    /// The time of the last message.
     pub(crate) fn last(&self) -> Stamp {
         self.last
     }
 
-    /// Whether it is silent for too long at the end.
+    /// Whether the silence at the end is too long for the rhythm.
     pub(crate) fn broke_off(&self, end: Stamp) -> bool {
         end.since(self.last) > self.patience()
     }
 
-    /// The longest silence that says nothing.
+    /// The longest silence that means nothing, in nanoseconds.
     fn patience(&self) -> i64 {
         self.period
             .saturating_mul(if self.is_even { BREAK } else { BREAK * UNUSUAL })
@@ -95,33 +98,33 @@ impl Pulse {
     }
 }
 
-/// What is known about the life of one element.
+/// The known signs and lives of one element.
 #[derive(Clone, Debug)]
 pub(crate) struct Liveness {
     pub(crate) evidence: Evidence,
-    /// How well it is known at its best.
+    /// The strongest degree of evidence for it.
     pub(crate) degree: Degree,
     /// Signs that bound lives: sorted later.
     pub(crate) signs: Vec<Stamp>,
-    /// Signs that bound nothing: of a topic those of its edges, which live by themselves.
+    /// Signs that bound nothing: of a topic those of its edges, which have their own lives.
     pub(crate) seen: Vec<Stamp>,
-    /// Those of the signs by which somebody states what holds already.
+    /// The signs that state a fact that may have begun before.
     pub(crate) stated: Vec<Stamp>,
     /// Proofs of an end.
     pub(crate) ends: Vec<Stamp>,
-    /// The last sign of its own: a message that it sent, or something that it says of itself.
+    /// The last sign of its own: a message that it sent, or a statement about itself.
     pub(crate) heard: Option<Stamp>,
-    /// The rhythms in what it sends.
+    /// The rhythms of its messages.
     pub(crate) pulses: Vec<Pulse>,
-    /// How many senders' messages are proofs of it, and how many of those are latched.
+    /// The number of senders whose messages prove it, and the number of those that are latched.
     pub(crate) senders: (u32, u32),
-    /// Whether it is known by more than latched messages.
+    /// Whether there are more proofs than latched messages.
     pub(crate) speaks: bool,
-    /// Whether it is known by more than moments.
+    /// Whether there are more proofs than moments.
     pub(crate) lasts: bool,
-    /// Whether it lives to the end, whatever its signs say.
+    /// Whether it lives to the end, regardless of its signs.
     pub(crate) unending: bool,
-    /// Whether it is there for the whole mission.
+    /// Whether it exists for the whole mission.
     pub(crate) extent: Extent,
     pub(crate) lives: Vec<Lifetime>,
 }
@@ -148,8 +151,8 @@ impl Default for Liveness {
 }
 
 impl Liveness {
-    /// Adds signs, sorted, that state what holds already; of those with no end between them only the outer two are
-    /// kept.
+    /// Adds signs, sorted, of a fact that may have begun before; of those with no end between them only the outer two
+    /// are kept.
     pub(crate) fn sign_all(&mut self, signs: &[Stamp], ends: &[Stamp]) {
         let before = self.signs.len();
         self.bound_all(signs, ends);
@@ -166,7 +169,7 @@ impl Liveness {
         self.ends.extend(ends);
     }
 
-    /// Takes on what another element proves about this one: an edge proves its node and its topic.
+    /// Adds the proofs of another element that prove this one too: an edge proves its node and its topic.
     pub(crate) fn learn(&mut self, other: &Self) {
         self.evidence = self.evidence.and(other.evidence);
         self.degree = self.degree.min(other.degree);
@@ -180,7 +183,7 @@ impl Liveness {
         self.extent = self.extent.max(other.extent.min(Extent::Whole));
     }
 
-    /// Works out the lives from the signs alone. What nothing tells the end of goes on: no evidence is not absence.
+    /// Computes the lives from the signs alone. A life without a known end goes on: missing evidence is not absence.
     pub(crate) fn live(&mut self, mission: (Stamp, Stamp)) {
         self.signs.sort_unstable();
         self.ends.sort_unstable();
@@ -205,7 +208,7 @@ impl Liveness {
         }
     }
 
-    /// Tells where the truth about a restart lies: the node was there for a period after its last message, and again
+    /// Sets the possible times of a restart: the node still existed for a period after its last message, and again
     /// before its first.
     pub(crate) fn restart(&mut self, restart: &Restart) {
         let period = self.pulses.iter().map(|p| p.period).min().unwrap_or(0);
@@ -221,7 +224,7 @@ impl Liveness {
         }
     }
 
-    /// Takes on what an edge proves about its topic. Its senders are told apart on the topic itself.
+    /// Adds the proofs of an edge to its topic. The senders are counted on the topic itself.
     pub(crate) fn know(&mut self, edge: &Self) {
         self.evidence = self.evidence.and(edge.evidence);
         self.degree = self.degree.min(edge.degree);
@@ -250,7 +253,7 @@ impl Liveness {
         }
     }
 
-    /// Where a rhythm broke off for good, if one did; of what is known by moments only, the last of them.
+    /// The time at which a rhythm broke off for good, if one did; of an element known by moments only, the last moment.
     fn end(&self, mission: Stamp) -> Option<Bound> {
         if !self.lasts && !self.unending {
             return self.signs.last().map(|last| Bound {
@@ -273,8 +276,8 @@ impl Liveness {
         })
     }
 
-    /// Works out the lives of an edge inside those of its node: whoever has advertised or subscribed a topic does so
-    /// until it ends, unless something else is known. What somebody states was so before he said it, unless its absence
+    /// Computes the lives of an edge inside those of its node: a node that has advertised or subscribed a topic does so
+    /// until it ends, unless something else is known. A stated fact was true before the statement, unless its absence
     /// is known; a first message, in contrast, is a beginning.
     pub(crate) fn live_within(&mut self, node: &[Lifetime]) {
         self.signs.sort_unstable();
@@ -310,8 +313,8 @@ impl Liveness {
         }
     }
 
-    /// When the last of some edges ended, of which this is one and the others ended at `last`; `None` if nothing tells
-    /// that it did.
+    /// The end of the last of some edges, of which this is one and the others ended at `last`; `None` if nothing shows
+    /// that it ended.
     pub(crate) fn closed(&self, last: Stamp) -> Option<Stamp> {
         if self.signs.is_empty() {
             return (!self.is_whole()).then_some(last);
@@ -321,7 +324,7 @@ impl Liveness {
         (!open).then_some(last.max(*end))
     }
 
-    /// Whether messages prove it, all of them latched.
+    /// Whether it is proved by messages, all of them latched.
     pub(crate) fn is_latched(&self) -> bool {
         self.senders.0 > 0 && self.senders.0 == self.senders.1
     }
@@ -331,7 +334,7 @@ impl Liveness {
         self.signs.is_empty() && self.is_whole() && self.degree == Degree::Declared
     }
 
-    /// Whether it is there for the whole mission.
+    /// Whether it exists for the whole mission.
     fn is_whole(&self) -> bool {
         match self.extent {
             Extent::Signs => false,
@@ -347,10 +350,10 @@ impl Liveness {
     }
 }
 
-/// A node that is told to end may send for as long as this.
+/// The longest time for which a node that is told to end may still send, in nanoseconds.
 const SHUTDOWN_NS: i64 = 500_000_000;
 
-/// There all the time.
+/// A life for the whole mission.
 pub(crate) fn whole(mission: (Stamp, Stamp)) -> Lifetime {
     Lifetime {
         from: mission.0,
@@ -374,7 +377,7 @@ impl Lifetime {
         }
     }
 
-    /// Ends it by a proof.
+    /// Ends the life by a proof.
     fn close(&mut self, end: Stamp) {
         let last = self.to;
         self.to = end.max(last);
@@ -385,7 +388,7 @@ impl Lifetime {
         });
     }
 
-    /// Sets the beginning of a first life, after nothing: with a rhythm it was not there long before its first sign.
+    /// Sets the beginning of a first life, after nothing: with a rhythm it began shortly before its first sign.
     fn begin(&mut self, mission: Stamp, period: Option<i64>) {
         let late = period.unwrap_or(0);
         if self.from.since(mission) <= FOUND_NS.saturating_add(late) {
@@ -396,8 +399,8 @@ impl Lifetime {
         }
     }
 
-    /// Sets the beginning of an edge's first life inside its node's; `absent` is the first moment at which it may be
-    /// there, if that is known.
+    /// Sets the beginning of an edge's first life inside its node's; `absent` is the first moment at which it may
+    /// exist, if that is known.
     fn begin_within(&mut self, around: &Self, absent: Option<Stamp>, stated: bool) {
         let registered = around.from.plus(REGISTRATION_NS);
         match absent {
@@ -421,8 +424,8 @@ impl Lifetime {
     }
 }
 
-/// Lives between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it. The truth about
-/// an end lies between it and the sign before, about a beginning between it and the end before.
+/// Lives between ends, from sorted signs and sorted ends; an end at the time of a sign comes after it. The true end
+/// lies between the proof and the sign before, the true beginning between the sign and the end before.
 fn lives(signs: &[Stamp], ends: &[Stamp]) -> Vec<Lifetime> {
     let mut lives: Vec<Lifetime> = Vec::new();
     let mut ends = ends.iter().copied().peekable();

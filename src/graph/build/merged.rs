@@ -1,5 +1,5 @@
-//! When the publisher of a merged stream fell silent. A tool that rewrites bags keeps one connection per topic, so that no
-//! message tells who sent it; but where only one node is known to publish a topic, the end of the topic's rhythm is the
+//! Ends of the publishers of merged streams. A tool that rewrites bags keeps one connection per topic, so that no
+//! message names its sender; but where only one node is known to publish a topic, the end of the topic's rhythm is the
 //! end of its own.
 
 use std::collections::BTreeMap;
@@ -13,8 +13,8 @@ use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{ElementKey, Reliability};
 use crate::graph::lives::Stretch;
 
-/// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on says nothing:
-/// somebody else may have taken the topic over.
+/// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on proves
+/// nothing: another node may have taken the topic over.
 pub(crate) fn fall_silent(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
     traffic: &Traffic,
@@ -38,7 +38,7 @@ pub(crate) fn fall_silent(
     }
 }
 
-/// Who is known to publish each topic.
+/// The known publishers of each topic.
 fn publishers(tracks: &BTreeMap<ElementKey, Liveness>) -> BTreeMap<Name, Vec<Name>> {
     let mut all: BTreeMap<Name, Vec<Name>> = BTreeMap::new();
     for what in tracks.keys() {
@@ -49,7 +49,7 @@ fn publishers(tracks: &BTreeMap<ElementKey, Liveness>) -> BTreeMap<Name, Vec<Nam
     all
 }
 
-/// The sender that stands for all of a merged topic's, unless messages outlive it.
+/// The sender that stands for all senders of a merged topic, unless messages are latched.
 fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<&'a Sender> {
     let of = traffic.get(&topic)?;
     let is_merged = |at: &usize| findings.streams[*at].trust == Reliability::First;
@@ -57,8 +57,8 @@ fn merged<'a>(traffic: &'a Traffic, findings: &Findings, topic: Name) -> Option<
     (of.streams.iter().all(is_merged) && !sender.latched).then_some(sender)
 }
 
-/// What each of the publishers sent: one alone all of it, those of one role in turns, each from its start to the next
-/// one's.
+/// The messages of each of the publishers: all of them for a single one; for those of one role, which take turns, those
+/// from its start to the next one's.
 fn turns<'a>(
     nodes: &[Name],
     sender: &'a Sender,

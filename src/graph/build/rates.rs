@@ -1,4 +1,4 @@
-//! How often: messages of each topic and of each of its streams per window, their bytes, periods and gaps.
+//! Rates: messages of each topic and of each of its streams per window, their bytes, periods and gaps.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
@@ -9,7 +9,7 @@ use crate::base::error::Result;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::collector::{Recorded, spool_error};
 
-/// What one topic did in one window.
+/// The messages of one topic in one window.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sums {
     pub(crate) window: usize,
@@ -17,22 +17,22 @@ pub(crate) struct Sums {
     pub(crate) bytes: Option<u64>,
     pub(crate) median_period_s: Option<f64>,
     pub(crate) max_gap_s: Option<f64>,
-    /// Messages of each stream of the topic.
+    /// The number of messages of each stream of the topic.
     pub(crate) streams: Vec<u64>,
 }
 
-/// How many messages a topic has in a window.
+/// The number of messages of a topic in a window.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct TopicCount {
     /// The topic's name.
     pub topic: Arc<str>,
-    /// The window's place.
+    /// The place of the window.
     pub window: usize,
-    /// Messages, 1...
+    /// The number of messages, ≥ 1.
     pub count: u64,
 }
 
-/// Every count of a topic in a window, before anything is concluded. Windows are as for [`super::graphs`].
+/// Counts the messages of every topic in every window, before any conclusions. Windows are as for [`super::graphs`].
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
@@ -55,7 +55,7 @@ pub(crate) fn counts(recorded: &Recorded, windows: &[Span]) -> Result<Vec<TopicC
     Ok(all)
 }
 
-/// A window that messages still fall into.
+/// A window that may still get messages.
 struct OpenWindow {
     window: usize,
     count: u64,
@@ -144,7 +144,7 @@ impl OpenWindow {
     }
 }
 
-/// The middle value in seconds; the mean of both middle ones of an even number.
+/// The median in seconds; the mean of the two middle values of an even number.
 fn median(gaps: &mut [i64]) -> Option<f64> {
     if gaps.is_empty() {
         return None;

@@ -1,4 +1,4 @@
-//! How every sender sent on every topic over the whole mission: even stretches, pauses, first and last messages.
+//! The sending of every sender on every topic over the whole mission: even stretches, pauses, first and last messages.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -12,45 +12,45 @@ use crate::evidence::proof::{Reliability, Stream};
 use crate::graph::lives::Stretch;
 use crate::graph::sending::{LongestPauses, SendingRuns, shortest_silence};
 
-/// What happened on each topic.
+/// The senders of each topic.
 pub(crate) type Traffic = BTreeMap<Name, Senders>;
 
-/// Who sent on one topic.
+/// The senders of one topic.
 #[derive(Debug)]
 pub(crate) struct Senders {
     /// The places of the topic's streams.
     pub(crate) streams: Vec<usize>,
     /// The first and the last message of each stream; `None` if it has none.
     pub(crate) traces: Vec<Option<(Stamp, Stamp)>>,
-    /// What each sender sent: those that are known, sorted, after the unknown ones together.
+    /// The messages of each sender: first the unknown ones together, then the known ones, sorted.
     pub(crate) list: Vec<Sender>,
-    /// The place of each stream's sender among those.
+    /// The place of each stream's sender in `list`.
     pub(crate) of: Vec<usize>,
-    /// When anybody sent.
+    /// The intervals in which there were messages.
     pub(crate) sending: Vec<Span>,
-    /// The longest times in which nobody did.
+    /// The longest pauses of all senders together.
     pub(crate) pauses: Vec<Span>,
 }
 
-/// What one sender sent on one topic, over all its streams: a split recording has one per part.
+/// The messages of one sender on one topic, over all its streams: a split recording has one per part.
 #[derive(Debug)]
 pub(crate) struct Sender {
-    /// `None` for all who are not known.
+    /// The node; `None` for all unknown senders together.
     pub(crate) node: Option<Name>,
     pub(crate) latched: bool,
     pub(crate) stretches: Vec<Stretch>,
-    /// When it sent, as figures show it.
+    /// The intervals of sending, as figures show them.
     pub(crate) sending: Vec<Span>,
 }
 
-/// The node that is believed to have sent the messages of a stream.
+/// The node that sent the messages of a stream, if its name is reliable enough.
 pub(crate) fn sender(stream: &Stream) -> Option<Name> {
     stream
         .speaker
         .filter(|_| stream.trust != Reliability::First)
 }
 
-/// Listens to every topic once.
+/// Reads the times of every topic once.
 pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> io::Result<Traffic> {
     let mut streams: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
     for (at, stream) in findings.streams.iter().enumerate() {
@@ -60,7 +60,7 @@ pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> io::Result<Tr
     streams.into_iter().map(of_topic).collect()
 }
 
-/// Listens to some streams, which together are one topic.
+/// Reads the times of some streams, which together are one topic.
 fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io::Result<Senders> {
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
     let ids: Vec<_> = of_topic.iter().map(|stream| stream.times).collect();
@@ -88,20 +88,20 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
     })
 }
 
-/// What is heard of one sender.
+/// The times of one sender.
 struct SenderTimes {
     node: Option<Name>,
     latched: bool,
     runs: SendingRuns,
     times: Vec<Stamp>,
-    /// Of so many messages one is kept, unless it comes late.
+    /// The number of messages of which one is kept, unless it comes late.
     every: usize,
     passed: usize,
 }
 
-/// The most times kept per sender (32 MB); of more, every second goes.
+/// The most times kept per sender (32 MB); of more, every second one is dropped.
 const MOST_TIMES: usize = 1 << 22;
-/// A message after so much silence is kept in any case, and the one before it.
+/// The silence after which a message is kept in any case, and the one before it, in nanoseconds.
 const LATE_NS: i64 = 500_000_000;
 
 impl SenderTimes {
@@ -142,7 +142,7 @@ impl SenderTimes {
     }
 }
 
-/// The sender of each stream, and what is heard of each sender: nothing yet.
+/// The place of each stream's sender, and the senders without times yet.
 fn places(streams: &[&Stream]) -> (Vec<usize>, Vec<SenderTimes>) {
     let mut latched: BTreeMap<Option<Name>, bool> = BTreeMap::new();
     for stream in streams {

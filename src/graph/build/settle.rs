@@ -1,4 +1,4 @@
-//! The lives of nodes from those of their edges, of edges within those of their nodes, of topics from both.
+//! The lives of nodes from those of their edges, of edges within those of their nodes, of topics from both together.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::evidence::claim::Name;
 use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::restarts::Restarts;
 
-/// Works out all lives; `mission` is its first and its last moment.
+/// Computes all lives; `mission` is its first and its last moment.
 pub(crate) fn settle(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
     proofs: &[Proof],
@@ -80,7 +80,7 @@ pub(crate) fn settle(
     live_like(tracks, proofs, true);
 }
 
-/// Lets elements live like others, which are topics or not; tells which did.
+/// Gives elements the lives of others, which are topics or not; returns those that got them.
 fn live_like(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
     proofs: &[Proof],
@@ -101,7 +101,7 @@ fn live_like(
     done
 }
 
-/// All edges.
+/// All publications and subscriptions with their tracks.
 fn edges(tracks: &BTreeMap<ElementKey, Liveness>) -> Vec<(ElementKey, Liveness)> {
     let is_edge =
         |what: &ElementKey| matches!(what, ElementKey::Publish(..) | ElementKey::Subscribe(..));

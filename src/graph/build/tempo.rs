@@ -3,29 +3,30 @@
 use crate::base::time::Stamp;
 use crate::graph::lives::Stretch;
 
-/// Fewer intervals than this tell no rate.
+/// The fewest intervals that show a rate.
 pub(crate) const FEWEST: usize = 5;
-/// A gap is this many times as long as the usual interval on both of its sides; one or two lost messages are none.
+/// The length of a gap as a multiple of the usual interval on both of its sides; one or two lost messages are not a
+/// gap.
 const GAP: i64 = 5;
-/// And at least this long: shorter pauses are the scheduler's.
+/// The shortest gap, in nanoseconds: shorter pauses are the scheduler's.
 const GAP_NS: i64 = 1_000_000_000;
-/// How many intervals on each side of a gap tell what is usual.
+/// The number of intervals on each side of a gap that show the usual one.
 const AROUND: usize = 9;
-/// The most pieces of a run in which changes of rate are looked for; longer ones are summed up first.
+/// The most pieces of a run that are searched for changes of rate; intervals of longer ones are summed up first.
 const PIECES: usize = 2048;
-/// Of one sender's messages at most this many rates are told apart, each time doubling the work.
+/// The depth of splitting one sender's messages by rate; each level may double the number of rates.
 const DEPTH: usize = 8;
-/// A change of rate must be larger than chance makes in one of so many tries: 3 standard deviations of a normal
-/// distribution are half a squared 3 in log likelihood; positions that could be chosen double that.
+/// The least gain in log likelihood of a change of rate over chance: 3 standard deviations of a normal distribution are
+/// half a squared 3 in log likelihood; positions that could be chosen double that.
 const GAIN: f64 = 9.0;
-/// Medians that differ by less are one rate (the least that `--rate-change` can usefully tell).
+/// The ratio of medians below which rates are the same (the least that `--rate-change` can usefully show).
 const SAME: f64 = 1.1;
-/// How far the quarters of even intervals may lie apart.
+/// The largest ratio of the quartiles of even intervals.
 const EVEN: f64 = 1.8;
-/// A sender with more gaps than this has no rhythm; the rest of its messages is one stretch.
+/// The most gaps of a sender with a rhythm; after more, the rest of its messages is one stretch.
 const MOST: usize = 4096;
 
-/// Takes sorted times apart.
+/// Divides sorted times into stretches of even sending.
 pub(crate) fn stretches(times: &[Stamp]) -> Vec<Stretch> {
     let mut all = Vec::new();
     let mut from = 0;
@@ -67,7 +68,7 @@ fn usual(times: &[Stamp]) -> Option<i64> {
     intervals.get(intervals.len().checked_sub(1)? / 2).copied()
 }
 
-/// Splits a run without gaps where its rate changes most, as long as that is no chance.
+/// Splits a run without gaps where its rate changes most, as long as that is not chance.
 fn split(times: &[Stamp], depth: usize, is_joined: bool, all: &mut Vec<Stretch>) {
     let Some(cut) = (depth > 0).then(|| cut(times)).flatten() else {
         all.extend(stretch(times, is_joined));
@@ -140,7 +141,7 @@ fn scatter(times: &[Stamp], step: usize) -> f64 {
     (relative * relative * step as f64).clamp(0.01, 4.0)
 }
 
-/// What a run of messages at one rate is.
+/// The stretch of a run of messages at one rate.
 fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     let (first, last) = (*times.first()?, *times.last()?);
     let mut intervals: Vec<i64> = times.windows(2).map(|t| t[1].since(t[0])).collect();
@@ -162,7 +163,7 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
     })
 }
 
-/// Joins neighbours whose rates are the same by the median after all.
+/// Joins neighbours whose rates have the same median.
 fn merged(all: Vec<Stretch>, times: &[Stamp]) -> Vec<Stretch> {
     let mut kept: Vec<Stretch> = Vec::new();
     for next in all {
@@ -189,7 +190,7 @@ fn is_same(a: &Stretch, b: &Stretch) -> bool {
 mod tests {
     use super::*;
 
-    /// Times from (how many, milliseconds apart), with a little jitter.
+    /// Times from runs of (number, milliseconds apart), with a little jitter.
     fn times(runs: &[(usize, i64)]) -> Vec<Stamp> {
         let (mut at, mut all) = (0, vec![Stamp(0)]);
         let mut noise = 7_i64;

@@ -1,4 +1,4 @@
-//! Every proof on the track of its element: signs, ends and rhythms, from which lives follow.
+//! The proofs of each element as a track: signs, ends and rhythms, from which its lives follow.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -12,7 +12,7 @@ use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::restarts::Restart;
 use crate::evidence::{Degree, Evidence, SOURCES};
 
-/// What is known about the life of every element.
+/// The track of every element.
 pub(crate) type Tracks = BTreeMap<ElementKey, Liveness>;
 
 /// Puts the signs of every proof on the track of its element.
@@ -93,7 +93,8 @@ pub(crate) fn tracks(
     Ok(tracks)
 }
 
-/// How strongly a proof holds: a connection without a message, or with none in the time that is read, is a header's word.
+/// The degree of a proof: a connection without a message, or with none in the time that is read, is only declared by
+/// its header.
 fn degree(proof: &Proof, findings: &Findings, traffic: &Traffic) -> Degree {
     let Validity::Messages(at) = proof.when else {
         return proof.degree;
@@ -109,7 +110,7 @@ fn degree(proof: &Proof, findings: &Findings, traffic: &Traffic) -> Degree {
     }
 }
 
-/// The streams whose messages are somebody's: they prove a publication.
+/// The streams with a known publisher, whose messages prove a publication.
 fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
     let sent = proofs.iter().filter_map(|proof| match proof {
         Proof {
@@ -122,26 +123,26 @@ fn sent(proofs: &[Proof]) -> BTreeSet<usize> {
     sent.collect()
 }
 
-/// Whether a reason holds on after its last sign.
+/// Whether a proof still holds after its last sign.
 fn lasts(when: &Validity) -> bool {
     !matches!(when, Validity::Moments(_) | Validity::Like(_))
 }
 
-/// Two lists of times as one, sorted.
+/// Both lists of times as one, sorted.
 fn together(a: &[Stamp], b: &[Stamp]) -> Vec<Stamp> {
     let mut all = [a, b].concat();
     all.sort_unstable();
     all
 }
 
-/// A latched topic with more messages than this is published anew all the time.
+/// The most messages of a latched topic: one with more is sent again all the time.
 const LATCHED: u64 = 20;
 
-/// What is known of a stream that is followed.
+/// Facts about a stream that is followed.
 struct Followed<'a> {
-    /// Whether it is a topic's, whose senders are known: it lives as long as its publications.
+    /// Whether it is followed for a topic whose senders are known: the topic lives as long as its publications.
     known: bool,
-    /// Whether its rhythm tells that its sender is there; nobody logs for that.
+    /// Whether its rhythm shows that its sender exists, which has no log records.
     beats: bool,
     restarts: &'a [Restart],
 }

@@ -1,4 +1,4 @@
-//! Which windows a moment or a stretch of time falls into; windows may overlap.
+//! Search for the windows that contain a moment or overlap an interval; windows may overlap.
 
 use std::ops::Range;
 
@@ -28,7 +28,7 @@ impl SortedWindows<'_> {
         first..end.max(first)
     }
 
-    /// The last moment at which somebody whose last sign was at `time` counts as alive, after `more` windows of
+    /// The last moment at which an element whose last sign was at `time` counts as alive, after `more` windows of
     /// silence.
     pub(crate) fn last_moment(&self, time: Stamp, more: usize) -> Stamp {
         let last = self.over(time, time).end.saturating_sub(1);

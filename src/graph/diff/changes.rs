@@ -1,4 +1,4 @@
-//! Tells a diff as reconfigurations: thresholds for rates, hand-overs, and the hints that the evidence gave.
+//! Reconfigurations from differences: thresholds for rates, hand-overs, and hints from the evidence.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use super::{Change, Delta, Diff, ValueKind, diff};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{EdgeState, Element, Elements, Graph, NodeId, State, TopicId, TopicState};
 
-/// A rate counts as changed from this share on, unless the user says otherwise.
+/// The default share by which a rate must change to count as changed.
 pub const RATE_CHANGE: f64 = 0.25;
 
 /// Types that many nodes write to in turn, so that a new writer takes over nothing.
@@ -22,21 +22,21 @@ const SHARED: [&str; 8] = [
     "TopicStatistics",
 ];
 
-/// Finds the reconfigurations of a mission, window by window in order.
+/// A finder of the reconfigurations of a mission, window by window in order.
 #[derive(Debug)]
 pub struct Changes<'a> {
     elements: &'a Elements,
-    /// The share by which a rate must change, 0...
+    /// The share by which a rate must change, ≥ 0.
     threshold: f64,
     before: Option<(Span, Graph)>,
-    /// When each topic was sent on: from the first sign of a publisher to the last.
+    /// The interval in which each topic had publishers: from their first sign to the last.
     sent: Vec<(Option<Stamp>, Option<Stamp>)>,
-    /// Who last sent messages on each topic.
+    /// The nodes that last sent messages on each topic.
     senders: BTreeMap<TopicId, BTreeSet<NodeId>>,
 }
 
 impl<'a> Changes<'a> {
-    /// Nothing seen yet.
+    /// A finder that has seen no window yet.
     pub fn new(elements: &'a Elements, threshold: f64) -> Self {
         Self {
             elements,
@@ -47,8 +47,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// What changed from the window before to this one; nothing in the first, which is the base.
-    /// `restarts` are nodes that began anew in it under the same name, and when.
+    /// The changes from the window before to this one; none in the first, which is the base. `restarts` are nodes that
+    /// restarted in it under the same name, and when.
     ///
     /// Order: added, removed, rates, hand-overs, restarts, values; each by kind of element and name.
     pub fn next(&mut self, span: Span, graph: &Graph, restarts: &[(NodeId, Stamp)]) -> Vec<Change> {
@@ -73,7 +73,7 @@ impl<'a> Changes<'a> {
         changes
     }
 
-    /// Whether nothing that speaks for what came or went knows when.
+    /// Whether none of the evidence for an added or removed element has times.
     fn is_timeless(&self, change: &Change) -> bool {
         let all = self.elements;
         match change {
@@ -130,8 +130,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// The change of a rate, if it is one. What came or went within a window is measured over the part it was there,
-    /// so that coming and going are not told twice.
+    /// The change of a rate, if it is one. The rate of an element that came or went within a window is measured over
+    /// the part in which it existed, so that coming and going are not reported twice.
     fn rate(
         &self,
         what: Element,
@@ -153,7 +153,7 @@ impl<'a> Changes<'a> {
         })
     }
 
-    /// How many seconds of a window lie between an element's first and last sign of life.
+    /// The number of seconds of a window between an element's first and last sign of life.
     fn present(&self, what: Element, span: Span) -> f64 {
         let (first, last) = match what {
             Element::Topic(id) => self.sent[id as usize],
@@ -174,7 +174,7 @@ impl<'a> Changes<'a> {
         topics.filter(|topic| !seen.insert(*topic)).collect()
     }
 
-    /// A topic changes hands when those who send on it now are all others than those who sent on it last.
+    /// Adds hand-overs: a topic changes hands when none of the nodes that send on it now sent on it last.
     fn handed_over(&mut self, before: &Graph, after: &Graph, changes: &mut Vec<Change>) {
         let there = |graph: &Graph, topic| {
             graph
@@ -192,7 +192,7 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// Per topic the nodes that sent messages on it in a window.
+    /// The nodes that sent messages on each topic in a window.
     fn sending(&self, graph: &Graph) -> BTreeMap<TopicId, BTreeSet<NodeId>> {
         let mut sending: BTreeMap<TopicId, BTreeSet<NodeId>> = BTreeMap::new();
         for state in graph
@@ -221,13 +221,13 @@ fn ids<'s, T>(
     list.iter().map(element)
 }
 
-/// Messages in the busier of two windows from which on a rate means something.
+/// The fewest messages in the busier of two windows with which a rate means something.
 const FEW: f64 = 3.5;
 
-/// A gap this many times the median period long makes a topic one that speaks when it has something to say.
+/// The ratio of the longest gap to the median period from which on a topic counts as irregular.
 const UNSTEADY: f64 = 4.0;
 
-/// And so does a median period that, message by message, covers less than this share of the time.
+/// The share of the time that the median period must cover, message by message, for a topic to be regular.
 const COVERED: f64 = 0.6;
 
 /// Whether a rate changed: by more than the share `threshold` of what it was, by more than the two messages that two
@@ -237,8 +237,8 @@ fn rate_differs(from: f64, to: f64, secs: f64, threshold: f64) -> bool {
     by > threshold * from && by * secs > 2.2 && from.max(to) * secs > FEW
 }
 
-/// Whether a topic sends at a rate at all in a window that it was there for `secs` seconds of: not latched, and in
-/// even steps all the time, as far as is known.
+/// Whether a topic has a steady rate in a window of which it existed for `secs` seconds: not latched, and in even steps
+/// all the time, as far as is known.
 fn is_steady(topic: &TopicState, secs: f64) -> bool {
     let even = match (topic.median_period_s, topic.max_gap_s) {
         (Some(median), Some(gap)) => {
@@ -249,7 +249,8 @@ fn is_steady(topic: &TopicState, secs: f64) -> bool {
     even && topic.state != State::Latched
 }
 
-/// The life of each topic's publishers together; of the topic itself where none is known.
+/// The interval from the first to the last sign of each topic's publishers together; of the topic itself where none is
+/// known.
 fn sent(elements: &Elements) -> Vec<(Option<Stamp>, Option<Stamp>)> {
     let mut sent = vec![(None, None); elements.topics.len()];
     for edge in elements.publishes.iter().filter(|e| e.first.is_some()) {

@@ -1,17 +1,17 @@
-//! What becomes of one element, window by window, as bytes: how long it is away, how long it stays the same, and what
-//! differs from the window before.
+//! The rows of one element over all windows, as bytes: the lengths of its absences, the lengths without changes, and
+//! the differences from the window before.
 
 use super::row::{Number, Row};
 use crate::evidence::Degree;
 use crate::graph::State;
 
-/// All windows of one element.
+/// The rows of one element over all windows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Column {
     bytes: Vec<u8>,
 }
 
-// What the next byte begins; any other is a row, its bits the parts that differ.
+// The kind of the next byte; any other is a row, with bits for the parts that differ.
 const AWAY: u8 = 0x80;
 const SAME: u8 = 0x40;
 // The parts of a row.
@@ -22,7 +22,7 @@ const MEDIAN: u8 = 8;
 const GAP: u8 = 16;
 const RATE: u8 = 32;
 
-/// What both sides know of the rows so far.
+/// The state that writer and reader share: the rows so far.
 #[derive(Clone, Copy, Debug)]
 struct Memory {
     row: Row,
@@ -39,20 +39,20 @@ impl Default for Memory {
     }
 }
 
-/// Takes in the rows of an element in order of their windows.
+/// A writer of the rows of an element in order of their windows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ColumnWriter {
     column: Column,
     memory: Memory,
-    /// The window that comes next.
+    /// The next window.
     next: usize,
-    /// How many windows up to that one repeat the last row.
+    /// The number of windows up to `next` that repeat the last row.
     same: u64,
     is_there: bool,
 }
 
 impl ColumnWriter {
-    /// Takes in the row of the window at a place; one that came before is not taken.
+    /// Adds the row of the window at a place; ignored if the place lies before `next`.
     pub(crate) fn push(&mut self, window: usize, row: Row) {
         let Some(away) = window.checked_sub(self.next) else {
             return;
@@ -120,7 +120,7 @@ impl ColumnWriter {
         self.memory.row = *row;
     }
 
-    /// The column.
+    /// Ends the writing.
     pub(crate) fn finish(mut self) -> Column {
         self.end_run();
         self.column.bytes.shrink_to_fit();
@@ -129,13 +129,13 @@ impl ColumnWriter {
 }
 
 impl Column {
-    /// The bytes it takes.
+    /// The number of bytes.
     #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.bytes.len()
     }
 
-    /// Goes through it from the first window.
+    /// A cursor at the first window.
     pub(crate) fn cursor(&self) -> ColumnCursor<'_> {
         ColumnCursor {
             bytes: &self.bytes,
@@ -146,7 +146,7 @@ impl Column {
     }
 }
 
-/// Goes through a column.
+/// A cursor over a column.
 #[derive(Clone, Debug)]
 pub(crate) struct ColumnCursor<'a> {
     bytes: &'a [u8],
@@ -156,7 +156,7 @@ pub(crate) struct ColumnCursor<'a> {
 }
 
 impl ColumnCursor<'_> {
-    /// The row of the next window; `None` where the element is not there, and after the last.
+    /// The row of the next window; `None` where the element does not exist, and after the last.
     pub(crate) fn next(&mut self) -> Option<Row> {
         if self.same > 0 {
             self.same -= 1;
@@ -180,7 +180,7 @@ impl ColumnCursor<'_> {
         Some(self.memory.row)
     }
 
-    /// The row of the next window as [`Self::next`], and for how many windows it stays, 1...
+    /// The row of the next window as [`Self::next`], and the number of windows for which it stays, ≥ 1.
     pub(crate) fn next_run(&mut self) -> (Option<Row>, u64) {
         let row = self.next();
         let more = match row {
@@ -219,7 +219,7 @@ impl ColumnCursor<'_> {
     }
 }
 
-/// Seven bits a byte, the lowest first.
+/// Writes a number with seven bits a byte, the lowest first.
 fn put(bytes: &mut Vec<u8>, value: impl Into<u128>) {
     let mut value = value.into();
     while value >= 0x80 {
@@ -253,7 +253,7 @@ fn take_byte(bytes: &mut &[u8]) -> u8 {
     *byte
 }
 
-/// Small numbers of either sign as small numbers.
+/// A number of either sign as an unsigned one; small stays small.
 fn folded(value: i64) -> u128 {
     u128::from((value.wrapping_shl(1) ^ (value >> 63)).cast_unsigned())
 }
@@ -267,7 +267,7 @@ fn unfolded(value: u128) -> i64 {
     (value >> 1).cast_signed() ^ -(value & 1).cast_signed()
 }
 
-/// 0 for none, else the difference.
+/// Writes a count: 0 for none, else the difference.
 fn put_count(bytes: &mut Vec<u8>, old: Option<u64>, new: Option<u64>) {
     let step = |new: u64| new.wrapping_sub(old.unwrap_or(0)).cast_signed();
     put(bytes, new.map_or(0, |new| folded(step(new)) + 1));
@@ -278,7 +278,7 @@ fn take_count(bytes: &mut &[u8], old: Option<u64>) -> Option<u64> {
     Some(old.unwrap_or(0).wrapping_add(step.cast_unsigned()))
 }
 
-/// 0 for none, 1 for bits, else the difference to the last whole one.
+/// Writes a number: 0 for none, 1 for bits, else the difference to the last whole one.
 fn put_number(bytes: &mut Vec<u8>, last: &mut i64, number: Number) {
     match number {
         Number::Unknown => put(bytes, 0_u8),

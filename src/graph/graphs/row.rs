@@ -1,4 +1,4 @@
-//! What nodes, topics and edges say in one window, in one form: exact integers where numbers come of such.
+//! The state of a node, topic or edge in one window, in one form: exact integers where numbers come from integers.
 
 use std::sync::Arc;
 
@@ -6,14 +6,14 @@ use crate::base::time::Span;
 use crate::evidence::Degree;
 use crate::graph::{EdgeState, NodeState, State, TopicState, per_second};
 
-/// A number, as an integer where it is one.
+/// A number, as an integer where possible.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Number {
     #[default]
     Unknown,
-    /// Seconds that are so many half nanoseconds.
+    /// Seconds as a whole number of half nanoseconds.
     Halves(i64),
-    /// Any other, by its bits.
+    /// Any other number, by its bits.
     Bits(u64),
 }
 
@@ -46,22 +46,22 @@ impl Number {
     }
 }
 
-/// Integers below this are exact in a float.
+/// The number below which integers are exact in a float.
 const EXACT: f64 = 9e15;
 
-/// What one element says in one window.
+/// The state of one element in one window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Row {
     pub(crate) state: State,
     pub(crate) degree: Degree,
     /// The place of its lifecycle state, counted from 1; 0 for none.
     pub(crate) lifecycle: u32,
-    /// Messages; of a node those that its rate comes of.
+    /// The number of messages; of a node those that its rate is computed from.
     pub(crate) count: Option<u64>,
     pub(crate) bytes: Option<u64>,
     pub(crate) median: Number,
     pub(crate) gap: Number,
-    /// Its rate, where that does not follow from the count and the window's length.
+    /// The rate, where it does not follow from the count and the window's length.
     pub(crate) rate: Option<Number>,
 }
 

@@ -1,4 +1,4 @@
-//! Whatever graphs are put in come out again.
+//! Tests that graphs read back are those written.
 
 use proptest::prelude::*;
 

@@ -1,19 +1,20 @@
-//! Goes through all elements at once, window by window, and stops only where one of them differs from the window before.
+//! A walk through all elements at once, window by window, that stops only where one of them differs from the window
+//! before.
 
 use super::{Column, ColumnCursor, Row};
 use crate::graph::Element;
 
-/// Where the way through all columns is.
+/// The state of a walk through all columns.
 #[derive(Debug)]
 pub(crate) struct ColumnWalk<'a> {
     /// The next window.
     window: u64,
-    /// Nodes, topics, publications, subscriptions: of each the window in which it may be another.
+    /// For each node, topic, publication and subscription, the next window in which it may differ.
     due: [Vec<u64>; 4],
     cursors: [Vec<ColumnCursor<'a>>; 4],
 }
 
-/// How an element of each list is called.
+/// The element for an id in each list.
 const KINDS: [fn(u32) -> Element; 4] = [
     Element::Node,
     Element::Topic,
@@ -30,7 +31,7 @@ impl<'a> ColumnWalk<'a> {
         }
     }
 
-    /// Tells of every element that may differ in the next window what it says there, if it is there.
+    /// Passes to `tell` every element that may differ in the next window, with its row there, if it exists.
     pub(crate) fn next(&mut self, mut tell: impl FnMut(Element, Option<Row>)) {
         let lists = self.due.iter_mut().zip(&mut self.cursors);
         for ((due, cursors), kind) in lists.zip(KINDS) {

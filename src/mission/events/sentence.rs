@@ -1,4 +1,4 @@
-//! An entry as one sentence: what happened to whom, and what came or went with it.
+//! An entry as one sentence: the change, the element, and the parts that came or went with it.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::graph::{Element, Elements, TopicId};
 use crate::mission::Mission;
 use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
 
-/// So many topics are named; the rest is counted.
+/// The most topics that are named; the rest is counted.
 const NAMED: usize = 6;
 
 /// The sentence, without a period: `/robot1/planner started: publishes plan; subscribes map, costmap`.
@@ -20,7 +20,7 @@ pub(crate) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String 
     sentence_with(mission, &parts.collect::<Vec<_>>(), entry)
 }
 
-/// The same for whoever knows the entries that are part of it.
+/// The sentence by the parts of the entry, for callers that know them.
 pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let elements = &mission.elements;
     let name = name(elements, entry);
@@ -71,7 +71,7 @@ pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry)
     }
 }
 
-/// Whom an entry is about: a role where a role restarted.
+/// The name of the element of an entry: a role where a role restarted.
 fn name(elements: &Elements, entry: &Entry) -> String {
     let node = |id: u32| visible(elements.nodes[id as usize].name.as_str());
     let topic = |id: u32| visible(elements.topics[id as usize].name.as_str());
@@ -92,7 +92,7 @@ fn name(elements: &Elements, entry: &Entry) -> String {
     }
 }
 
-/// What a node publishes and subscribes, by the parts of its entry: `: publishes plan; subscribes map`.
+/// The topics that a node publishes and subscribes, by the parts of its entry: `: publishes plan; subscribes map`.
 fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let elements = &mission.elements;
     let (mut sends, mut takes) = (BTreeSet::new(), BTreeSet::new());
@@ -120,10 +120,10 @@ fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     }
 }
 
-/// The parts of an action, which are named as one.
+/// The topics of an action, which are named together.
 const ACTION: [&str; 5] = ["goal", "cancel", "status", "feedback", "result"];
 
-/// The names of topics within a namespace, actions as one, housekeeping left out.
+/// The names of topics within a namespace, actions as one name, without housekeeping.
 fn topics_as_said(elements: &Elements, topics: &BTreeSet<TopicId>, space: &str) -> Vec<String> {
     let full = |id: &TopicId| elements.topics[*id as usize].name.as_str();
     let parts = |name: &str| {

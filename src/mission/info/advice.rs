@@ -1,10 +1,10 @@
-//! What would tell more: of this recording now, of the next one by another command.
+//! Advice on getting more information: from this recording now, from the next one by another command.
 
 use super::Info;
 use crate::evidence::Evidence;
 
-/// What to do so that more is known than now: first with this bag, then when recording. Empty if nothing is missing, and
-/// for missions that nobody recorded (`is_ros1` is `None`).
+/// Advice on getting more information: first from this bag, then when recording. Empty if nothing is missing, and for
+/// missions that were not recorded (`is_ros1` is `None`).
 pub(super) fn advice(info: &Info, is_ros1: Option<bool>) -> Vec<String> {
     match is_ros1 {
         None => Vec::new(),
@@ -68,7 +68,7 @@ fn ros2(info: &Info) -> Vec<String> {
     advice
 }
 
-/// What files of the user's add to the bag as it is.
+/// Advice on files of the user's that add to the bag.
 fn from_files(info: &Info) -> Vec<String> {
     let mut advice = Vec::new();
     let named = info.nodes_by_degree.total();

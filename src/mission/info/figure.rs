@@ -1,4 +1,4 @@
-//! Which figure for a paper fits a mission: the first says most, the others say something too.
+//! The choice of figures for a paper: the first fits the mission best, the others add to it.
 
 use std::collections::BTreeSet;
 
@@ -15,12 +15,11 @@ use crate::mission::phases::knows_publishers;
 pub struct FigureInfo {
     /// The word of `--figure`.
     pub figure: &'static str,
-    /// What it would show, and how much of it.
+    /// The content of the figure, and its amount.
     pub shows: String,
 }
 
-/// The figures that fit, the best first: life lines where something comes and goes, else the map where it is known who
-/// talks to whom.
+/// The figures that fit, the best first: life lines where something comes and goes, else the map where edges are known.
 pub(super) fn figures(mission: &Mission) -> Vec<FigureInfo> {
     let many = mission.ledger.phases.len();
     let fitting = [lives(mission), map(mission), steps(many)];

@@ -10,11 +10,11 @@ use crate::base::words::{self, visible};
 /// A bag in a survey.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SurveyRow {
-    /// Its path from the folder surveyed.
+    /// The path relative to the folder surveyed.
     pub path: String,
-    /// Why it could not be read; everything below is then empty.
+    /// The reason why it could not be read; everything below is then empty.
     pub error: Option<String>,
-    /// What is known of it.
+    /// The summary of the bag.
     pub info: Option<Info>,
 }
 

@@ -6,7 +6,7 @@ use super::{DegreeCounts, Info, NodeInfo, TopicInfo};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
 
-/// How many columns a sparkline has at most.
+/// The most columns of a sparkline.
 const COLUMNS: usize = 32;
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
@@ -22,7 +22,7 @@ pub fn text(info: &Info) -> String {
     out
 }
 
-/// What source code offers beyond what is drawn.
+/// Writes the edges that source code offers and that are not drawn.
 fn undrawn(out: &mut String, info: &Info) -> std::fmt::Result {
     if info.undrawn.is_empty() {
         return Ok(());
@@ -115,7 +115,7 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
     writeln!(out)
 }
 
-/// Such as `34 nodes (31 measured, 3 stated)`.
+/// A count with its degrees, such as `34 nodes (31 measured, 3 stated)`.
 pub(crate) fn how_many(what: &str, degrees: DegreeCounts) -> String {
     let parts = [
         (degrees.measured, "measured"),
@@ -193,7 +193,7 @@ fn nodes(out: &mut String, info: &Info) -> std::fmt::Result {
     Ok(())
 }
 
-/// What a node sends and receives per second of the mission.
+/// The messages that a node sends and receives per second of the mission.
 fn load(node: &NodeInfo, duration_s: f64) -> String {
     let rate = |count: u64| words::number(count as f64 / duration_s.max(1e-3));
     let topics = |n: usize| words::count(n, "topic");
@@ -214,7 +214,7 @@ fn load(node: &NodeInfo, duration_s: f64) -> String {
     parts.join(", ")
 }
 
-/// Messages over time as bars; a blank where there are none.
+/// Messages over time as bars; a blank where there are no messages.
 fn sparkline(activity: &[u64]) -> String {
     let columns = activity.len().clamp(1, COLUMNS);
     let part = |k: usize| {

@@ -1,4 +1,4 @@
-//! Explains an element: what proves it, when it lived, and each piece of evidence with its time and text.
+//! Explanation of an element: the evidence for it, its life, and each piece of evidence with its time and text.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,11 +11,11 @@ use crate::graph::{Edge, Element};
 use crate::mission::Mission;
 
 /// The elements with all of `names` (one: a node or topic of that name; two: the edges between them), each with its
-/// evidence and life, then the `pieces` in order of time. Plain text, a line each; what is said again and again stands
-/// once, with how often. Names are as recorded.
+/// evidence and life, then the `pieces` in order of time. Plain text, a line each; repeated pieces are written once,
+/// with their number. Names are as recorded.
 ///
 /// # Errors
-/// [`Error::Usage`] if the mission has no such element, naming those that come close.
+/// [`Error::Usage`] if the mission has no such element, naming similar ones.
 pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Result<String> {
     let found = elements(mission, names);
     if found.is_empty() {
@@ -45,16 +45,16 @@ pub fn why(mission: &Mission, names: &[String], pieces: &[EvidenceLine]) -> Resu
     Ok(out)
 }
 
-/// The same piece of evidence, once or more often.
+/// A piece of evidence with its repetitions.
 struct Repeated<'a> {
-    /// The first of them.
+    /// The first occurrence.
     piece: &'a EvidenceLine,
     count: usize,
-    /// When it was said last.
+    /// The time of the last occurrence.
     last: Option<Stamp>,
 }
 
-/// Pieces that differ in nothing but their time as one each, in the order of their first.
+/// Pieces that differ in nothing but their time, joined to one each, in the order of their first.
 fn said(pieces: &[EvidenceLine]) -> Vec<Repeated<'_>> {
     let mut all: Vec<Repeated<'_>> = Vec::new();
     let mut places = BTreeMap::new();
@@ -76,7 +76,7 @@ fn said(pieces: &[EvidenceLine]) -> Vec<Repeated<'_>> {
     all
 }
 
-/// Everything that is named, with how to call it.
+/// The elements with these names, each with a description.
 fn elements(mission: &Mission, names: &[String]) -> Vec<(Element, String)> {
     let all = &mission.elements;
     let node = |edge: &Edge| all.nodes[edge.node as usize].name.as_str();
@@ -160,7 +160,7 @@ fn shows(graph: &crate::graph::Graph, element: Element) -> bool {
     }
 }
 
-/// How many names are offered instead.
+/// The most similar names that are offered.
 const OFFERED: usize = 5;
 
 fn unknown(mission: &Mission, names: &[String]) -> Error {

@@ -1,14 +1,14 @@
-//! The activity of a mission as JSON, so that phases and figures of a file are those of its bag.
+//! The activity of a mission as JSON, so that phases and figures from a file equal those from its bag.
 //!
 //! ```text
 //! "activity": {"bounds_ns": [0, 2000000000, …],
 //!   "topics": [{"name": "/scan", "sending": [[17, 90000000], …], "in": {"windows": [[0, 44]], …}}, …], …}
 //! ```
 //!
-//! `bounds_ns` are the starts of the cells and the end of the last. `sending` are the stretches of sending, first
-//! message to last plus 1 ns, and `pauses` the longest
-//! pauses, from message to message; they are there where messages were heard one by one. `in` is what an element says in the
-//! cells, in the columns of the form `runs`: its `windows` are cells.
+//! `bounds_ns` are the starts of the cells and the end of the last. `sending` are the intervals of sending, first
+//! message to last plus 1 ns, and `pauses` the longest pauses, from message to message; both are present where single
+//! messages were read. `in` is the state of an element in the cells, in the columns of the form `runs`: its `windows`
+//! are cells.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap as _, Serializer};
@@ -23,7 +23,7 @@ use crate::graph::sending::Sending;
 use crate::graph::{Edge, Element, Elements, Graphs, GraphsWriter};
 use crate::mission::activity::{Activity, Cell, MOST_CELLS};
 
-/// The activity as it is written.
+/// The activity in the form for writing.
 pub(super) struct ActivityOf<'a> {
     activity: &'a Activity,
     elements: &'a Elements,
@@ -133,10 +133,10 @@ impl Serialize for ActivityOf<'_> {
     }
 }
 
-/// The activity that was read, of a mission with these names.
+/// Reads the activity of a mission with these names.
 ///
 /// # Errors
-/// What is wrong with the cells, or with the stretches of sending.
+/// The mistake in the cells, or in the intervals of sending.
 pub(super) fn read(bounds: &[i64], raw: &RawElements, ids: &Ids) -> Result<Activity, String> {
     let spans = cells(bounds)?;
     let graphs = runs::graphs(raw, ids, &spans);
@@ -182,7 +182,7 @@ fn sending(raw: &RawElements, ids: &Ids) -> Result<Sending, String> {
     })
 }
 
-/// The stretches by id; none at all where none are told.
+/// The intervals by id; an empty list where there are none at all.
 fn stretches<'a>(
     raw: impl Iterator<Item = (u32, &'a RawState)>,
     many: usize,

@@ -1,4 +1,4 @@
-//! What changed from window to window as JSON writes it.
+//! The changes from window to window in JSON.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use crate::graph::diff::Change;
 use crate::graph::{Edge, Element, Elements};
 use crate::mission::EntryId;
 
-/// An element by its name, or an edge by its two.
+/// An element by its name, or an edge by its two names.
 #[derive(Serialize)]
 pub(crate) struct RawElementName<'a> {
     what: &'static str,

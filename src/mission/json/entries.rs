@@ -11,7 +11,7 @@ use crate::evidence::{Degree, Evidence};
 use crate::graph::{Edge, Element, Elements, NodeId};
 use crate::mission::ledger::{Detail, Entry, Kind, Ledger, Phase, sorted};
 
-/// An entry as it is written.
+/// An entry in the form for writing.
 #[derive(Serialize)]
 pub(crate) struct EntryRow<'a> {
     id: u32,
@@ -77,7 +77,7 @@ pub(crate) fn entries<'a>(
     })
 }
 
-/// A phase, written and read.
+/// A phase in the form for writing and reading.
 #[derive(Deserialize, Serialize)]
 pub(crate) struct PhaseRow {
     start_ns: i64,
@@ -108,7 +108,7 @@ impl From<&Phase> for PhaseRow {
     }
 }
 
-/// The phases of rows that were read; one that names a later phase as its like names none.
+/// The phases of rows that were read; a reference to a later phase as the same one is dropped.
 pub(crate) fn phases(rows: Vec<PhaseRow>) -> Vec<Phase> {
     let phase = |(at, row): (u32, PhaseRow)| Phase {
         span: Span {
@@ -129,7 +129,7 @@ pub(crate) fn rows<'a>(
     ledger: &'a Ledger,
     elements: &'a Elements,
 ) -> impl Iterator<Item = String> + 'a {
-    // Only maps with keys that are no strings fail, and there are none.
+    // Only maps with keys that are not strings fail, and there are none.
     entries(ledger, elements).map(|row| serde_json::to_string(&row).unwrap_or_default())
 }
 
@@ -163,7 +163,7 @@ fn detail<'a>(detail: &'a Detail, elements: &'a Elements) -> DetailRow<'a> {
     }
 }
 
-/// An entry as it is read: all but its kind, what it is about and its time may be missing.
+/// An entry in the form for reading: all but its kind, element and time may be missing.
 #[derive(Deserialize)]
 pub(crate) struct RawEntry {
     kind: String,
@@ -196,7 +196,7 @@ enum OneOrMore {
     Many(Vec<String>),
 }
 
-/// The ledger of rows that were read; `None` if one of them is about something that no window holds.
+/// The ledger of rows that were read; `None` if one of them is about an element that is not in any window.
 pub(crate) fn read(rows: &[RawEntry], elements: &Elements) -> Option<Vec<Entry>> {
     let mut list = rows
         .iter()

@@ -6,7 +6,7 @@ use serde_json::ser::Formatter;
 
 use crate::base::words::visible_json;
 
-/// Breaks lines down to a depth; everything deeper stays on its line.
+/// A formatter that breaks lines down to a depth; everything deeper stays on its line.
 #[derive(Debug, Default)]
 pub(crate) struct LineFormatter {
     depth: usize,
@@ -14,7 +14,8 @@ pub(crate) struct LineFormatter {
 }
 
 impl LineFormatter {
-    /// Breaks lines so deep: 1 the mission's keys, 2 its windows, 3 their keys, 4 the elements in their lists.
+    /// A formatter that breaks lines to this depth: 1 the mission's keys, 2 its windows, 3 their keys, 4 the elements
+    /// in their lists.
     pub(crate) fn down_to(deepest: usize) -> Self {
         Self { depth: 0, deepest }
     }
@@ -44,7 +45,7 @@ impl LineFormatter {
 }
 
 impl Formatter for LineFormatter {
-    /// Part of a text, with characters that nobody would see as `\uXXXX`: they mean the same and steer no terminal.
+    /// Writes part of a text, with invisible characters as `\uXXXX`: they mean the same and do not control a terminal.
     fn write_string_fragment<W: ?Sized + Write>(
         &mut self,
         writer: &mut W,

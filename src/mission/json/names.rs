@@ -1,4 +1,4 @@
-//! Gives the names of an evolution that is read their places, and its windows their graphs.
+//! Places for the names of an evolution that is read, and graphs for its windows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,14 +10,14 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::{Edge, Elements, Graph, Node, NodeState, Topic, TopicState};
 
-/// Names and what is known of them over all windows, before they have places.
+/// Names with their facts over all windows, before they have places.
 #[derive(Default)]
 pub(crate) struct Names {
     nodes: BTreeMap<Arc<str>, Node>,
     topics: BTreeMap<Arc<str>, Topic>,
-    /// By (node, topic).
+    /// Publications by (node, topic).
     publishes: BTreeMap<(Arc<str>, Arc<str>), Edge>,
-    /// By (topic, node).
+    /// Subscriptions by (topic, node).
     subscribes: BTreeMap<(Arc<str>, Arc<str>), Edge>,
 }
 
@@ -166,7 +166,7 @@ fn edge(edges: &mut BTreeMap<(Arc<str>, Arc<str>), Edge>, key: (&str, &str), raw
     keep(&mut edge.runs, raw.rest.runs());
 }
 
-/// Every window tells all runs.
+/// Keeps the first intervals read: every window repeats all of them.
 fn keep(runs: &mut Vec<Span>, told: Vec<Span>) {
     if runs.is_empty() {
         *runs = told;
@@ -195,7 +195,7 @@ pub(crate) struct Ids {
 }
 
 impl Ids {
-    /// The place of a node that was taken in.
+    /// The place of a node that was read.
     pub(crate) fn of_node(&self, name: &str) -> u32 {
         self.nodes[name]
     }
@@ -215,17 +215,17 @@ impl Ids {
         self.subscribes[&(Arc::from(raw.topic.as_str()), Arc::from(raw.node.as_str()))]
     }
 
-    /// How many topics there are.
+    /// The number of topics.
     pub(crate) fn topics(&self) -> usize {
         self.topics.len()
     }
 
-    /// How many publications there are.
+    /// The number of publications.
     pub(crate) fn publishes(&self) -> usize {
         self.publishes.len()
     }
 
-    /// The graph of a window; an element listed twice counts once, and the ends of an edge are there.
+    /// The graph of a window; an element listed twice counts once, and the ends of an edge are always included.
     pub(crate) fn graph(&self, window: &RawWindow) -> Graph {
         let pair = |a: &str, b: &str| (Arc::from(a), Arc::from(b));
         let publishes = by_id(window.publishes.iter().map(|raw| {
@@ -276,7 +276,7 @@ impl Ids {
         (state.id, state)
     }
 
-    /// A node that only an edge names.
+    /// The state of a node that only an edge names.
     fn bare_node(&self, raw: &RawEdge) -> (u32, NodeState) {
         let id = self.nodes[raw.node.as_str()];
         (
@@ -291,7 +291,7 @@ impl Ids {
         )
     }
 
-    /// A topic that only an edge names.
+    /// The state of a topic that only an edge names.
     fn bare_topic(&self, raw: &RawEdge) -> (u32, TopicState) {
         let id = self.topics[raw.topic.as_str()];
         let state = TopicState {
@@ -308,7 +308,7 @@ impl Ids {
     }
 }
 
-/// Sorted by id; of several with one id the last.
+/// The states sorted by id; of several with one id the last.
 fn by_id<T>(states: impl Iterator<Item = (u32, T)>) -> Vec<T> {
     states.collect::<BTreeMap<_, _>>().into_values().collect()
 }

@@ -1,4 +1,4 @@
-//! The keys of an evolution's JSON, all but the names and times optional.
+//! The keys of an evolution's JSON; all are optional except names and times.
 
 use serde::Deserialize;
 
@@ -113,7 +113,7 @@ pub(crate) struct RawWindow {
     pub(crate) subscribes: Vec<RawEdge>,
 }
 
-/// What every element may say of itself.
+/// The keys that every element may have.
 #[derive(Default, Deserialize)]
 pub(crate) struct RawState {
     pub(crate) state: Option<String>,

@@ -1,7 +1,7 @@
-//! Reads an evolution back: our own JSON, or a graph over time that another tool wrote with our keys.
+//! Reader of evolutions: our own JSON, or a graph over time that another tool wrote with our keys.
 //!
-//! Required are `schema`, the windows' times and the elements' names; what else is missing is unknown, unknown keys are
-//! ignored. What changed is found by the ledger; a mission without one is left for [`Mission::find_changes`].
+//! Required are `schema`, the windows' times and the elements' names; other missing values are unknown, unknown keys
+//! are ignored. Changes are found by the ledger; a mission without one is left for [`Mission::find_changes`].
 
 use std::path::Path;
 
@@ -20,8 +20,8 @@ use crate::mission::{Mission, Place, Places, Window};
 /// Reads the text of an evolution; `path` is only named in errors.
 ///
 /// # Errors
-/// [`Error::BadFile`] with the line for what is no JSON or has no such keys, for another schema, and for windows that
-/// are not in order of time.
+/// [`Error::BadFile`] with the line for text that is not JSON or lacks these keys, for another schema, and for windows
+/// that are not in order of time.
 pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     let bad = |line: usize, reason: String| Error::BadFile {
         path: path.to_owned(),
@@ -52,7 +52,7 @@ pub fn read_json(text: &str, path: &Path) -> Result<Mission> {
     Ok(mission)
 }
 
-/// The windows' times, checked.
+/// The times of the windows, checked.
 fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
     if raw.windows.is_empty() {
         return Err("it has no windows".to_owned());
@@ -78,8 +78,8 @@ fn spans(raw: &Raw) -> Result<Vec<Span>, String> {
     Ok(spans)
 }
 
-/// The mission of windows made elsewhere, each with all that is in it; what changed is left for
-/// [`Mission::find_changes`]. There is at least one window, and they are in order of time.
+/// The mission of windows made elsewhere, each with its full graph; changes are left for [`Mission::find_changes`].
+/// There is at least one window, and they are in order of time.
 pub(crate) fn mission_of(raw: Raw) -> Result<Mission, String> {
     let span = |w: &RawWindow| Span {
         start: Stamp(w.start_ns),
@@ -168,7 +168,7 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
     })
 }
 
-/// The bounds of the cells, and what is in them.
+/// The bounds of the cells, and their contents.
 fn parts(raw: RawActivity) -> (Vec<i64>, RawElements) {
     let elements = RawElements {
         nodes: raw.nodes,
@@ -216,7 +216,7 @@ fn layout(raw: RawLayout) -> Places {
     }
 }
 
-/// Notices of an earlier run are kept as notes: what was lost then is not lost now.
+/// The notices of an earlier run as plain notes: data lost then is not lost now.
 fn notices(raw: Vec<RawNotice>) -> Notices {
     let mut notices = Notices::new();
     notices.extend(raw.into_iter().map(|n| Notice {

@@ -1,4 +1,4 @@
-//! Nodes, topics and edges as JSON writes them: over the whole mission, and in one window.
+//! Nodes, topics and edges in JSON: over the whole mission, and in one window.
 
 use serde::{Serialize, Serializer};
 
@@ -6,7 +6,7 @@ use super::write::words;
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Edge, EdgeState, Elements, Node, NodeState, Topic, TopicState};
 
-/// When an element is there, as pairs of nanoseconds.
+/// The intervals in which an element exists, as pairs of nanoseconds.
 #[derive(Clone, Copy)]
 pub(crate) struct RunRows<'a>(pub(crate) &'a [Span]);
 

@@ -16,16 +16,16 @@ use crate::evidence::Evidence;
 use crate::graph::{Elements, Graph};
 use crate::mission::{Mission, Place, Places, Window};
 
-/// The schema that is written, and read.
+/// The schema that is written and read.
 pub(crate) const SCHEMA: &str = "bagreel.evolution/2";
 /// The schema without a ledger, which is still read.
 pub(crate) const OLD_SCHEMA: &str = "bagreel.evolution/1";
 
 /// Writes the whole mission as JSON, ending in a new line. Lists are sorted by name, times are nanoseconds since 1970,
-/// what is not known is `null`.
+/// unknown values are `null`.
 ///
 /// # Errors
-/// Whatever `out` refuses.
+/// The errors of `out`.
 pub fn write_json(mission: &Mission, out: &mut dyn Write) -> std::io::Result<()> {
     let json = Json {
         mission,
@@ -35,30 +35,31 @@ pub fn write_json(mission: &Mission, out: &mut dyn Write) -> std::io::Result<()>
     json.write(out)
 }
 
-/// How the windows of a mission are written.
+/// The form of a mission's windows in JSON.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum JsonForm {
-    /// By their number: as windows up to 2000, as runs beyond.
+    /// Chosen by the number of windows: as windows up to 2000, as runs beyond.
     #[default]
     Auto,
-    /// Each with all that is there in it.
+    /// Each window with all elements in it.
     Windows,
-    /// Each element once, with what it says in which windows.
+    /// Each element once, with its states and their windows.
     Runs,
 }
 
-/// Tools read windows one by one; beyond so many the file would be larger than the bag.
+/// The most windows in the form of windows, which tools read one by one; with more the file would be larger than the
+/// bag.
 const MOST_WINDOWS: usize = 2000;
-/// The word of the form that is no list of windows with everything in them.
+/// The word of the form of runs.
 pub(crate) const RUNS: &str = "runs";
 
-/// A mission as it is written.
+/// A mission in the form for writing.
 pub(crate) struct Json<'a> {
-    /// The data.
+    /// The mission.
     pub mission: &'a Mission,
-    /// Where everything was drawn, if it was.
+    /// The places of the drawing, if one was made.
     pub places: Option<&'a Places>,
-    /// How its windows are written.
+    /// The form of its windows.
     pub form: JsonForm,
 }
 
@@ -71,10 +72,10 @@ impl Json<'_> {
         }
     }
 
-    /// Writes it, as [`write_json`] does.
+    /// Writes the mission, as [`write_json`] does.
     ///
     /// # Errors
-    /// Whatever `out` refuses.
+    /// The errors of `out`.
     pub(crate) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let lines = LineFormatter::down_to(if self.is_runs() { 3 } else { 4 });
         let mut serializer = serde_json::Serializer::with_formatter(&mut *out, lines);
@@ -135,7 +136,7 @@ impl Serialize for Json<'_> {
     }
 }
 
-/// A list made while it is written.
+/// A list serialised from an iterator.
 pub(crate) struct List<I>(pub(crate) I);
 
 impl<I: Iterator<Item: Serialize> + Clone> Serialize for List<I> {
@@ -256,7 +257,7 @@ impl Serialize for WindowOf<'_> {
     }
 }
 
-/// A window without what is in it.
+/// A window without its elements.
 struct WindowRow<'a> {
     window: &'a Window,
     elements: &'a Elements,

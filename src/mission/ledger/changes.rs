@@ -1,4 +1,4 @@
-//! The windows' differences, each with the entry that explains it.
+//! The changes between windows, each with the entry that explains it.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::graph::diff::{Change, ValueKind, diff};
 use crate::graph::{Element, Elements, Graph};
 use crate::mission::Window;
 
-/// What is different in each window from the one before, with the places of the entries that tell why.
+/// The changes of each window since the one before, with the places of the entries that explain them.
 pub(crate) fn explain(
     windows: impl Iterator<Item = (Span, Graph)>,
     elements: &Elements,
@@ -33,11 +33,11 @@ pub(crate) fn explain(
     all
 }
 
-/// When entries say that elements begin or end, sorted.
+/// The times at which entries let elements begin or end, sorted.
 struct EntryTurns {
     begins: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
     ends: BTreeMap<Element, Vec<(Stamp, EntryId)>>,
-    /// Publishers that nobody names, and their publications: they come and go with their topic.
+    /// Unnamed publishers and their publications, with their topics: they come and go with the topic.
     unnamed: BTreeMap<Element, Element>,
 }
 
@@ -83,7 +83,7 @@ impl EntryTurns {
     }
 }
 
-/// The topics of publishers that nobody names, and of what these publish.
+/// The topics of unnamed publishers, and of their publications.
 fn unnamed(elements: &Elements) -> BTreeMap<Element, Element> {
     let mut unnamed = BTreeMap::new();
     for (id, edge) in (0..).zip(&elements.publishes) {
@@ -135,7 +135,7 @@ fn ids<'s, T>(
     list.iter().map(element)
 }
 
-/// What entries tell of a window beside what is there: rates, hand-overs, restarts, values.
+/// The changes of a window in entries that are not about existence: rates, hand-overs, restarts, values.
 fn values(ledger: &Ledger, news: Span) -> impl Iterator<Item = (Change, EntryId)> + '_ {
     let inside = (0..).zip(&ledger.entries).filter(move |(_, e)| {
         news.contains(
@@ -147,7 +147,7 @@ fn values(ledger: &Ledger, news: Span) -> impl Iterator<Item = (Change, EntryId)
     inside.filter_map(|(id, entry)| Some((change(entry)?, id)))
 }
 
-/// The change that an entry tells of, but for what comes and goes.
+/// The change in an entry, unless it is about existence.
 fn change(entry: &Entry) -> Option<Change> {
     let what = entry.what;
     match (&entry.detail, entry.kind) {
@@ -185,8 +185,8 @@ fn change(entry: &Entry) -> Option<Change> {
     }
 }
 
-/// The places of the entries that tell of the windows' changes, of a ledger that was made from them: of those of the
-/// same kind about the same element the one that is nearest in time.
+/// The places of the entries that explain the windows' changes, of a ledger that was made from them: of those of the
+/// same kind and element the one nearest in time.
 pub(crate) fn places(ledger: &Ledger, windows: &[Window]) -> Vec<Vec<EntryId>> {
     let mut of: BTreeMap<(Kind, Element), Vec<EntryId>> = BTreeMap::new();
     for (id, entry) in (0..).zip(&ledger.entries) {
@@ -208,7 +208,7 @@ pub(crate) fn places(ledger: &Ledger, windows: &[Window]) -> Vec<Vec<EntryId>> {
     windows.iter().map(of_window).collect()
 }
 
-/// The kind of the entry that tells of a change, and what it is about.
+/// The kind and the element of the entry that explains a change.
 fn kind_of(change: &Change) -> (Kind, Element) {
     let turn = |what: Element, node, other| match what {
         Element::Node(_) => (node, what),

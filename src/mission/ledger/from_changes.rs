@@ -1,4 +1,4 @@
-//! The ledger of a mission of which only the windows are known: each change is told in the window that shows it.
+//! The ledger of a mission of which only the windows are known: each change belongs to the window that shows it.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::graph::diff::{Change, ValueKind};
 use crate::graph::{Edge, Element, Elements, NodeId, TopicId};
 use crate::mission::Window;
 
-/// What the changes from window to window say. A change without a time inside its window is told at the window's start.
+/// The ledger from the changes between windows. A change without a time inside its window is put at the window's start.
 pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Ledger {
     let mut entries: Vec<Entry> = Vec::new();
     for window in windows {
@@ -30,7 +30,7 @@ pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Ledger {
     }
 }
 
-/// What explains what explains this: parts have no parts.
+/// The outermost entry that explains this one: parts have no parts.
 fn whole(entries: &[Entry], mut at: EntryId) -> usize {
     // A topic may belong to a publication, and that to a node or a hand-over.
     for _ in 0..3 {
@@ -39,7 +39,8 @@ fn whole(entries: &[Entry], mut at: EntryId) -> usize {
     at as usize
 }
 
-/// Sorted by time, then kind, then element, which is an order of names; parts still know what they are part of.
+/// The entries sorted by time, then kind, then element, which is an order of names; parts still know what they are part
+/// of.
 fn sorted(entries: &[Entry]) -> Vec<Entry> {
     let mut order: Vec<usize> = (0..entries.len()).collect();
     order.sort_by_key(|at| (entries[*at].time, entries[*at].kind, entries[*at].what, *at));
@@ -67,16 +68,16 @@ fn id(place: usize) -> EntryId {
     EntryId::try_from(place).unwrap_or(EntryId::MAX)
 }
 
-/// What came or went in one window, and which of it belongs to which.
+/// The elements that came or went in one window, and how they belong together.
 struct WindowTurns<'a> {
     elements: &'a Elements,
     window: &'a Window,
-    /// What came, what went: the place of its change.
+    /// The elements that came, with the places of their changes; `went` has those that went.
     came: BTreeMap<Element, usize>,
     went: BTreeMap<Element, usize>,
     restarted: BTreeMap<NodeId, usize>,
     handed: BTreeMap<TopicId, usize>,
-    /// Per topic, its publications that came or went.
+    /// The publications that came or went, per topic.
     senders: BTreeMap<TopicId, Vec<(Element, NodeId)>>,
 }
 
@@ -144,7 +145,7 @@ impl<'a> WindowTurns<'a> {
         }
     }
 
-    /// The change that explains this one, if another does.
+    /// The place of the change that explains this one, if another does.
     fn whole(&self, change: &Change) -> Option<usize> {
         match change {
             Change::Added { what, .. } => self.mover(*what, &self.came),
@@ -154,7 +155,8 @@ impl<'a> WindowTurns<'a> {
         }
     }
 
-    /// What brought or took this: a node its edges and topics, a hand-over its publications.
+    /// The place of the change that explains an added or removed element: a node its edges and topics, a hand-over its
+    /// publications.
     fn mover(&self, what: Element, moved: &BTreeMap<Element, usize>) -> Option<usize> {
         match what {
             Element::Node(_) => None,
@@ -180,7 +182,7 @@ impl<'a> WindowTurns<'a> {
         }
     }
 
-    /// The node with which a topic came or went, else the publication with which it did.
+    /// The place of the change of the node with which a topic came or went, else of the publication.
     fn topic_mover(&self, topic: TopicId, moved: &BTreeMap<Element, usize>) -> Option<usize> {
         let senders = self.senders.get(&topic).into_iter().flatten();
         let mut senders = senders.filter(|(edge, _)| moved.contains_key(edge));
@@ -196,7 +198,8 @@ impl<'a> WindowTurns<'a> {
         nodes.copied().next()
     }
 
-    /// What explains another rate: a publisher that came, went or began anew, or other publishers.
+    /// The place of the change that explains a change of rate: a publisher that came, went or restarted, or other
+    /// publishers.
     fn sender(&self, what: Element) -> Option<usize> {
         let topic = match what {
             Element::Topic(topic) => topic,

@@ -1,4 +1,4 @@
-//! Whose topics changed hands: one sender stops and another begins, or the larger share of a topic's messages moves.
+//! Hand-overs of topics: one sender stops and another begins, or the larger share of a topic's messages moves.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -9,13 +9,13 @@ use crate::base::time::Stamp;
 use crate::graph::lives::{Bound, Voice};
 use crate::graph::{Element, NodeId, TopicId};
 
-/// The new sender begins at most so long before the old one stops.
+/// The longest time for which the new sender may begin before the old one stops, in nanoseconds.
 const BEFORE_NS: i64 = 5_000_000_000;
-/// And so long after; any time later if the old one never sends again.
+/// The longest time for which it may begin after, in nanoseconds; any time later if the old one never sends again.
 const AFTER_NS: i64 = 60_000_000_000;
-/// The old one does not come back sooner.
+/// The shortest time before the old one comes back, in nanoseconds.
 const BACK_NS: i64 = 5_000_000_000;
-/// Fewer messages than this are no sending: somebody who speaks once takes over nothing.
+/// The fewest messages of a sender: one that sends less takes over nothing.
 const FEWEST: u64 = 3;
 
 /// An interval of sending of one role, without a gap.
@@ -28,7 +28,7 @@ struct RoleSending {
     count: u64,
 }
 
-/// Tells of all hand-overs.
+/// Adds all hand-overs.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut of: BTreeMap<TopicId, Vec<&Voice>> = BTreeMap::new();
     for voice in &told.lives.voices {
@@ -49,7 +49,7 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// When each role sends, sorted by its first message.
+/// The intervals of sending of each role, sorted by first message.
 fn sendings(told: &LedgerInput<'_>, voices: &[&Voice]) -> Vec<RoleSending> {
     let mut all: Vec<RoleSending> = Vec::new();
     for voice in voices {
@@ -75,7 +75,7 @@ fn sendings(told: &LedgerInput<'_>, voices: &[&Voice]) -> Vec<RoleSending> {
     all
 }
 
-/// Every end of sending that another role's beginning makes good.
+/// Every end of sending that the beginning of another role compensates.
 fn replaced(all: &[RoleSending]) -> Vec<(RoleSending, RoleSending)> {
     let mut found = Vec::new();
     for old in all.iter().filter(|s| s.count >= FEWEST) {
@@ -100,7 +100,7 @@ fn replaced(all: &[RoleSending]) -> Vec<(RoleSending, RoleSending)> {
         let Some(new) = begins.filter(|new| back.is_none_or(|back| new.first < back)) else {
             continue;
         };
-        // Somebody who sent before and goes on takes nothing over, and leaves nothing to be taken.
+        // A role that sent before and goes on takes nothing over, and leaves nothing to be taken.
         let carried = others().any(|s| {
             s.role != new.role && s.last > old.last && s.first < old.last.plus(-BEFORE_NS)
         });
@@ -136,10 +136,10 @@ fn hand(
     drafts.add(entry);
 }
 
-/// A share that holds for less is none.
+/// The shortest time for which a larger share must hold, in nanoseconds.
 const HOLDS_NS: i64 = 5_000_000_000;
 
-/// How often somebody sends from when to when.
+/// The rate of a sender in an interval.
 struct Pace {
     node: NodeId,
     first: Stamp,
@@ -147,7 +147,7 @@ struct Pace {
     hz: f64,
 }
 
-/// Tells where most messages of a topic come from another sender than before, while both go on.
+/// Adds the times at which most messages of a topic begin to come from another sender, while both go on.
 fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, voices: &[&Voice]) {
     let paces: Vec<Pace> = voices
         .iter()

@@ -1,4 +1,4 @@
-//! What began, ended and came back: nodes and roles, with their edges and topics as parts.
+//! Starts, ends and restarts: of nodes and roles, with their edges and topics as parts.
 
 use std::collections::BTreeMap;
 
@@ -8,24 +8,24 @@ use crate::base::time::Stamp;
 use crate::graph::lives::{Bound, Known};
 use crate::graph::{Edge, Element, NodeId, TopicId};
 
-/// An edge that begins or ends so soon after its node does so because of it.
+/// The longest time between the turn of a node and that of an edge caused by it, in nanoseconds.
 const WITH_ITS_NODE_NS: i64 = 5_000_000_000;
 
-/// Whether something begins or ends.
+/// The kind of a turn: a beginning or an end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Turn {
     Begins,
     Ends,
 }
 
-/// The entries that tell of turns, by whose they are.
+/// The entries about turns, by node and topic.
 #[derive(Default)]
 struct Wholes {
     nodes: BTreeMap<(NodeId, Turn), Vec<(Bound, EntryId)>>,
     topics: BTreeMap<(TopicId, Turn, Stamp), EntryId>,
 }
 
-/// Tells of all lives.
+/// Adds the entries of all lives.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut wholes = Wholes::default();
     for turns in turns_by_role(told).values() {
@@ -87,7 +87,7 @@ fn kind(turn: Turn) -> Kind {
 /// The turns of a role, sorted by time.
 type RoleTurns = Vec<(Stamp, Turn, NodeId, Bound)>;
 
-/// The turns of all nodes: of each anonymous role together; any other node is a role of its own.
+/// The turns of all nodes: of each anonymous role together; any other node is its own role.
 fn turns_by_role<'a>(told: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
     let mut all: BTreeMap<&str, RoleTurns> = BTreeMap::new();
     let nodes = (0..).zip(told.elements.nodes.iter().zip(&told.lives.nodes));
@@ -101,7 +101,7 @@ fn turns_by_role<'a>(told: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
     all
 }
 
-/// Tells of one role: an end that a beginning follows is a restart.
+/// Adds the entries of one role: an end followed by a beginning is a restart.
 fn tell_role(told: &LedgerInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, turns: &RoleTurns) {
     let mut rest = turns.as_slice();
     while let Some((&(_, turn, node, at), after)) = rest.split_first() {
@@ -142,7 +142,7 @@ fn tell_role(told: &LedgerInput<'_>, drafts: &mut Drafts, wholes: &mut Wholes, t
     }
 }
 
-/// Tells of an edge: as a part of what its node does at that time, or alone.
+/// Adds the entry of an edge: as a part of its node's entry at that time, or alone.
 fn tell_edge(
     told: &LedgerInput<'_>,
     drafts: &mut Drafts,

@@ -1,4 +1,4 @@
-//! Makes the entries of a mission from its lives: each kind in a file of its own, then sorted and joined.
+//! The making of a mission's entries from its lives: each kind in a file of its own, then sorted and joined.
 
 use super::{Detail, Entry, EntryId, Kind, hands, lifetimes, rates, silence};
 use crate::base::name::{is_player, is_quiet, is_recorder};
@@ -7,23 +7,23 @@ use crate::evidence::{Degree, Evidence};
 use crate::graph::lives::{Bound, Known, Lives};
 use crate::graph::{Element, Elements, Node};
 
-/// What the entries are made from.
+/// The data from which entries are made.
 #[derive(Clone, Copy)]
 pub(crate) struct LedgerInput<'a> {
     pub(crate) elements: &'a Elements,
     pub(crate) lives: &'a Lives,
-    /// The share by which a rate must change, 0...
+    /// The share by which a rate must change, ≥ 0.
     pub(crate) rate_change: f64,
 }
 
-/// Entries not yet sorted; a part names the place of its whole.
+/// Entries not yet sorted; a part refers to the place of its whole.
 #[derive(Default)]
 pub(crate) struct Drafts {
     pub(crate) list: Vec<Entry>,
 }
 
 impl Drafts {
-    /// Adds an entry; answers its place.
+    /// Adds an entry; returns its place.
     pub(crate) fn add(&mut self, entry: Entry) -> EntryId {
         self.list.push(entry);
         EntryId::try_from(self.list.len() - 1).unwrap_or(EntryId::MAX)
@@ -41,7 +41,7 @@ pub(crate) fn make(told: &LedgerInput<'_>) -> Vec<Entry> {
     sorted(drafts.list, told.elements).0
 }
 
-/// Sorts by time, kind and name, gives parts the new places of their wholes and wholes their weight; answers also the
+/// Sorts by time, kind and name, gives parts the new places of their wholes and wholes their weight; returns also the
 /// new place of each.
 pub(crate) fn sorted(mut list: Vec<Entry>, elements: &Elements) -> (Vec<Entry>, Vec<EntryId>) {
     let mut order: Vec<usize> = (0..list.len()).collect();
@@ -103,7 +103,7 @@ impl LedgerInput<'_> {
         }
     }
 
-    /// Whether nothing that speaks for an element knows when it was there.
+    /// Whether none of the evidence for an element has times.
     pub(crate) fn is_timeless(&self, what: Element) -> bool {
         self.elements.evidence(what).is_timeless()
     }
@@ -113,7 +113,7 @@ impl LedgerInput<'_> {
         is_housekeeping(self.elements, what)
     }
 
-    /// Whether a topic's rates and senders mean nothing by themselves: housekeeping, and what actions send when asked.
+    /// Whether a topic's rates and senders mean nothing by themselves: housekeeping, and topics of actions.
     pub(crate) fn is_by_the_way(&self, topic: u32) -> bool {
         let name = self.elements.topics[topic as usize].name.as_str();
         is_quiet(name)
@@ -144,14 +144,14 @@ pub(crate) fn is_housekeeping(elements: &Elements, what: Element) -> bool {
         || topic.is_some_and(|id| is_quiet(elements.topics[id as usize].name.as_str()))
 }
 
-/// Whether a node records or plays bags, by its name or by what it logs, or is the log's own.
+/// Whether a node records or plays bags, by its name or its log records, or is the log's own.
 fn is_tool(node: &Node) -> bool {
     let name = node.name.as_str();
     let records = node.evidence.words().any(|word| word == "recorder");
     records || is_recorder(name) || is_player(name) || is_quiet(name)
 }
 
-/// When nodes changed their lifecycle states.
+/// Adds the changes of nodes' lifecycle states.
 fn lifecycles(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut states: std::collections::BTreeMap<u32, std::sync::Arc<str>> =
         std::collections::BTreeMap::new();

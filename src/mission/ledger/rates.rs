@@ -1,18 +1,18 @@
-//! Whose rate changed: where two even stretches of one sender meet.
+//! Changes of rates: where two even stretches of one sender meet.
 
 use super::make::{Drafts, LedgerInput};
 use super::{Detail, Kind};
 use crate::graph::Element;
 use crate::graph::lives::{Bound, Stretch, Voice};
 
-/// A rate that holds for less is a hiccup: messages, 5 intervals.
+/// The fewest messages (5 intervals) of a rate that counts.
 const FEWEST: u64 = 6;
-/// And nanoseconds.
+/// The shortest time for which a rate must hold, in nanoseconds.
 const HOLDS_NS: i64 = 3_000_000_000;
-/// A sender may pause for so long while it takes another rate.
+/// The longest pause of a sender while it takes another rate, in nanoseconds.
 const PAUSE_NS: i64 = 5_000_000_000;
 
-/// Tells of all changes of rate.
+/// Adds all changes of rates.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let voices = told.lives.voices.iter();
     for voice in voices.filter(|v| !v.is_latched && !told.is_by_the_way(v.topic)) {
@@ -48,7 +48,7 @@ fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
     holds(before) && holds(after) && differs && meets
 }
 
-/// Whether the sender began anew between the two.
+/// Whether the sender restarted between the two.
 fn is_away(told: &LedgerInput<'_>, voice: &Voice, before: &Stretch, after: &Stretch) -> bool {
     let known = told.known(told.sender(voice));
     let lives = known.into_iter().flat_map(|k| &k.lives);
@@ -59,7 +59,7 @@ fn is_away(told: &LedgerInput<'_>, voice: &Voice, before: &Stretch, after: &Stre
 }
 
 impl LedgerInput<'_> {
-    /// The publication of a voice; its topic where nobody knows who sends.
+    /// The publication of a voice; its topic where the sender is unknown.
     pub(super) fn sender(&self, voice: &Voice) -> Element {
         let place = voice.node.and_then(|node| {
             let key = |e: &crate::graph::Edge| (e.node, e.topic);

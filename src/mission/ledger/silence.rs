@@ -1,4 +1,4 @@
-//! Who paused while nothing says that it was gone: nodes, and topics whose senders all paused.
+//! Silences without a proof of an end: of nodes, and of topics whose senders all paused.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,10 @@ use crate::base::time::{Span, Stamp};
 use crate::graph::lives::{Bound, Known, Stretch, Voice, all_silent};
 use crate::graph::{Element, NodeId, TopicId};
 
-/// From when to when somebody was silent; `None` if to the end.
+/// The beginning and end of a silence; `None` if to the end of the mission.
 type Silence = (Stamp, Option<Stamp>);
 
-/// Tells of all silences.
+/// Adds all silences.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let pauses = Pauses::new(&told.lives.voices);
     let gone = Gone::new(drafts);
@@ -38,10 +38,11 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     }
 }
 
-/// So long before or after its sender's end a topic falls silent because of it.
+/// The longest time between the end of a sender and the silence of its topic caused by it, before or after, in
+/// nanoseconds.
 const WITH_ITS_SENDER_NS: i64 = 5_000_000_000;
 
-/// When nodes ended, and the entries that tell of it.
+/// The ends of nodes with their times, and the entries about them.
 struct Gone(BTreeMap<NodeId, Vec<(Stamp, EntryId)>>);
 
 impl Gone {
@@ -57,7 +58,7 @@ impl Gone {
         Self(gone)
     }
 
-    /// The entry that tells of the end of one of these senders at that time.
+    /// The entry about the end of one of these senders at that time.
     fn at(&self, voices: &[&Voice], time: Stamp) -> Option<EntryId> {
         let of = voices.iter().filter_map(|v| self.0.get(&v.node?));
         of.flatten()
@@ -127,7 +128,7 @@ fn meet(a: Silence, b: Silence) -> bool {
     !before(a, b) && !before(b, a)
 }
 
-/// When nobody at all was heard: the recording paused, not the robot.
+/// The times without any message: the recording paused, not the robot.
 struct Pauses(Vec<(Stamp, Stamp)>);
 
 impl Pauses {

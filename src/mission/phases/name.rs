@@ -1,4 +1,4 @@
-//! What a phase is called as long as nobody gives it a name: what began, else what ended.
+//! The default name of a phase: the elements that began, else those that ended.
 
 use std::sync::Arc;
 
@@ -8,7 +8,8 @@ use crate::base::words::{count, some_of};
 /// The most names that are listed.
 const MOST: usize = 3;
 
-/// `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `−1 node: replanner`, `same nodes`.
+/// The name by the changes: `11 nodes`, `+4 nodes: controller, costmap, planner and 1 more`, `−1 node: replanner`,
+/// `same nodes`.
 pub(crate) fn of_changes(
     is_first: bool,
     added: &[&Arc<str>],
@@ -24,7 +25,7 @@ pub(crate) fn of_changes(
     Arc::from(text)
 }
 
-/// `ramp to 22 nodes`.
+/// The name of a ramp: `ramp to 22 nodes`.
 pub(crate) fn ramp(nodes: usize, unit: &str) -> Arc<str> {
     Arc::from(format!("ramp to {}", count(nodes, unit)))
 }

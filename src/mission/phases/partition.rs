@@ -1,15 +1,16 @@
-//! Where to cut time so that one graph per piece errs least: dynamic programming in whole nanoseconds.
+//! The partition of time into pieces so that one graph per piece has the least error: dynamic programming in whole
+//! nanoseconds.
 
 use std::collections::BTreeMap;
 
 use super::presence::Presence;
 
-/// What a boundary costs, in element-nanoseconds: this share (one in so many) of the mission times its usual number of
+/// The cost of a boundary, in element-nanoseconds: this share (one in so many) of the mission times its usual number of
 /// elements. Chosen on three real missions and tested on three others (precision .98, recall .83 of 44 boundaries).
 const PRICE: i128 = 400;
-/// A mission of fewer elements than this is cut as if it had so many.
+/// The least number of elements that is assumed for the cost.
 const FEWEST: i128 = 10;
-/// A phase is at least one in so many parts of the mission.
+/// The shortest phase, as a part of the mission (one in so many).
 const SHORTEST: i64 = 20;
 
 /// The cells, other than the first, at which pieces begin. `widths` are the cells' lengths in nanoseconds. On a tie the
@@ -62,8 +63,8 @@ pub(crate) fn partition(widths: &[i64], present: &[Presence]) -> Vec<usize> {
     cuts
 }
 
-/// The time each element is present before every cell, and how many elements share that; elements that come and go
-/// together are one row.
+/// The time each element is present before every cell, and the number of elements that share that; elements that come
+/// and go together are one row.
 fn rows(widths: &[i64], present: &[Presence]) -> Vec<(Vec<i64>, i128)> {
     let mut many: BTreeMap<&[bool], i128> = BTreeMap::new();
     for presence in present {
@@ -88,7 +89,7 @@ mod tests {
     use super::super::presence::PresentThing;
     use super::*;
 
-    /// Where a mission is cut, of which each text is an element and each sign a cell of a second.
+    /// The cuts of a mission in which each text is an element and each character a cell of a second.
     fn cuts(rows: &[(&str, usize)]) -> Vec<usize> {
         let presence = |(text, many): &(&str, usize)| {
             let row = Presence {

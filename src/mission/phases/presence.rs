@@ -1,4 +1,4 @@
-//! In which cells of the activity each element of the graph is there, which is what phases are cut by.
+//! The presence of each element of the graph in the cells of the activity, by which phases are cut.
 
 use std::sync::Arc;
 
@@ -7,11 +7,11 @@ use crate::base::time::Stamp;
 use crate::graph::{Edge, Elements, Node, State, Topic};
 use crate::mission::activity::{Activity, is_hidden_node};
 
-/// Absences up to this share of the mission, one in so many, inside an element's life are none: a slow topic has no
-/// message in some cells.
+/// The longest absence, as a part of the mission (one in so many), that does not count inside an element's life: a slow
+/// topic has no message in some cells.
 const FILLED: i64 = 50;
 
-/// What is there or not.
+/// An element whose presence is recorded.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum PresentThing {
     /// A node, by role.
@@ -31,7 +31,7 @@ impl PresentThing {
     }
 }
 
-/// Something, and the cells in which it is there.
+/// An element, and the cells in which it exists.
 #[derive(Clone, Debug)]
 pub(crate) struct Presence {
     pub(crate) subject: PresentThing,
@@ -39,7 +39,7 @@ pub(crate) struct Presence {
 }
 
 impl Presence {
-    /// Whether phases are told by it: nodes, or topics where there are only these.
+    /// Whether it counts for the names of phases: nodes, or topics where there are only topics.
     pub(crate) fn counts(&self, topics: bool) -> bool {
         match self.subject {
             PresentThing::Node(_) => !topics,
@@ -49,7 +49,7 @@ impl Presence {
     }
 }
 
-/// Whether phases were found in topics.
+/// Whether phases are found in topics.
 pub(crate) fn is_topics(present: &[Presence]) -> bool {
     present
         .iter()
@@ -90,11 +90,11 @@ pub(crate) fn presences(elements: &Elements, activity: &Activity) -> Vec<Presenc
     seen.map(filled).collect()
 }
 
-/// What each node, publication and topic stands for in the activity, by id; `None` for what is left out.
+/// The subject of each node, publication and topic in the activity, by id; `None` for those left out.
 struct Subjects([Vec<Option<PresentThing>>; 3]);
 
 impl Subjects {
-    /// Nodes and their publications, or topics.
+    /// The subjects: nodes and their publications, or topics.
     fn new(elements: &Elements, knows_publishers: bool) -> Self {
         let told = |topic: &Topic| Some(topic.name.shared()).filter(|name| !is_quiet(name));
         if !knows_publishers {
@@ -123,7 +123,7 @@ impl Subjects {
         all
     }
 
-    /// The places of all among those that are sorted.
+    /// The places of all subjects in the sorted list.
     fn places(&self, all: &[&PresentThing]) -> [Vec<Option<usize>>; 3] {
         let place = |subject: &PresentThing| all.binary_search(&subject).ok();
         self.0.each_ref().map(|list| {

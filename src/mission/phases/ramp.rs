@@ -1,21 +1,22 @@
-//! Many short phases in a row that only add or only remove, such as a fleet that joins one by one, as one.
+//! Ramps: many short phases in a row that only add or only remove, such as a fleet that joins one by one, made one
+//! phase.
 
 use super::Configuration;
 use crate::base::time::Span;
 
-/// So many phases at least make a ramp.
+/// The fewest phases of a ramp.
 const FEWEST: usize = 5;
-/// Each of them is shorter than this share of the mission, in hundredths.
+/// The share of the mission, in hundredths, that each phase of a ramp must stay below.
 const SHORT: i64 = 8;
 
-/// What a phase does to the one before it.
+/// The effect of a phase on the one before it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum PhaseEffect {
     Up,
     Down,
 }
 
-/// The phases with every ramp made one, and which of them those are. A ramp's configuration is its last one.
+/// The phases with every ramp made one, and flags of the ramps. A ramp's configuration is its last one.
 pub(crate) fn joined(
     spans: &[Span],
     found: &[Configuration],
@@ -61,7 +62,7 @@ mod tests {
     use super::*;
     use crate::base::time::Stamp;
 
-    /// The lengths of the phases that are left, of phases with so many nodes and of such length.
+    /// The lengths of the phases that are left, of phases with this number of nodes and this length.
     fn lengths(phases: &[(usize, i64)]) -> Vec<(i64, bool)> {
         let mut start = Stamp(0);
         let span = |(_, length): &(usize, i64)| {

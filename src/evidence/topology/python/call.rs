@@ -1,4 +1,5 @@
-//! Calls in a launch file: functions of the file, paths and texts, lists that grow, and the launch system's substitutions.
+//! Calls in a launch file: functions of the file, paths and texts, lists that grow, and the launch system's
+//! substitutions.
 
 use super::evaluator::Evaluator;
 use super::value::PythonValue;

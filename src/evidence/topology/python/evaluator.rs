@@ -1,5 +1,5 @@
-//! Follows a launch file's statements without running anything: assignments, literal lists, loops over them, functions of
-//! the file. Where a condition is not known both branches count, and what they make is marked as undecided.
+//! Follows a launch file's statements without running anything: assignments, literal lists, loops over them, functions
+//! of the file. Where a condition is not known both branches count, and what they make is marked as undecided.
 
 use std::collections::BTreeMap;
 

@@ -58,8 +58,8 @@ impl PythonValue {
         }
     }
 
-    /// Whether two values are equal; `None` where that is not known. A text that says `true` equals `True`, for texts of
-    /// arguments are read both ways.
+    /// Whether two values are equal; `None` where that is not known. A text that says `true` equals `True`, for texts
+    /// of arguments are read both ways.
     pub(super) fn equals(&self, other: &Self) -> Option<bool> {
         match (self, other) {
             (Self::Text(a), Self::Text(b)) if a.contains("$(") || b.contains("$(") => None,

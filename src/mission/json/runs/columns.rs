@@ -1,4 +1,4 @@
-//! Columns of values, of which equal neighbours are one.
+//! Columns of values in which equal neighbours are joined.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer};
 
 use crate::graph::{Number, Row};
 
-/// Values, each with how often it is repeated.
+/// Values, each with the number of its repetitions.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JsonColumn<T>(pub(crate) Vec<(T, u32)>);
 
@@ -29,14 +29,14 @@ impl<T: PartialEq> JsonColumn<T> {
 }
 
 impl<T: Default + PartialEq> JsonColumn<T> {
-    /// Whether it says nothing in any window.
+    /// Whether all windows have the default value.
     pub(crate) fn is_plain(&self) -> bool {
         self.0.iter().all(|(value, _)| *value == T::default())
     }
 }
 
 impl<T> JsonColumn<T> {
-    /// What every value means, in order.
+    /// The meaning of every value, in order.
     pub(crate) fn values<'a, U: Copy + 'a>(
         &'a self,
         mut meaning: impl FnMut(&T) -> U + 'a,
@@ -59,7 +59,7 @@ impl<T: Serialize> Serialize for JsonColumn<T> {
     }
 }
 
-/// One value, or one with how often it is repeated.
+/// One value, or one with the number of its repetitions.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum RawCell<T> {
@@ -94,10 +94,10 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Cells<T> {
     }
 }
 
-/// A rate: that of the count, or another.
+/// A rate: computed from the count, or another.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum JsonRate {
-    /// As the count says.
+    /// The rate that follows from the count.
     Counted,
     Other(Option<f64>),
 }

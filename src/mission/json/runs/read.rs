@@ -1,4 +1,4 @@
-//! Reads elements with their columns back.
+//! Reader of elements with their columns.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ pub(crate) struct RawElements {
     pub(crate) subscribes: Vec<RawWhole<RawEdge>>,
 }
 
-/// An element, and what it says in which windows.
+/// An element, with its states and their windows.
 #[derive(Deserialize)]
 pub(crate) struct RawWhole<E> {
     #[serde(flatten)]
@@ -76,7 +76,7 @@ pub(crate) fn graphs(raw: &RawElements, ids: &Ids, spans: &[Span]) -> Graphs {
 }
 
 impl RawColumns {
-    /// Gives each row with its window to `put`, in order; what is out of order or behind the last window is left out.
+    /// Passes each row with its window to `put`, in order; rows out of order or behind the last window are left out.
     fn rows(
         &self,
         many: usize,

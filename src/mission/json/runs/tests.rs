@@ -1,4 +1,4 @@
-//! Both forms of a mission hold the same.
+//! Tests that both forms of a mission have the same content.
 
 use proptest::prelude::*;
 

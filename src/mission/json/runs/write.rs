@@ -1,4 +1,4 @@
-//! Writes every element with its columns.
+//! Writer of every element with its columns.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
@@ -38,7 +38,7 @@ pub(crate) fn elements<M: SerializeMap>(mission: &Mission, map: &mut M) -> Resul
     map.serialize_entry("subscribes", &List(subscribes))
 }
 
-/// An element, and what it says in which windows.
+/// An element, with its states and their windows.
 #[derive(Serialize)]
 pub(crate) struct WithColumns<'a, E> {
     #[serde(flatten)]
@@ -47,7 +47,7 @@ pub(crate) struct WithColumns<'a, E> {
     pub(crate) seen: In<'a>,
 }
 
-/// The windows in which an element is there, with what it says in them.
+/// The windows in which an element exists, with its states in them.
 pub(crate) struct In<'a> {
     pub(crate) what: Element,
     pub(crate) graphs: &'a Graphs,
