@@ -228,7 +228,7 @@ impl Judge<'_> {
             let many = words::count(entries.len(), "time");
             let says = format!("{role} restarted {many}, expected {}", range.value);
             let mut finding = Finding::new(FindingKind::NodeRestarted, role, at, says)
-                .saw(entries.len(), range.value);
+                .saw(&many, words::count_range(range.value.from, range.value.to));
             for entry in entries.iter().take(6) {
                 let until = entry.until.unwrap_or(entry.time);
                 let away = words::duration(until.since(entry.time).max(0));
