@@ -21,11 +21,12 @@ impl Judge<'_> {
         let before = self.checks.len();
         if facts.forbidden {
             let found = self.forbidden_nodes(&named.name, named.at);
-            self.note(format!("{name} forbidden"), named.at, found);
+            self.note(format!("node {name} forbidden"), named.at, found);
         } else {
             let found = self.presence(&named.name, named.at, facts);
-            self.note(name, named.at, found);
-            self.node_facts(name, &named.name, facts);
+            let title = format!("node {name}");
+            self.note(&title, named.at, found);
+            self.node_facts(&title, &named.name, facts);
         }
         for finding in self.checks[before..]
             .iter_mut()
