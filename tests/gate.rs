@@ -33,6 +33,28 @@ fn run(folder: &Path, args: &[&str]) -> (i32, String) {
     (output.status.code().unwrap(), said(&output) + &errors)
 }
 
+#[test]
+fn an_expectation_of_another_robot_is_not_brought_up_to_date() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "run.bag", &recording(HEALTHY, 0));
+    let gone: String = (0..1500).map(|n| format!("  /gone_{n}: {{}}\n")).collect();
+    let text = format!("schema: bagreel.expect/1\nnodes:\n{gone}");
+    fs::write(here.join("g.yaml"), &text).unwrap();
+    let (code, said) = run(here, &["baseline", "run.bag", "--update", "g.yaml"]);
+    assert!(
+        code == 2 && said.contains("1500 facts of `g.yaml`"),
+        "{said}"
+    );
+    assert_eq!(fs::read_to_string(here.join("g.yaml")).unwrap(), text);
+    let only = [
+        "baseline", "run.bag", "--update", "g.yaml", "--only", "/gone_7",
+    ];
+    assert_eq!(run(here, &only).0, 0);
+    let left = fs::read_to_string(here.join("g.yaml")).unwrap();
+    assert_eq!(left, text.replace("  /gone_7: {}\n", ""));
+}
+
 /// The ids of all findings of a check, in the order of the file.
 fn findings(folder: &Path, bag: &str, expect: &str) -> Vec<String> {
     let output = bagreel(

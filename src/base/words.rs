@@ -33,6 +33,18 @@ pub fn rate_range(from_hz: Option<f64>, to_hz: Option<f64>) -> String {
     }
 }
 
+/// A range of counts: `at most 2`, `1–3`.
+pub fn count_range(from: Option<f64>, to: Option<f64>) -> String {
+    match (from, to) {
+        (Some(from), Some(to)) if from < to => format!("{from}–{to}"),
+        (Some(one), Some(_)) => one.to_string(),
+        (Some(from), None) => format!("at least {from}"),
+        (None, Some(0.0)) => "none".to_owned(),
+        (None, Some(to)) => format!("at most {to}"),
+        (None, None) => "any".to_owned(),
+    }
+}
+
 /// The rate of `count` messages in `seconds`, with no more digits than so few messages can tell: `1 msg` for a single
 /// one, one significant digit below 10, two below 1,000, else as [`rate`]. A count of n is uncertain by about √n.
 pub fn rate_of(count: u64, seconds: f64) -> String {
@@ -307,6 +319,10 @@ mod tests {
             (rate_change(900.0, 1200.0), "900 Hz → 1.2 kHz"),
             (rate_range(Some(13.5), Some(16.0)), "13.5–16 Hz"),
             (rate_range(Some(13.5), None), "at least 13.5 Hz"),
+            (count_range(None, Some(0.0)), "none"),
+            (count_range(None, Some(2.0)), "at most 2"),
+            (count_range(Some(1.0), Some(3.0)), "1–3"),
+            (count_range(Some(2.0), Some(2.0)), "2"),
             (rate_of(0, 10.0), "0 Hz"),
             (rate_of(1, 300.0), "1 msg"),
             (rate_of(3, 10.0), "0.3 Hz"),

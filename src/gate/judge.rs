@@ -21,7 +21,7 @@ use crate::mission::Mission;
 /// One fact of the file, judged.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Checked {
-    /// What it is about: `/scan hz`, or a rule's `id`.
+    /// What it is about: `topic /scan hz`, or a rule's `id`.
     pub(crate) title: String,
     /// Where it stands.
     pub(crate) place: YamlPlace,

@@ -41,10 +41,13 @@ pub(crate) struct Check {
 impl Check {
     /// What the reports are about.
     pub(crate) fn subject<'a>(&self, mission: &'a Mission) -> Subject<'a> {
+        // Services that show findings beside the file compare its name with those of the repository.
+        let file = self.expect.display().to_string();
+        let plain = file.trim_start_matches("./");
         Subject {
             mission,
             bags: self.bags.clone(),
-            file: self.expect.display().to_string(),
+            file: plain.to_owned(),
             links: self.links.clone(),
         }
     }

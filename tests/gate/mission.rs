@@ -64,10 +64,10 @@ fn each_reconfiguration_breaks_the_rule_written_for_it() {
         .map(|(a, b)| (a.as_str(), b.as_str()))
         .collect();
     let expected = [
-        ("/camera_driver", "node-gone"),
-        ("/controller", "node-gone"),
-        ("/probe", "node-gone"),
-        ("/camera_backup", "node-gone"),
+        ("node /camera_driver", "node-gone"),
+        ("node /controller", "node-gone"),
+        ("node /probe", "node-gone"),
+        ("node /camera_backup", "node-gone"),
         ("localizer-starts", "node-late"),
         ("planner-starts", "node-late"),
         ("controller-starts", "node-late"),
@@ -126,21 +126,21 @@ fn from_one_reconfiguration_to_the_next_exactly_its_rule_breaks() {
         ("80", &["planner-starts"], &[]),
         ("110", &["controller-starts"], &[]),
         // Whether the camera is replaced in time nobody knows by now.
-        ("130", &["/camera_driver"], &[]),
+        ("130", &["node /camera_driver"], &[]),
         ("140", &["camera-is-replaced"], &[]),
         ("160", &["backup-starts"], &[]),
         ("174", &["probe-starts"], &[]),
-        ("184", &["/planner"], &[]),
-        ("196", &["/probe"], &[]),
+        ("184", &["node /planner"], &[]),
+        ("196", &["node /probe"], &[]),
         // Who is back has not gone.
-        ("207", &["planner-restarts"], &["/planner"]),
-        ("220", &["probe-restarts"], &["/probe"]),
+        ("207", &["planner-restarts"], &["node /planner"]),
+        ("220", &["probe-restarts"], &["node /probe"]),
         // Half a second apart, as the next two.
-        ("243", &["/controller", "successor-starts"], &[]),
-        ("258", &["/probe", "joystick-starts"], &[]),
-        ("275", &["/localizer"], &[]),
-        ("300", &["localizer-restarts"], &["/localizer"]),
-        ("325", &["/camera_backup"], &[]),
+        ("243", &["node /controller", "successor-starts"], &[]),
+        ("258", &["node /probe", "joystick-starts"], &[]),
+        ("275", &["node /localizer"], &[]),
+        ("300", &["localizer-restarts"], &["node /localizer"]),
+        ("325", &["node /camera_backup"], &[]),
     ];
     let mut broken: Vec<String> = Vec::new();
     for (end, came, went) in steps {

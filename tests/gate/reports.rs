@@ -88,6 +88,24 @@ fn hostile_names_are_inert_in_every_format() {
             .count(),
         1
     );
+    // A node and a topic may have one name; services keep one case of each.
+    fs::write(
+        here.join("both.yaml"),
+        "schema: bagreel.expect/1\nnodes:\n  /x: {}\ntopics:\n  /x: {}\n",
+    )
+    .unwrap();
+    let both = ["check", "run.bag", "--expect", "./both.yaml", "--format"];
+    let junit = said(&bagreel(here, &[&both[..], &["junit"]].concat()));
+    assert!(
+        junit.contains("classname=\"both.yaml\" name=\"node /x\""),
+        "{junit}"
+    );
+    assert!(
+        junit.contains("classname=\"both.yaml\" name=\"topic /x\""),
+        "{junit}"
+    );
+    let gitlab = said(&bagreel(here, &[&both[..], &["gitlab"]].concat()));
+    assert!(gitlab.contains("\"path\": \"both.yaml\""), "{gitlab}");
     for format in ["json", "sarif", "gitlab"] {
         serde_json::from_str::<serde_json::Value>(&print(format)).unwrap();
     }

@@ -7,12 +7,16 @@ use super::edit::EditedText;
 use super::{Draft, NodeLine, TopicLine, length, list, scalar};
 use crate::base::error::{Error, Result};
 use crate::base::nearest::nearest;
+use crate::base::words;
 use crate::base::yaml::BadYaml;
 use crate::gate::facts::Facts;
 use crate::gate::finding::{Finding, FindingKind, Severity};
 use crate::gate::pattern::Pattern;
 use crate::gate::{Expectation, judge, read};
 use crate::mission::Mission;
+
+/// More facts than this are not written anew: each takes a look at the whole file, and nothing of it is left to keep.
+const MOST: usize = 1000;
 
 /// An expectation brought up to date.
 #[derive(Debug)]
@@ -41,26 +45,36 @@ pub(crate) fn update(text: &str, path: &Path, runs: &[Mission], only: &[String])
         draft: &draft,
         runs,
     };
-    let mut done = BTreeSet::new();
-    let mut left = 0;
-    for finding in broken(&expectation, runs) {
-        let Some(name) = &finding.accept else {
-            left += 1;
-            continue;
-        };
-        if !only.is_empty() && !only.iter().any(|o| o == name || *o == finding.name) {
-            continue;
-        }
-        if done.insert((name.clone(), fact(finding.kind))) {
-            work.accept(name, &finding)
-                .map_err(|bad| unchanged(path, &bad))?;
-        }
+    let findings = broken(&expectation, runs);
+    let left = findings.iter().filter(|f| f.accept.is_none()).count();
+    let mut seen = BTreeSet::new();
+    let named = findings
+        .iter()
+        .filter_map(|f| Some((f.accept.as_deref()?, f)));
+    let wanted = named.filter(|(name, finding)| {
+        let is_meant = |o: &String| o == name || *o == finding.name;
+        (only.is_empty() || only.iter().any(is_meant)) && seen.insert((*name, fact(finding.kind)))
+    });
+    let wanted: Vec<(&str, &Finding)> = wanted.collect();
+    if wanted.len() > MOST {
+        return Err(Error::usage(
+            format!(
+                "{} of `{}` no longer hold, as if it were of another robot",
+                words::count(wanted.len(), "fact"),
+                path.display()
+            ),
+            "write a new one: `bagreel baseline BAG -o graph.yaml`; or bring it up to date by `--only NAME`",
+        ));
+    }
+    for (name, finding) in &wanted {
+        work.accept(name, finding)
+            .map_err(|bad| unchanged(path, &bad))?;
     }
     let text = work.text.0;
     read(&text, path)?;
     Ok(Update {
         text,
-        changed: done.len(),
+        changed: wanted.len(),
         left,
     })
 }

@@ -21,11 +21,12 @@ impl Judge<'_> {
         let before = self.checks.len();
         if facts.forbidden {
             let found = self.forbidden_nodes(&named.name, named.at);
-            self.note(format!("{name} forbidden"), named.at, found);
+            self.note(format!("node {name} forbidden"), named.at, found);
         } else {
             let found = self.presence(&named.name, named.at, facts);
-            self.note(name, named.at, found);
-            self.node_facts(name, &named.name, facts);
+            let title = format!("node {name}");
+            self.note(&title, named.at, found);
+            self.node_facts(&title, &named.name, facts);
         }
         for finding in self.checks[before..]
             .iter_mut()
@@ -228,7 +229,7 @@ impl Judge<'_> {
             let many = words::count(entries.len(), "time");
             let says = format!("{role} restarted {many}, expected {}", range.value);
             let mut finding = Finding::new(FindingKind::NodeRestarted, role, at, says)
-                .saw(entries.len(), range.value);
+                .saw(&many, words::count_range(range.value.from, range.value.to));
             for entry in entries.iter().take(6) {
                 let until = entry.until.unwrap_or(entry.time);
                 let away = words::duration(until.since(entry.time).max(0));

@@ -240,7 +240,7 @@ impl Judge<'_> {
             self.facts.clock(span.end)
         );
         let mut finding = Finding::new(FindingKind::TooManyChanges, "reconfigurations", at, says)
-            .saw(entries.len(), many)
+            .saw(entries.len(), words::count_range(many.from, many.to))
             .at(span);
         for (id, entry) in entries.iter().take(TOLD) {
             let text = sentence(self.facts.mission, *id, entry);

@@ -19,11 +19,12 @@ impl Judge<'_> {
         let before = self.checks.len();
         if facts.forbidden {
             let found = self.forbidden_topics(&named.name, named.at);
-            self.note(format!("{name} forbidden"), named.at, found);
+            self.note(format!("topic {name} forbidden"), named.at, found);
         } else {
             let found = self.topic_presence(&named.name, named.at, facts);
-            self.note(name, named.at, found);
-            self.topic_facts(name, &named.name, facts);
+            let title = format!("topic {name}");
+            self.note(&title, named.at, found);
+            self.topic_facts(&title, &named.name, facts);
         }
         for finding in self.checks[before..]
             .iter_mut()

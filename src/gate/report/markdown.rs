@@ -1,5 +1,6 @@
 //! A summary in Markdown for a pull request or a job: its first line is enough, its table says what and when.
 
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
@@ -28,7 +29,9 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     };
     let broken = told(&[Severity::Error, Severity::Warning]);
     let mut out = headline(subject, verdict) + "\n\n";
-    let groups = grouped(&broken);
+    // The worst first, and of those what most follows from.
+    let mut groups = grouped(&broken);
+    groups.sort_by_key(|(_, group)| (group.first().map(|f| f.severity), Reverse(group.len())));
     causes(&groups, &mut out);
     table(&facts, &groups, &mut out);
     links(subject, &mut out);
@@ -84,12 +87,11 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
     )
 }
 
-/// What several findings follow from, the most of them first.
+/// What several findings follow from.
 fn causes(groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
     let several = groups.iter().filter(|(_, group)| group.len() > 1);
     let several = several.filter_map(|(cause, group)| Some(((*cause)?, group.len())));
-    let mut several: Vec<(&str, usize)> = several.collect();
-    several.sort_by_key(|(_, many)| std::cmp::Reverse(*many));
+    let several: Vec<(&str, usize)> = several.collect();
     for (cause, many) in several.iter().take(CAUSES) {
         let many = words::count(*many, "finding");
         let _ = writeln!(out, "- **{}**: {many}", plain(cause));
@@ -97,11 +99,7 @@ fn causes(groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
     match several.len() {
         0 => {}
         n if n > CAUSES => {
-            let _ = writeln!(
-                out,
-                "- and {} more with several\n",
-                words::count(n - CAUSES, "cause")
-            );
+            let _ = writeln!(out, "- and {} more such causes\n", n - CAUSES);
         }
         _ => out.push('\n'),
     }
