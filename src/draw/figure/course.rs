@@ -39,7 +39,8 @@ impl Course {
             .filter_map(|h| Some((h.at, node(h.from)?, node(h.to)?)))
             .collect();
         if rows(&lives).len() > most && !by_topics {
-            lives = LivesFigure::of(source, groups::tracks(source, &lives.tracks));
+            let whole = usize::MAX;
+            lives = LivesFigure::of(source, groups::tracks(source, &lives.tracks, whole));
         }
         let mut chosen = rows(&lives);
         if chosen.len() > most {
