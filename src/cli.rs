@@ -348,22 +348,22 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .as_deref()
         .map(Purpose::parse)
         .transpose()?;
-    let page = look::options(&args.look, args.change.rate_change);
+    let drawing = Drawing {
+        body: look::body(args)?,
+        view: look::view(&args.view)?,
+        style: look::style(&args.look.style)?,
+        fonts: look::fonts(args.look.font.as_deref())?,
+        page: look::options(&args.look, args.change.rate_change),
+        is_sized: args.look.size.is_some(),
+        purpose: None,
+        is_fitted: args.look.fit == "auto",
+        engine: crate::layout::engine(&args.look.layout)?,
+        kept: look::kept(args.look.layout_from.as_deref())?,
+    };
     Ok(Render {
-        drawing: Drawing {
-            body: look::body(args)?,
-            view: look::view(&args.view)?,
-            style: look::style(&args.look.style)?,
-            fonts: look::fonts(args.look.font.as_deref())?,
-            page: match purpose {
-                Some(purpose) => purpose.page(page),
-                None => page,
-            },
-            is_sized: args.look.size.is_some() || purpose.is_some(),
-            purpose,
-            is_fitted: args.look.fit == "auto",
-            engine: crate::layout::engine(&args.look.layout)?,
-            kept: look::kept(args.look.layout_from.as_deref())?,
+        drawing: match purpose {
+            Some(purpose) => drawing.seen(purpose),
+            None => drawing,
         },
         sequence: crate::export::sequence::SequenceOptions {
             append_to: summary(),

@@ -45,7 +45,11 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let viewed = items::Viewed::new(&mission.elements, options);
     let notices = hidden::notes(&mission.elements, &viewed, options);
     let frames = frames::frames(mission, options, &viewed);
-    (staged(viewed, options, frames), notices)
+    let view = View {
+        compares: mission.ledger.compares,
+        ..staged(viewed, options, frames)
+    };
+    (view, notices)
 }
 
 /// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
@@ -77,6 +81,7 @@ fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) 
         frames: list,
         items_shown: shown.0,
         arrows_shown: shown.1,
+        compares: false,
     }
 }
 
@@ -424,6 +429,9 @@ pub struct View {
     pub items_shown: Vec<Showing>,
     /// What is shown of each arrow.
     pub arrows_shown: Vec<Showing>,
+    /// Whether two missions are compared, A and B, so that no time, no window and no timeline means anything; of two
+    /// windows the first is A alone.
+    pub compares: bool,
 }
 
 impl View {

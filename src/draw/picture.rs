@@ -46,8 +46,6 @@ pub struct PageOptions {
     pub width_mm: Option<f64>,
     /// The graph alone, without title, caption, legend and timeline.
     pub bare: bool,
-    /// Whether two missions are compared, so that no time, no window and no timeline means anything.
-    pub compares: bool,
     /// The title, if not the names of the bags.
     pub title: Option<String>,
     /// Which way the edges run; `None` takes what fits better.
@@ -70,7 +68,6 @@ impl Default for PageOptions {
             size: Size::new(1280.0, 720.0),
             width_mm: None,
             bare: false,
-            compares: false,
             title: None,
             orientation: None,
             phases: Vec::new(),
@@ -111,7 +108,7 @@ impl<'a> Measured<'a> {
         } else {
             Vec::new()
         };
-        let page = PageFrame::new(style, &options, legend.len());
+        let page = PageFrame::new(style, &options, legend.len(), !view.compares);
         Self {
             view,
             style,
@@ -250,7 +247,7 @@ impl<'a> Picture<'a> {
             self.furniture(k, frame, &mut scene.groups);
         }
         measured.options.title().clone_into(&mut scene.title);
-        if !measured.options.compares {
+        if !measured.view.compares {
             let (window, all) = (frame.index + 1, self.len());
             scene.title = format!("{}, window {window} of {all}", scene.title);
         }
@@ -279,7 +276,7 @@ impl<'a> Picture<'a> {
                 let (legend, style) = (&measured.legend, measured.style);
                 groups.push(legend::legend(legend, style, &measured.page));
             }
-            if !measured.options.compares {
+            if !measured.view.compares {
                 groups.extend(self.timeline.ground(measured.view));
             }
         }
@@ -293,9 +290,8 @@ impl<'a> Picture<'a> {
             .phases
             .get(k)
             .map_or("", String::as_str);
-        if self.measured.options.compares {
-            groups.push(self.title.compared());
-            groups.push(self.title.chips(frame));
+        if self.measured.view.compares {
+            groups.extend(self.title.compared(frame, self.len()));
             groups.push(self.title.caption(frame, phase));
             return;
         }

@@ -63,7 +63,7 @@ function seek(w, quiet) {
 }
 function header() {
 	const place = `window ${now + 1} of ${W}`, chips = chipsOf(), n = base < 0 ? news.get(now)?.n ?? 0 : marked(whole).length;
-	say('where', `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
+	say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
 	$.clock.lastChild.textContent = data.date;
 	const p = phases.findLastIndex(([from]) => from < ends[now]);

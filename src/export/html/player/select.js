@@ -99,7 +99,7 @@ function card() {
 	say('endstitle', group < 0 ? 'Connected' : 'Holds');
 	const past = told.flatMap(([w, , , lines]) => lines.filter(line => group < 0 ? line[2] == sel : folded.holds[group].includes(line[2])).map(line => [w, ...line]));
 	$.story.hidden = !past.length;
-	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: clock(Math.floor(s)) + ' ' }), text), 12);
+	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : clock(Math.floor(s)) + ' ' }), text), 12);
 	fill('ends', group < 0 ? whole.ends(sel) : folded.holds[group], element);
 }
 function drawLife(life, classes) {
