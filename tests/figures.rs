@@ -4,6 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use serde_json::{Value, json};
+
+use crate::support::{pdf::letters_pt, shared};
+
 /// The text of a figure as SVG, or what the command said against it.
 fn figure(bag: &Path, flags: &[&str]) -> Result<String, String> {
     let folder = tempfile::tempdir().unwrap();
@@ -247,6 +251,7 @@ fn the_paper_of_the_examples_is_made_by_its_script() {
     for name in ["lives", "map", "steps"] {
         assert!(log.contains(&format!("<{name}.pdf")), "{name}: {log}");
     }
+    assert!(log.contains("(1 page, "), "{log}");
 }
 
 /// Font sizes in points.
@@ -268,6 +273,87 @@ fn no_text_is_below_six_points() {
     let svg = figure(&example(), &["--figure", "lives", "--text", "8pt"]).unwrap();
     let smallest = sizes_pt(&svg).into_iter().fold(f64::MAX, f64::min);
     assert!(smallest >= 6.95, "{smallest}");
+}
+
+#[test]
+fn no_letter_of_a_pdf_is_below_six_points_on_paper() {
+    let folder = tempfile::tempdir().unwrap();
+    let pdf = folder.path().join("figure.pdf");
+    for (kind, width, _) in FIGURES {
+        let out = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+            .args(["render", "--quiet", "--figure", kind, "--width", width])
+            .arg(example())
+            .arg("-o")
+            .arg(&pdf)
+            .output()
+            .unwrap();
+        assert!(out.status.success(), "{out:?}");
+        let letters = letters_pt(&std::fs::read(&pdf).unwrap());
+        let smallest = letters.iter().copied().fold(f64::MAX, f64::min);
+        let largest = letters.iter().copied().fold(0.0, f64::max);
+        assert!(letters.len() > 40, "{kind} {width}: {}", letters.len());
+        assert!(smallest >= 5.999, "{kind} {width}: {smallest} pt");
+        assert!(largest < 7.001, "{kind} {width}: {largest} pt");
+    }
+}
+
+/// A mission of many nodes in nested namespaces, two of which come and one of which goes half way.
+fn large() -> Value {
+    let start = 1_700_000_000_000_000_000_i64;
+    let second = 1_000_000_000_i64;
+    let spaces = [
+        "plan",
+        "sense/near",
+        "sense/far",
+        "drive/left",
+        "drive/right",
+        "map",
+    ];
+    let name = |k: usize| format!("/{}/part{}/node{k}", spaces[k % 6], k / 6 % 5);
+    let there = |w: i64, k: usize| match k {
+        7 | 20 => w >= 6,
+        33 => w < 6,
+        _ => true,
+    };
+    let window = |w: i64| {
+        let who: Vec<usize> = (0..300).filter(|k| there(w, *k)).collect();
+        let topic = |k: usize| format!("{}/out", name(k));
+        let edge = |node: usize, of: usize| json!({"node": name(node), "topic": topic(of), "state": "active", "hz": 10.0, "count": 100});
+        let heard = who.iter().filter(|k| **k >= 6).map(|k| edge(*k, k % 6));
+        json!({
+            "start_ns": start + w * 10 * second, "end_ns": start + (w + 1) * 10 * second, "messages": 1000,
+            "nodes": who.iter().map(|k| json!({"name": name(*k), "state": "active"})).collect::<Vec<_>>(),
+            "topics": who.iter().map(|k| json!({"name": topic(*k), "types": ["a/B"], "state": "active", "hz": 10.0, "count": 100}))
+                .collect::<Vec<_>>(),
+            "publishes": who.iter().map(|k| edge(*k, *k)).collect::<Vec<_>>(),
+            "subscribes": heard.collect::<Vec<_>>(),
+        })
+    };
+    json!({"schema": "bagreel.evolution/1", "bags": [{"name": "large", "format": "mcap"}], "windows": (0..12).map(window).collect::<Vec<_>>()})
+}
+
+#[test]
+fn what_is_too_much_for_nodes_is_drawn_in_groups_of_ever_shorter_namespaces() {
+    let folder = tempfile::tempdir().unwrap();
+    let mission = folder.path().join("large.json");
+    std::fs::write(&mission, large().to_string()).unwrap();
+    for kind in ["lives", "map", "steps"] {
+        let svg = figure(&mission, &["--figure", kind, "--width", "181mm"]).unwrap();
+        let (w, h) = size_mm(&svg);
+        assert!((w - 181.0).abs() < 0.1 && h <= 225.0, "{kind}: {w} x {h}");
+        let together = ["more</text>", " +", " throughout</text>"];
+        assert!(
+            together.iter().any(|words| svg.contains(words)),
+            "{kind} draws no two as one"
+        );
+        // What comes and goes is no member of a group that stays.
+        assert!(svg.contains("node33"), "{kind} hides who goes");
+    }
+    let Some(huge) = shared("data/graphs/huge.json") else {
+        return;
+    };
+    let svg = figure(&huge, &["--figure", "lives"]).unwrap();
+    assert!(svg.contains("debug_info_monitor +61"), "of 300 nodes");
 }
 
 #[test]

@@ -5,6 +5,7 @@
 pub mod cdr;
 pub mod mcap;
 pub mod mission;
+pub mod pdf;
 pub mod rosbag1;
 pub mod sqlite3;
 

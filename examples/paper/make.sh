@@ -6,7 +6,7 @@ bagreel=${BAGREEL:-bagreel}
 bag=../warehouse.bag
 # A column is 88 mm wide, the page 180 mm: what --width says is included without scaling, so that 6 pt stay 6 pt.
 # With --bare the legend stands in the caption, which the .tex beside the .pdf holds.
-for figure in map:180mm lives:88mm steps:180mm; do
+for figure in lives:88mm map:88mm steps:180mm; do
     "$bagreel" render "$bag" --figure "${figure%%:*}" --width "${figure##*:}" --phases phases.txt --bare \
         -o "${figure%%:*}.pdf" -o "${figure%%:*}.tex"
 done
@@ -15,5 +15,5 @@ pdflatex -interaction=nonstopmode -halt-on-error paper.tex
 pdflatex -interaction=nonstopmode -halt-on-error paper.tex
 # What the README shows.
 if command -v pdftoppm > /dev/null; then
-    pdftoppm -r 80 -png paper.pdf page
+    pdftoppm -r 100 -png -singlefile paper.pdf page
 fi

@@ -17,6 +17,7 @@ import zlib
 import axe
 import firefox
 import folded
+import sight
 import touch
 import webdriver
 from webdriver import Browser
@@ -359,6 +360,7 @@ def main(page, evolution, hostile_page, svg, folded_page, board, report):
     animation(svg)
     folded.check(url(folded_page), data_of(pathlib.Path(folded_page).read_text()))
     touch.check(url(page))
+    sight.check(url(page), url(folded_page), url(board))
     if is_there(axe):
         axe.check(url(page), url(board), report)
     if is_there(firefox):

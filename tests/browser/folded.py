@@ -18,6 +18,7 @@ def check(url, data):
     name, held = folded["names"][place], folded["holds"][place]
     with Browser(1440, 900) as b:
         b.open(url)
+        time.sleep(0.3)
         b.js("document.querySelectorAll('#folded .items > g')[arguments[0]].querySelector('rect').dispatchEvent(new MouseEvent('click', {bubbles: true}))", place)
         assert b.js("return document.getElementById('name').textContent") == name
         assert b.js("return document.querySelectorAll('#ends button').length") == min(50, len(held))
@@ -35,6 +36,7 @@ def check(url, data):
         assert f"sel=namespace:{name}" in link, link
         b.open("about:blank")
         b.open(url + link)
+        time.sleep(0.3)
         assert b.js("return document.getElementById('name').textContent") == name
         b.keys("\ue00c")
         assert b.js("return document.getElementById('card').hidden") and not b.js(OUTSIDE)[5]

@@ -38,8 +38,10 @@ impl Course {
             .filter_map(|h| Some((h.at, node(h.from)?, node(h.to)?)))
             .collect();
         let is_grouped = rows(lives).len() > most && source.knows_publishers();
-        let grouped =
-            is_grouped.then(|| LivesFigure::of(source, groups::tracks(source, &lives.tracks)));
+        let grouped = is_grouped.then(|| {
+            let tracks = groups::tracks(source, &lives.tracks, usize::MAX);
+            LivesFigure::of(source, tracks)
+        });
         let lives = grouped.as_ref().unwrap_or(lives);
         let mut chosen = rows(lives);
         if chosen.len() > most {

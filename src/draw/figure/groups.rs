@@ -1,5 +1,5 @@
 //! Groups: nodes of one namespace that live in the same phases. A group hides no change, for its members come and go
-//! together.
+//! together. Where groups of whole namespaces are too many, shorter namespaces make fewer of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::incidents::configurations;
 use super::source::{FigureSource, merged};
 use super::tracks::{SendingBar, Track, TrackLife};
-use crate::base::name::namespace;
+use crate::base::name::{last_part, namespace};
 use crate::base::time::Span;
 
 /// Some nodes that are drawn as one.
@@ -34,12 +34,26 @@ pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTre
     tracks.iter().map(of).collect()
 }
 
-/// The groups of some tracks, by namespace and first phase.
-pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<NodeGroup> {
+/// How many parts of namespaces tell groups apart, from all of them down to the first one.
+pub(crate) fn depths(tracks: &[Track]) -> impl Iterator<Item = usize> + use<> {
+    let parts = |t: &Track| namespace(&t.name).matches('/').count();
+    let deepest = tracks.iter().map(parts).max().unwrap_or(1).max(1);
+    (1..=deepest).rev()
+}
+
+/// The first `depth` parts of a namespace.
+pub(crate) fn cut(space: &str, depth: usize) -> &str {
+    let end = space.match_indices('/').nth(depth);
+    end.map_or(space, |(end, _)| &space[..end])
+}
+
+/// The groups of some tracks, by the first `depth` parts of their namespace and by their phases.
+pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track], depth: usize) -> Vec<NodeGroup> {
     let phases = phases_of(source, tracks);
     let mut all: BTreeMap<(&str, Vec<usize>), Vec<usize>> = BTreeMap::new();
     for (at, (track, phases)) in tracks.iter().zip(&phases).enumerate() {
-        let key = (namespace(&track.name), phases.iter().copied().collect());
+        let space = cut(namespace(&track.name), depth);
+        let key = (space, phases.iter().copied().collect());
         all.entry(key).or_default().push(at);
     }
     all.into_iter()
@@ -52,8 +66,8 @@ pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<NodeGro
 }
 
 /// A row per group: alive while a member is, busy by what all send.
-pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<Track> {
-    groups(source, tracks)
+pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track], depth: usize) -> Vec<Track> {
+    groups(source, tracks, depth)
         .iter()
         .map(|group| match group.members[..] {
             [only] => tracks[only].clone(),
@@ -80,7 +94,10 @@ fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Track]) -> T
     let bar = |span: Span| SendingBar { span, share: 1.0 };
     let first = members().next();
     let more = group.members.len() - 1;
-    let name = first.map_or_else(String::new, |t| format!("{} +{more}", t.name));
+    let space = group.space.trim_end_matches('/');
+    let name = first.map_or_else(String::new, |t| {
+        format!("{space}/{} +{more}", last_part(&t.name))
+    });
     Track {
         name: Arc::from(name),
         nodes: members().flat_map(|t| &t.nodes).copied().collect(),
@@ -91,5 +108,17 @@ fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Track]) -> T
             .map(bar)
             .collect(),
         hz: members().filter_map(|t| t.hz).reduce(|a, b| a + b),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn namespaces_are_cut_to_their_first_parts() {
+        assert_eq!(["/", "/a", "/a/b"].map(|s| cut(s, 1)), ["/", "/a", "/a"]);
+        assert_eq!(cut("/a/b/c", 2), "/a/b");
+        assert_eq!(cut("/a/b/c", 9), "/a/b/c");
     }
 }

@@ -345,7 +345,11 @@ fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>)
     let Some(right) = place.rates else { return };
     // Two digits from 1 Hz on, one below: more is not known, and not needed.
     let digits = |hz: f64| if hz < 0.95 { 1 } else { 2 };
-    let shown = |hz: f64| words::number(words::significant(hz, digits(hz)));
+    // Four digits are wider than the column.
+    let shown = |hz: f64| match words::significant(hz, digits(hz)) {
+        kilo if kilo >= 1000.0 => format!("{}k", words::number(kilo / 1000.0)),
+        hz => words::number(hz),
+    };
     let text = hz.map_or("–".to_owned(), shown);
     canvas.text_end(right, y, Type::Small, ink::QUIET, &text);
 }

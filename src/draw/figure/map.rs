@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 
 use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use super::groups::{groups, phases_of};
+use super::groups::{NodeGroup, depths, groups, phases_of};
 use super::notes::{flow, sentence};
-use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
+use super::page::{FITTING, FigureSheet, TOLD, filter_that_fits, nothing};
 use super::place::{PlacedPanel, place, rooms};
 use super::talks::{Talk, Talks};
 use super::tracks::{Track, of_nodes};
@@ -28,6 +28,8 @@ const PILL: f64 = 3.3;
 const NAMED: usize = 4;
 /// The most nodes that are laid out one by one; more never fit.
 const MOST_NODES: usize = 120;
+/// The most groups that are laid out; more never fit.
+const MOST_GROUPS: usize = 60;
 
 /// One box with the text in it.
 enum MapBox {
@@ -59,7 +61,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let asked = sheet.options.rows;
     let few = tracks.len() <= MOST_NODES;
     let nodes = (asked != Some(RowKind::Groups) && few)
-        .then(|| page(sheet, &tracks, false))
+        .then(|| page(sheet, &tracks, None))
         .flatten();
     let is_low = |s: &Scene, most: f64| s.size.h <= most * super::canvas::PX_PER_MM;
     if let Some(scene) = nodes
@@ -69,9 +71,9 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         return Ok((scene.clone(), Vec::new()));
     }
     let grouped = (asked != Some(RowKind::Nodes))
-        .then(|| page(sheet, &tracks, true))
+        .then(|| grouped(sheet, &tracks))
         .flatten();
-    if let Some(scene) = grouped.filter(|s| is_low(s, MOST_HEIGHT)) {
+    if let Some(scene) = grouped {
         let remark = format!(
             "boxes are groups: {} one by one are too many for this width",
             words::count(tracks.len(), "node")
@@ -87,6 +89,19 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         Some(scene) => Ok((scene, Vec::new())),
         None => Err(too_large(sheet, &tracks)),
     }
+}
+
+/// The map of the smallest groups that fit.
+fn grouped(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Option<Scene> {
+    let mut many = usize::MAX;
+    depths(tracks).find_map(|depth| {
+        let groups = groups(sheet.source, tracks, depth);
+        let is_new = groups.len() < many;
+        many = groups.len();
+        let fits = is_new && many <= MOST_GROUPS;
+        let scene = fits.then(|| page(sheet, tracks, Some(&groups))).flatten();
+        scene.filter(super::page::fits)
+    })
 }
 
 fn too_large(sheet: &FigureSheet<'_>, tracks: &[Track]) -> Error {
@@ -110,22 +125,22 @@ fn page_at(sheet: &FigureSheet<'_>, tracks: &[Track], width: f64) -> bool {
         options: &options,
         ..*sheet
     };
-    page(&wider, tracks, true).is_some_and(|s| super::page::fits(&s))
+    grouped(&wider, tracks).is_some()
 }
 
-fn page(sheet: &FigureSheet<'_>, tracks: &[Track], is_grouped: bool) -> Option<Scene> {
+/// The map of nodes, or of groups of them.
+fn page(sheet: &FigureSheet<'_>, tracks: &[Track], groups: Option<&[NodeGroup]>) -> Option<Scene> {
     let width = sheet.options.width_mm;
     let mut canvas = sheet.canvas();
-    let drawn = if is_grouped {
-        of_groups(sheet, &canvas, tracks)
-    } else {
-        of_pills(sheet, &canvas, tracks)
+    let drawn = match groups {
+        Some(groups) => of_groups(sheet, &canvas, tracks, groups),
+        None => of_pills(sheet, &canvas, tracks),
     }?;
     let many = drawn.labels.len();
     let left_out = drawn.placed.left_out;
     paint(&mut canvas, sheet, &drawn);
     let end = drawn.placed.size.h + 0.2;
-    let told = (is_grouped, left_out, many);
+    let told = (groups.is_some(), left_out, many);
     let y = below(&mut canvas, sheet, end, told, &drawn.alone);
     Some(canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Map")))
 }
@@ -162,12 +177,13 @@ fn below(
         text.push_str(if is_grouped {
             "Box: nodes of one namespace that come and go together; number and bar: the phases they live in. "
         } else {
-            "Green number: the phases in which a node lives; grey: all of them. Dashed frame: nodes without a known partner. "
+            "Number: the phases in which a node lives; filled: all of them. Dashed frame: nodes without a known partner. "
         });
         text.push_str("Arrow: topics, thicker = more Hz, dashed = inferred. ");
     }
     if !alone.is_empty() {
-        let _ = write!(text, "Without a known partner: {}. ", alone.join(", "));
+        let names = words::some_of(alone, TOLD);
+        let _ = write!(text, "Without a known partner: {names}. ");
     }
     if left_out > 0 {
         let _ = write!(text, "{left_out} of {many} topic names left out.");
@@ -254,9 +270,9 @@ fn of_groups(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,
     tracks: &[Track],
+    groups: &[NodeGroup],
 ) -> Option<MapDrawing> {
     let source = sheet.source;
-    let groups = groups(source, tracks);
     let mut vertex = vec![None; tracks.len()];
     let mut looks = Vec::new();
     let mut vertices = Vec::new();

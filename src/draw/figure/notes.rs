@@ -17,6 +17,9 @@ pub(crate) enum TextRun {
 /// Runs of text that are kept on one line if possible.
 pub(crate) type Unbroken = Vec<TextRun>;
 
+/// The most bytes of a text that is measured as a whole: no line has room for a longer one.
+const LONG: usize = 2000;
+
 /// The room between items in millimetres.
 const GAP: f64 = 2.6;
 
@@ -104,12 +107,12 @@ impl NotePlace {
     /// The text split after the words that fit on this line, at least one word on an empty line.
     fn split<'t>(&self, canvas: &PaperCanvas<'_>, of: Type, text: &'t str) -> (&'t str, &'t str) {
         let room = self.width - self.x + 0.01;
-        if canvas.width(text.trim_end(), of) <= room {
+        if text.len() <= LONG && canvas.width(text.trim_end(), of) <= room {
             return (text, "");
         }
         let breaks = text.match_indices(' ').map(|(at, _)| at + 1);
         let fits = |at: &usize| canvas.width(text[..*at].trim_end(), of) <= room;
-        let at = breaks.clone().rfind(fits);
+        let at = breaks.clone().take_while(fits).last();
         // A first word that is too long for the rest of the line goes to the next one; one that is too long for any
         // line stands out.
         let at = at.or_else(|| (self.x > 0.0).then_some(0));

@@ -2,6 +2,7 @@
 
 use super::band::{Axis, clock, names};
 use super::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
+use super::groups::depths;
 use super::lives::{LivesFigure, RowPlace, WIDE, sign};
 use super::notes::{TextRun, Unbroken, flow, sentence};
 use super::rows::FigureRow;
@@ -17,6 +18,9 @@ use crate::draw::text::Fonts;
 
 /// The shortest time axis in millimetres on which anything can be seen.
 const SHORTEST_AXIS: f64 = 15.0;
+
+/// The most names of one kind that are told in a note; the others are counted.
+pub(crate) const TOLD: usize = 60;
 
 /// The number of boxes that fit on a page, about.
 pub(crate) const FITTING: usize = 40;
@@ -70,11 +74,11 @@ impl<'a> FigureSheet<'a> {
             && !by_topics
             && matches!(self.options.rows, None | Some(RowKind::Groups))
         {
-            let groups = LivesFigure::of(
-                self.source,
-                super::groups::tracks(self.source, &first.tracks),
-            );
-            scene = self.lives_page(&groups).filter(fits);
+            scene = depths(&first.tracks).find_map(|depth| {
+                let tracks = super::groups::tracks(self.source, &first.tracks, depth);
+                let groups = LivesFigure::of(self.source, tracks);
+                self.lives_page(&groups).filter(fits)
+            });
             if scene.is_some() && !is_grouped {
                 let many = words::count(first.tracks.len(), "node");
                 remarks.push(format!(
@@ -240,7 +244,7 @@ fn lives_notes(lives: &LivesFigure<'_>, is_told: bool) -> Vec<Unbroken> {
                 .iter()
                 .map(|at| last_part(&lives.tracks[*at].name))
                 .collect();
-            let text = format!("Throughout in {space}: {}.", names.join(", "));
+            let text = format!("Throughout in {space}: {}.", words::some_of(&names, TOLD));
             items.push(sentence(ink::QUIET, text));
         }
     }

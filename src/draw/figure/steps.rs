@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::band::{clock, title};
 use super::canvas::{PX_PER_MM, PaperCanvas, ink};
-use super::groups::groups;
+use super::groups::{cut, depths, groups};
 use super::incidents::configurations;
 use super::notes::{Unbroken, flow, sentence};
 use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
@@ -43,6 +43,8 @@ struct Studio<'s> {
     found: Vec<Configuration>,
     /// The number of panels side by side.
     columns: usize,
+    /// How many parts of namespaces tell groups apart.
+    depth: usize,
 }
 
 /// The figure and its remarks.
@@ -57,12 +59,14 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
             "`--figure lives` shows what there is; `--phases FILE` cuts by your own times",
         ));
     }
+    let columns = match sheet.options.width_mm {
+        w if w >= 150.0 => 3,
+        w if w >= 110.0 => 2,
+        _ => 1,
+    };
     let mut studio = Studio {
-        columns: match sheet.options.width_mm {
-            w if w >= 150.0 => 3,
-            w if w >= 110.0 => 2,
-            _ => 1,
-        },
+        columns,
+        depth: depths(&tracks).next().unwrap_or(1),
         talks: Talks::new(sheet.source, &tracks),
         found: configurations(sheet.source),
         tracks,
@@ -72,11 +76,12 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     loop {
         let panels: Option<Vec<Panel>> = chosen.iter().map(|k| studio.panel(*k)).collect();
         let Some(panels) = panels else {
-            if studio.columns == 1 {
-                return Err(studio.too_wide());
+            // Fewer panels side by side are wider; shorter namespaces make fewer groups.
+            match (studio.columns, studio.depth) {
+                (1, 1) => return Err(studio.too_wide()),
+                (1, _) => (studio.columns, studio.depth) = (columns, studio.depth - 1),
+                _ => studio.columns -= 1,
             }
-            // Fewer panels side by side are wider.
-            studio.columns -= 1;
             continue;
         };
         let left = sheet.source.phases.len() - 1 - chosen.len();
@@ -251,7 +256,7 @@ impl Studio<'_> {
             let mut spaces: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
             for at in *own {
                 spaces
-                    .entry(namespace(&self.tracks[*at].name))
+                    .entry(cut(namespace(&self.tracks[*at].name), self.depth))
                     .or_default()
                     .push(*at);
             }
@@ -284,7 +289,7 @@ impl Studio<'_> {
             }
         }
         let mut linked = BTreeMap::new();
-        for group in groups(source, &self.tracks) {
+        for group in groups(source, &self.tracks, self.depth) {
             let most = group
                 .members
                 .iter()
@@ -364,7 +369,7 @@ impl Studio<'_> {
     }
 
     fn space(&self, at: usize) -> &str {
-        namespace(&self.tracks[at].name)
+        cut(namespace(&self.tracks[at].name), self.depth)
     }
 
     fn look(

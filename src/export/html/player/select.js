@@ -62,14 +62,14 @@ function unfold() {
 	viewBefore = view;
 	show(whole);
 	bring(held, TOPIC);
-	stand(around(boxesOf(held)), there);
 	pin();
+	stand(around(boxesOf(held)), there);
 	say('live', `${held.length} elements, one by one`);
 }
 // Moves the view so that the middle of a box stands at a place of the stage, and all of the box on it.
 function stand([x, y, w, h], there) {
 	const k = scaleOf(view), within = (at, part, all) => Math.max(part / 2, Math.min(all - part / 2, at));
-	if (w * k > wide || h * k > high) return;
+	if (w * k > wide || h * k > high) return minimap();
 	const left = within(there[0], w * k, wide), top = within(there[1], h * k, high);
 	fit([x + w / 2 - left / k, y + h / 2 - top / k, wide / k, high / k]);
 }
@@ -90,7 +90,8 @@ function card() {
 	say('name', g.name(i));
 	$.title.className = 'is-' + g.kind(i);
 	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · against window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
-	$.facts.replaceChildren(...facts.map(fact => make('p', { textContent: fact })));
+	// What a group holds is listed below.
+	$.facts.replaceChildren(...facts.filter(fact => group < 0 || !/^\d+ together/.test(fact)).map(fact => make('p', { textContent: fact })));
 	drawLife(g.lives[i][0], g.classes);
 	$.follow.hidden = group >= 0;
 	$.unfold.hidden = group < 0;

@@ -14,8 +14,8 @@ function fit(box) {
 	view = [...box];
 	svg().setAttribute('viewBox', view.join(' '));
 	const k = scaleOf(view), list = svg().classList;
-	list.toggle('norates', k < RATE * .99);
-	list.toggle('notopics', k < TOPIC * .89);
+	list.toggle('norates', k < RATE * .999);
+	list.toggle('notopics', k < TOPIC * .999);
 	list.toggle('nonodes', k < NODE * .6);
 	svg().style.setProperty('--space', Math.min(Math.max(sizes[3], 10 / k), 60) + 'px');
 	minimap();
@@ -67,9 +67,16 @@ function densest(boxes, w, h) {
 	}
 	return best.slice(1);
 }
+// The board's beginning, where all of it would be too small to be read.
+function boardView() {
+	const [x, y] = homeOf(), sizes = [...$.graph.querySelectorAll('text')].map(text => +text.getAttribute('font-size'));
+	const all = scaleOf(homeOf()), k = Math.max(all, READABLE / Math.min(...sizes));
+	fit(k > all ? [x, y, wide / k, high / k] : homeOf());
+}
 // All of it if its names can be read, else the changes of this window.
 function firstView() {
-	if (!shown.svg || scaleOf(homeOf()) >= TOPIC) return fit(homeOf());
+	if (!shown.svg) return boardView();
+	if (scaleOf(homeOf()) >= TOPIC) return fit(homeOf());
 	const all = marked();
 	const some = all.length ? all : [...shown.names.keys()].filter(i => shown.isThere(i, now));
 	bring(some, scaleOf(around(boxesOf(some))) >= RATE ? RATE : TOPIC);
@@ -82,13 +89,14 @@ function minimap() {
 	const hidden = !shown.svg || seen[0] >= w * .98 && seen[1] >= h * .98;
 	$.mini.toggleAttribute('hidden', hidden);
 	if (hidden) return;
-	const [all, , frame] = $.mini.children;
+	const [all, , picked, frame] = $.mini.children;
 	if ($.mini.of != shown) {
 		$.mini.of = shown;
 		$.mini.setAttribute('viewBox', homeOf().join(' '));
 		all.setAttribute('d', outline(shown.boxes));
 	}
 	markMini();
+	picked.setAttribute('d', outline([...near].filter(i => i < shown.N).map(i => shown.boxes[i])));
 	const places = [view[0] + view[2] / 2 - seen[0] / 2, view[1] + view[3] / 2 - seen[1] / 2, ...seen];
 	['x', 'y', 'width', 'height'].forEach((name, i) => frame.setAttribute(name, places[i]));
 }
