@@ -93,8 +93,8 @@ pub use mission::{Ledger, Mission, Window, write_json};
 pub use pipeline::{Reading, Render, Rendered};
 
 pub mod values {
-    //! What the values of the front page are made of: times and names, the elements of a graph, the entries of a ledger,
-    //! and what can be asked for.
+    //! The values that those of the front page are made of: times and names, the elements of a graph, the entries of a
+    //! ledger, and options.
 
     pub use crate::base::name::{NodeName, TopicName};
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -133,8 +133,8 @@ pub mod internals;
 /// Reads bags, or a mission's own JSON, into a mission.
 ///
 /// # Errors
-/// Where an input cannot be read at all or none holds a message, and for times that make no sense. What is damaged is
-/// left out and told in [`Mission::notices`].
+/// Where an input cannot be read at all or none holds a message, and for times that make no sense. Damaged data is left
+/// out and told in [`Mission::notices`].
 pub fn read(reading: &Reading) -> Result<Mission> {
     pipeline::read(reading, &mut pipeline::Unwatched)
 }
