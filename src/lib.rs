@@ -23,7 +23,7 @@
 //! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
-//! What happened in the mission, whatever its windows, is its [`Ledger`]; `examples/story.rs` prints it.
+//! The events of the mission, the same for all windows, are its [`Ledger`]; `examples/story.rs` prints it.
 //!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
 //!
@@ -42,7 +42,7 @@
 //! | `pipeline` | what was asked for | the whole program in the order it happens |
 //! | `cli` | the command line | a job for the pipeline |
 //!
-//! Where to add things: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
+//! To add a thing: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
 //! `evidence/source/` and `evidence::SOURCES`, an output one in `export/` and `export::FORMATS`, a style one in
 //! `styles/` and `draw::style::BUILTIN`, a layout engine one in `layout/` and `layout::ENGINES`.
 //!
@@ -114,7 +114,7 @@ pub mod values {
 pub use pipeline::fleet;
 
 pub mod commands {
-    //! What the commands beside `render` do: the summary, the log, the table of messages, the survey of a folder.
+    //! The work of the commands beside `render`: the summary, the log, the table of messages, the survey of a folder.
 
     pub use crate::mission::events::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};

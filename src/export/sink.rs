@@ -41,7 +41,7 @@ impl OutputSink {
     /// fails as [`io::ErrorKind::FileTooLarge`].
     ///
     /// # Errors
-    /// Where the system refuses; the error names the final file.
+    /// The error of the system where it refuses, with the name of the final file.
     pub(crate) fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
         let way = match target {
             Target::Stdout if limit.is_some() => Ok(SinkTarget::Memory(Vec::new())),
