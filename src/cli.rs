@@ -1,4 +1,4 @@
-//! What was typed, turned into work; the only file (with its folder) that knows clap and the environment.
+//! The command line, turned into work; the only file (with its folder) that uses clap and the environment.
 
 mod applies;
 mod args;
@@ -45,18 +45,18 @@ const FAILED: u8 = 1;
 const USAGE: u8 = 2;
 const SKIPPED: u8 = 3;
 
-/// How many parts of a mission `info` shows the activity of.
+/// The number of parts of a mission for which `info` shows the activity.
 const PARTS: u32 = 32;
 
-/// Runs the command line `args`, the program's name first, and answers its exit code: 0 done, 1 failed, 2 usage,
-/// 3 done but data was skipped.
+/// Runs the command line `args`, the program's name first, and returns its exit code: 0 done, 1 failed, 2 usage, 3 done
+/// but data was skipped.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     hush();
     // A mistake of ours is a failure, and has been told by now.
     catch_unwind(AssertUnwindSafe(|| command(args))).unwrap_or(FAILED)
 }
 
-/// Says nothing of what `layout-rs` states by panics: they are caught, and the graph is laid out by another engine.
+/// Silences the panics of `layout-rs`, which are caught; the graph is then laid out by another engine.
 fn hush() {
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -124,7 +124,7 @@ fn command(args: impl IntoIterator<Item = OsString>) -> u8 {
     })
 }
 
-/// What was typed: the names of the options, and all of it with defaults.
+/// The command line, parsed: the names of the options that were typed, and all options with defaults.
 fn parsed<T: Into<OsString> + Clone>(
     args: impl IntoIterator<Item = T>,
 ) -> Result<(Given, Typed), clap::Error> {
@@ -132,8 +132,8 @@ fn parsed<T: Into<OsString> + Clone>(
     Ok((Given::of(&matches), Typed::from_arg_matches(&matches)?))
 }
 
-/// Prints the help, the version, or what is wrong with the command line: as it looks with everything in it visible, so
-/// that no argument steers the terminal.
+/// Prints the help, the version, or the error of the command line, with all control characters made visible, so that no
+/// argument steers the terminal.
 fn untyped(args: &[OsString], error: clap::Error) -> u8 {
     let shown = args
         .iter()
@@ -187,7 +187,7 @@ fn reading(
     })
 }
 
-/// Which source code to read, if any.
+/// The source code to read, if any.
 fn source_code(graph: &GraphArgs) -> Result<Option<SourceCode>, Error> {
     let infers = graph.infer.iter().any(|word| word == "source");
     let Some(folder) = graph.source.clone() else {
@@ -285,7 +285,7 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
     Ok(code(&mission))
 }
 
-/// Tells what was written, how many windows and changes, in what time.
+/// Prints the files written, the number of windows and changes, and the time taken.
 fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
     let timings = args.timings;
     let mission = &done.mission;
@@ -311,7 +311,8 @@ fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
     ));
 }
 
-/// How the mission is divided: `33 windows of 10 s`, `1 window of 5 min 26 s`, `9 windows` that differ in length.
+/// The division of the mission in words: `33 windows of 10 s`, `1 window of 5 min 26 s`, `9 windows` that differ in
+/// length.
 fn division(mission: &Mission) -> String {
     let windows = words::count(mission.windows.len(), "window");
     if let [only] = &mission.windows[..] {
@@ -377,7 +378,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
     })
 }
 
-/// The files that are read beside the bags. A style or captions may be a name that is no file, which does no harm.
+/// The files that are read beside the bags. A style or captions may be a name that is not a file, which does no harm.
 fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     let look = &args.look;
     let named = [
@@ -392,7 +393,7 @@ fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     all.filter(|path| path.exists()).collect()
 }
 
-/// The file that collects what a job of GitHub's wants to say; its name has no extension.
+/// The file that collects the summary of a job of GitHub's; its name has no extension.
 fn summary() -> Option<PathBuf> {
     std::env::var_os("GITHUB_STEP_SUMMARY").map(PathBuf::from)
 }
@@ -403,7 +404,8 @@ fn summary_format(output: &OsStr) -> Option<&'static str> {
         .then_some("md")
 }
 
-/// `out/<bag name>.gif`, of a figure `.pdf`, the name without what tells the format.
+/// The output where none is given: `out/<bag name>.gif`, of a figure `.pdf`; the name is without the ending of the
+/// format.
 fn default_output(inputs: &[Input], is_figure: bool) -> String {
     let name = inputs.first().map_or_else(String::new, Input::name);
     let mut stem = name.as_str();

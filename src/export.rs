@@ -178,7 +178,7 @@ const POSTER: &OutputFormat = &OutputFormat {
     ..PICTURE
 };
 
-/// Drawings where that is what is asked for, else one that moves.
+/// Begins SVG: drawings where these are asked for, else one animation.
 fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn Encoder + 'a>> {
     let is_sequence = sequence.view.frames.len() > 1 && !sequence.options.is_one_drawing();
     if is_sequence && !target.is_numbered() {
@@ -188,12 +188,12 @@ fn start_svg<'a>(sequence: &'a Sequence<'a>, target: &Target) -> Result<Box<dyn 
     }
 }
 
-/// One output: what and where.
+/// One output: its format and its target.
 #[derive(Clone, Debug)]
 pub struct Output {
-    /// What.
+    /// The format.
     pub format: &'static OutputFormat,
-    /// Where.
+    /// The file or files, or standard output.
     pub target: Target,
 }
 
@@ -238,8 +238,8 @@ impl Output {
     }
 }
 
-/// Checks all outputs before the inputs are read: their names, their folders, and what their formats need. What the
-/// user keeps, inputs and other files that are read, is never overwritten.
+/// Checks all outputs before the inputs are read: their names, their folders, and what their formats need. `kept` are
+/// the inputs and other files that are read, which are never overwritten.
 ///
 /// # Errors
 /// As [`check::check`], and [`Error::Output`] where a format lacks something.

@@ -1,7 +1,7 @@
-//! Missions judged: compared with each other, written down as an expectation, held against one.
+//! Judgements of missions: compared with each other, written down as an expectation, held against one.
 //!
-//! Everything here judges lives, rates and the ledger, never the difference of two windows. What the bag has no evidence
-//! of is not absent: it is undecidable, and told as such.
+//! Everything here judges lives, rates and the ledger, never the difference of two windows. An element without evidence
+//! in the bag is not absent: it is undecidable, and told as such.
 
 mod baseline;
 mod difference;

@@ -1,4 +1,5 @@
-//! What the project's own tests, benchmarks and fuzz targets reach past the front page. No promise is made of it.
+//! The modules that the project's own tests, benchmarks and fuzz targets reach past the front page. No promise is made
+//! of them.
 
 /// See `src/base.rs`.
 pub mod base {

@@ -23,7 +23,7 @@
 //! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
-//! What happened in the mission, whatever its windows, is its [`Ledger`]; `examples/story.rs` prints it.
+//! The events of the mission, the same for all windows, are its [`Ledger`]; `examples/story.rs` prints it.
 //!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
 //!
@@ -42,7 +42,7 @@
 //! | `pipeline` | what was asked for | the whole program in the order it happens |
 //! | `cli` | the command line | a job for the pipeline |
 //!
-//! Where to add things: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
+//! To add a thing: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
 //! `evidence/source/` and `evidence::SOURCES`, an output one in `export/` and `export::FORMATS`, a style one in
 //! `styles/` and `draw::style::BUILTIN`, a layout engine one in `layout/` and `layout::ENGINES`.
 //!
@@ -93,8 +93,8 @@ pub use mission::{Ledger, Mission, Window, write_json};
 pub use pipeline::{Reading, Render, Rendered};
 
 pub mod values {
-    //! What the values of the front page are made of: times and names, the elements of a graph, the entries of a ledger,
-    //! and what can be asked for.
+    //! The values that those of the front page are made of: times and names, the elements of a graph, the entries of a
+    //! ledger, and options.
 
     pub use crate::base::name::{NodeName, TopicName};
     pub use crate::base::notice::{Notice, NoticeKind, Notices};
@@ -114,7 +114,7 @@ pub mod values {
 pub use pipeline::fleet;
 
 pub mod commands {
-    //! What the commands beside `render` do: the summary, the log, the table of messages, the survey of a folder.
+    //! The work of the commands beside `render`: the summary, the log, the table of messages, the survey of a folder.
 
     pub use crate::mission::events::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};
@@ -133,8 +133,8 @@ pub mod internals;
 /// Reads bags, or a mission's own JSON, into a mission.
 ///
 /// # Errors
-/// Where an input cannot be read at all or none holds a message, and for times that make no sense. What is damaged is
-/// left out and told in [`Mission::notices`].
+/// Where an input cannot be read at all or none holds a message, and for times that make no sense. Damaged data is left
+/// out and told in [`Mission::notices`].
 pub fn read(reading: &Reading) -> Result<Mission> {
     pipeline::read(reading, &mut pipeline::Unwatched)
 }

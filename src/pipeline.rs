@@ -29,7 +29,7 @@ pub(crate) use {
     read::mission_file,
 };
 
-/// A part of the work, as progress and timings tell it.
+/// A part of the work, for progress and timings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Stage {
@@ -41,7 +41,7 @@ pub enum Stage {
     Count,
     /// Graphs are built; progress counts windows.
     Graphs,
-    /// Everything gets its place.
+    /// Everything is laid out.
     Layout,
     /// Frames are drawn and written; progress counts frames.
     Draw,
@@ -61,18 +61,18 @@ impl Stage {
     }
 }
 
-/// Who watches the work: hears how far it is, and may stop it.
+/// A watcher of the work, which is told its progress and may stop it.
 pub trait Watch {
     /// A new stage begins; the one before is over.
     fn stage(&mut self, _stage: Stage) {}
 
-    /// How far the stage is: `done` of `total`.
+    /// The stage has done `done` of `total`.
     fn progress(&mut self, _done: u64, _total: u64) {}
 
-    /// What to know before the next stage begins, in a sentence.
+    /// A note for the user before the next stage begins, in a sentence.
     fn note(&mut self, _text: &str) {}
 
-    /// Where the time of the stage went: the words of its steps and their shares, the largest first.
+    /// The shares of the stage's time: the words of its steps and the share of each, 0..=1, the largest first.
     fn shares(&mut self, _shares: &[(&'static str, f64)]) {}
 
     /// Whether to stop at the next good moment, leaving nothing half-written.
@@ -81,7 +81,7 @@ pub trait Watch {
     }
 }
 
-/// Nobody watches.
+/// A watcher that does nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unwatched;
 

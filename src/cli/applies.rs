@@ -1,4 +1,4 @@
-//! Options that say nothing to what was asked for: refused with a hint, never ignored.
+//! Options without effect on the outputs and inputs asked for: refused with a hint, never ignored.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ use crate::pipeline::{Reading, mission_file};
 pub(super) struct Given(BTreeSet<String>);
 
 impl Given {
-    /// Those of the command that was typed.
+    /// The options of the command that was typed.
     pub(super) fn of(matches: &ArgMatches) -> Self {
         let typed = matches.subcommand().map(|(_, typed)| typed);
         let is_given =
@@ -33,16 +33,16 @@ impl Given {
     }
 }
 
-/// Options that only say something to some outputs.
+/// A rule for options that only apply to some outputs.
 struct AppliesTo {
     options: &'static [&'static str],
-    /// Whether they say something to this output.
+    /// Whether they apply to this output.
     takes: fn(&Asked<'_>, &Output) -> bool,
-    /// What does, for the hint.
+    /// The outputs to which they apply, for the hint.
     what: &'static str,
 }
 
-/// What else decides whether an output takes an option.
+/// The rest of the command line, which decides whether an output takes an option.
 struct Asked<'a> {
     args: &'a RenderArgs,
 }
@@ -197,7 +197,7 @@ const RULES: &[AppliesTo] = &[
     },
 ];
 
-/// Refuses options that say nothing to any of the outputs.
+/// Refuses options that apply to none of the outputs.
 pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]) -> Result<()> {
     let asked = Asked { args };
     for rule in RULES {
@@ -216,7 +216,7 @@ pub(super) fn check_outputs(given: &Given, args: &RenderArgs, outputs: &[Output]
     Ok(())
 }
 
-/// Options that say how bags are read and windows cut: an evolution holds windows already.
+/// Options that say how bags are read and windows cut: a mission's JSON holds windows already.
 const OF_BAGS: &[&str] = &[
     "verify",
     "period",
@@ -234,7 +234,7 @@ const OF_BAGS: &[&str] = &[
     "bytes",
 ];
 
-/// Refuses options about bags where the input is an evolution.
+/// Refuses options about bags where the input is a mission's JSON.
 pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
     let Some(option) = given.any(OF_BAGS) else {
         return Ok(());
@@ -254,8 +254,8 @@ pub(super) fn check_inputs(given: &Given, reading: &Reading) -> Result<()> {
 /// Options that say how time is cut into windows.
 const OF_WINDOWS: &[&str] = &["period", "step", "align", "skip-unchanged", "cut", "grace"];
 
-/// What is to be said where somebody cuts windows for what is told in continuous time. That is no mistake: scripts ask
-/// for the log and for pictures with the same options.
+/// The note where an option about windows is given for `what`, which tells continuous time; `None` without one. That is
+/// not a mistake: scripts ask for the log and for pictures with the same options.
 pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
     let option = given.any(OF_WINDOWS)?;
     Some(format!(
@@ -263,7 +263,7 @@ pub(super) fn about_windows(given: &Given, what: &str) -> Option<String> {
     ))
 }
 
-/// Refuses the options of `diff` that say nothing where one of the two is an expectation.
+/// Refuses the options of `diff` that do not apply where one of the two is an expectation.
 pub(super) fn check_against(given: &Given) -> Result<()> {
     match given.any(&["style", "size", "rate-change"]) {
         None => Ok(()),
@@ -315,7 +315,7 @@ pub(super) fn check_baseline(given: &Given) -> Result<()> {
     }
 }
 
-/// Refuses the options of `check` that say nothing to these formats.
+/// Refuses the options of `check` that apply to none of these formats.
 pub(super) fn check_check(given: &Given, infer: &[String], formats: &[&str]) -> Result<()> {
     check_guesses(infer)?;
     if given.any(&["link"]).is_some() && !formats.contains(&"markdown") {

@@ -1,4 +1,4 @@
-//! What can be typed: every command and flag with its help text.
+//! The command line: every command and flag with its help text.
 
 pub(super) mod gate;
 #[cfg(feature = "parquet")]

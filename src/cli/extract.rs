@@ -1,4 +1,4 @@
-//! `bagreel extract`: what was typed, turned into tables of messages.
+//! `bagreel extract`: its arguments, turned into tables of messages.
 
 use crate::bag::Input;
 use crate::base::error::Error;
@@ -11,7 +11,7 @@ use crate::export::target::Target;
 use crate::pipeline::{self, Extract};
 use crate::view::NameFilter;
 
-/// Writes the tables; answers what is worth saying, and how many messages could not be decoded.
+/// Writes the tables; returns the notices, and the number of messages that could not be decoded.
 pub(super) fn extract(
     args: &ExtractArgs,
     inputs: Vec<Input>,

@@ -1,4 +1,4 @@
-//! The commands that judge: what was typed, turned into work for the pipeline, and its outcome into an exit code.
+//! The commands that judge: their arguments, turned into work for the pipeline, and its outcome into an exit code.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Severity, expla
 use crate::pipeline::gate::{self, Baseline, Check, DiffJob, ReportJob};
 use crate::pipeline::{Body, Drawing, Reading};
 
-/// Tells what differs between two missions, or between one and an expectation.
+/// Prints the differences between two missions, or between one and an expectation.
 pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     let paths = [&args.first, &args.second];
     if let Some(at) = paths.iter().position(|path| is_expectation(path)) {
@@ -79,7 +79,7 @@ fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
     })
 }
 
-/// The names of two missions without their folders, unless these are all that tells one from the other.
+/// The names of two missions without their folders, unless the missions differ only in these.
 fn subject(first: &Path, second: &Path) -> DiffSubject {
     let whole = |path: &Path| path.display().to_string();
     let last = |path: &Path| {
@@ -114,7 +114,7 @@ fn is_expectation(path: &Path) -> bool {
         && path.is_file()
 }
 
-/// The difference between a mission and an expectation is what a check finds.
+/// Prints the difference between a mission and an expectation: the findings of a check.
 fn against(
     args: &DiffArgs,
     given: &Given,
@@ -136,7 +136,7 @@ fn against(
     self::check(&check, given, terminal)
 }
 
-/// Writes down what healthy runs have in common.
+/// Writes an expectation that holds in all of these healthy runs.
 pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
     applies::check_baseline(given)?;
     let runs = args.bags.iter().map(|bag| {
@@ -233,7 +233,7 @@ fn unknown_kind(word: &str) -> Error {
     )
 }
 
-/// What to read for a judgement. Missions in JSON bring their own windows.
+/// The reading for a judgement. Missions in JSON bring their own windows.
 fn judged(inputs: &Inputs, time: &GateTime, graph: &GraphArgs) -> Result<Reading> {
     let time = TimeArgs {
         period: time.period,

@@ -1,4 +1,4 @@
-//! How things are to look, from what was typed.
+//! The options of the look, from the command line.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::mission::{Places, read_json};
 use crate::pipeline::{Body, Phases};
 use crate::view::{Grouping, Hide, Mode, NameFilter, ViewOptions};
 
-/// What is shown: `rqt_graph`'s defaults or ours, then what was asked for.
+/// The options of the view: `rqt_graph`'s defaults or ours, changed by the options that were typed.
 pub(super) fn view(args: &ViewArgs) -> Result<ViewOptions> {
     let mut view = if args.rqt_defaults {
         ViewOptions::rqt_defaults()
@@ -62,7 +62,7 @@ pub(super) fn styles() -> String {
     names.join("\n") + "\n"
 }
 
-/// The bundled font, with a file of the user's for what it lacks.
+/// The bundled font, with a file of the user's for characters that it lacks.
 pub(super) fn fonts(file: Option<&Path>) -> Result<Fonts> {
     let Some(path) = file else {
         return Ok(Fonts::bundled());
@@ -111,7 +111,7 @@ pub(super) fn sequence(args: &SequenceArgs) -> Result<options::SequenceOptions> 
     })
 }
 
-/// Graph or board: what is asked for, or a graph where an option says something that only a graph has.
+/// Graph or board: as asked for, or a graph where an option applies to a graph only.
 pub(super) fn body(args: &RenderArgs) -> Result<Body> {
     let (view, look) = (&args.view, &args.look);
     let typed = [
@@ -171,7 +171,7 @@ pub(super) fn figure(args: &FigureArgs, look: &LookArgs) -> Result<Option<Figure
     }))
 }
 
-/// Where phases come from.
+/// The source of phases.
 pub(super) fn phases(word: &str, captions: Option<&str>) -> Result<Phases> {
     match (word, captions) {
         ("auto", None) => Ok(Phases::Found),
@@ -191,7 +191,7 @@ fn link(text: &str) -> Result<(String, String)> {
         .filter(|(name, url)| !name.is_empty() && !url.is_empty());
     let (name, url) = parts.ok_or_else(|| {
         Error::usage(
-            format!("`--link {text}` is no name with an address"),
+            format!("`--link {text}` is not a name with an address"),
             "write `--link player=https://…`",
         )
     })?;

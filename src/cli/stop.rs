@@ -1,4 +1,4 @@
-//! Stop means stop: a signal asks the work to end, and ends the process where the work does not hear it.
+//! Signals: the first asks the work to end, and the process ends soon after where the work does not.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -7,18 +7,19 @@ use std::time::Duration;
 
 use crate::base::leftovers;
 
-/// How long the work may take to end by itself. People notice half a second; what the work leaves we remove too.
+/// The time that the work may take to end by itself. People notice half a second; files that the work leaves we remove
+/// too.
 const GRACE: Duration = Duration::from_millis(250);
-/// How long the last words may take: standard error may be a pipe that nobody reads.
+/// The time that the last message may take: standard error may be a pipe that nobody reads.
 const LAST_WORDS: Duration = Duration::from_millis(50);
-/// What a shell adds to the number of the signal that ended a command.
+/// The number that a shell adds to that of the signal that ended a command.
 const BY_SIGNAL: u8 = 128;
 
-/// Whether a signal asked us to end, and which.
+/// The signal that asked us to end, if any.
 #[derive(Clone, Debug)]
 pub(super) struct Stop {
     signal: Arc<AtomicU8>,
-    /// What tells why the process ends.
+    /// The function that tells why the process ends.
     say: fn(),
 }
 
@@ -40,7 +41,7 @@ impl Stop {
         }
     }
 
-    /// A signal came: the first asks, a second ends us at once.
+    /// Takes in a signal: the first asks the work to end, a second ends the process at once.
     fn hear(&self, signal: u8) {
         let say = self.say;
         if self.signal.swap(signal, Ordering::Relaxed) != 0 {
@@ -85,7 +86,7 @@ fn listen(stop: &Stop) {
     });
 }
 
-/// Whether `nohup` or its like began us: a handler would undo that. Only Linux tells.
+/// Whether hang-ups are ignored, as `nohup` makes them: a handler would undo that. Only Linux tells.
 #[cfg(unix)]
 fn is_hangup_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! `bagreel tables`: what was typed, turned into the tables of a fleet.
+//! `bagreel tables`: its arguments, turned into the tables of a fleet.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::cli::args::tables::TablesArgs;
 use crate::cli::terminal::Terminal;
 use crate::pipeline::fleet::{self, FleetJob, Planning, Tabled};
 
-/// Writes the tables; answers the exit code.
+/// Writes the tables; returns the exit code.
 pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     let mut sources = args.bags.clone();
     if let Some(manifest) = &args.manifest {

@@ -1,4 +1,4 @@
-//! What a person sees: progress, notices, errors and hints; the only file that prints or measures time.
+//! The output for people: progress, notices, errors and hints; the only file that prints or measures time.
 
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -21,15 +21,15 @@ pub(crate) struct Terminal {
     bar: Option<ProgressBar>,
     stage: Option<(Stage, Instant)>,
     spent: BTreeMap<Stage, Duration>,
-    /// Where the time of a stage went, in words.
+    /// The shares of the time of each stage, in words.
     shares: BTreeMap<Stage, String>,
     begun: Instant,
     stop: Stop,
 }
 
 impl Terminal {
-    /// A terminal that says nothing but errors if `quiet`. Colours only where standard error is a terminal and
-    /// `no_colour` is false; progress only on a terminal.
+    /// A terminal that prints only errors if `quiet`. Colours only where standard error is a terminal and `no_colour`
+    /// is false; progress only on a terminal.
     pub(crate) fn new(quiet: bool, no_colour: bool) -> Self {
         Self {
             quiet,
@@ -43,7 +43,7 @@ impl Terminal {
         }
     }
 
-    /// Prints an error and its way out.
+    /// Prints an error and its hint.
     pub(crate) fn error(&mut self, error: &Error) {
         self.end_stage();
         self.line("31", "error", &error.to_string());
@@ -87,7 +87,7 @@ impl Terminal {
         }
     }
 
-    /// Prints results on standard output. A closed pipe is no error: the reader has what it wanted.
+    /// Prints results on standard output. A closed pipe is not an error: the reader has what it wanted.
     ///
     /// # Errors
     /// [`Error::Io`] where not all of it could be written.
@@ -99,7 +99,7 @@ impl Terminal {
         print(printable(text).as_bytes())
     }
 
-    /// As [`Terminal::results`], of a table: bytes that are no text are printed as they are.
+    /// As [`Terminal::results`], of a table: bytes that are not text are printed as they are.
     ///
     /// # Errors
     /// As [`Terminal::results`].
@@ -136,7 +136,7 @@ impl Terminal {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// Prints how long each stage took, and its largest steps.
+    /// Prints the time of each stage, and its largest steps.
     pub(crate) fn timings(&mut self) {
         self.end_stage();
         let lines: Vec<String> = self
@@ -225,12 +225,12 @@ fn bar(stage: Stage) -> ProgressBar {
     bar
 }
 
-/// Says why the process ends, whatever else is on the line.
+/// Prints why the process ends, on a line of its own.
 fn last_words() {
     let _ = writeln!(io::stderr(), "\nerror: {}", Error::Interrupted);
 }
 
-/// Writes to standard output. A closed pipe is no error.
+/// Writes to standard output. A closed pipe is not an error.
 fn print(bytes: &[u8]) -> Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {

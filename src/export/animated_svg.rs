@@ -9,8 +9,8 @@ use crate::export::sequence::{Overview, Sequence};
 use crate::export::target::Target;
 use crate::view::View;
 
-/// Above this many elements, browsers take a third of a processor core and more to show it, whether or not their user
-/// asked for less motion.
+/// The number of elements above which browsers take a third of a processor core and more to show it, whether or not
+/// their user asked for less motion.
 const MANY: usize = 100;
 
 /// Begins the animation.
@@ -40,7 +40,7 @@ pub(crate) fn start<'a>(
     })
 }
 
-/// An overview over time with a head that goes from window to window.
+/// The SVG text of an overview over time with a head that goes from window to window.
 fn played(overview: &Overview, frame_ms: u32) -> String {
     let list = |of: fn(&Rect) -> f64| overview.heads_list(of, ";");
     let seconds = overview.heads.len() as f64 * f64::from(frame_ms) / 1e3;

@@ -100,7 +100,7 @@ impl Encoder for Apng {
     }
 }
 
-/// What differs from the frame before; one pixel where nothing does, as every frame needs some.
+/// The packet of the area that differs from the frame before; one pixel where nothing does, as every frame needs some.
 #[expect(clippy::unnecessary_wraps, reason = "other formats can fail")]
 fn pack(frame: &DrawnFrame<'_>) -> Result<Packet> {
     if frame.before.is_empty() {
@@ -162,7 +162,7 @@ impl<W: Write> Animation<W> {
         self.writer.write_image_data(&pixels).map_err(to_io)
     }
 
-    /// Says where the next pixels go.
+    /// Sets the place of the next pixels.
     fn place(&mut self, area: Area) -> Result<(), png::EncodingError> {
         // Places inside an image whose sides are u32.
         let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
@@ -223,7 +223,7 @@ mod tests {
         bytes
     }
 
-    /// What a decoder makes of it: delays in milliseconds and the place of the dot.
+    /// The frames as a decoder reads them: delays in milliseconds and the place of the dot.
     fn played(bytes: &[u8]) -> Vec<(u16, usize)> {
         let mut reader = png::Decoder::new(io::Cursor::new(bytes))
             .read_info()

@@ -1,4 +1,4 @@
-//! Whether outputs may be written where they are asked for, told before anything is read.
+//! The check, before anything is read, that outputs may be written to their targets.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,11 +11,11 @@ use crate::base::error::{Error, Result};
 /// Checks every file to be written before the inputs are read: no two the same, none that the user keeps, every folder
 /// there or to be made, and writable. Leaves nothing behind.
 ///
-/// Kept are files with what `SQLite` puts beside them, and in a folder all that is there and does not end like an
-/// output of ours.
+/// Kept are files with the files that `SQLite` puts beside them, and in a folder all files in it that do not end like
+/// an output of ours.
 ///
 /// # Errors
-/// [`Error::Usage`] where targets meet each other or what is kept, [`Error::Output`] or [`Error::Io`] where a folder
+/// [`Error::Usage`] where targets meet each other or a kept file, [`Error::Output`] or [`Error::Io`] where a folder
 /// cannot be written.
 pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     for (at, target) in targets.iter().enumerate() {
@@ -42,7 +42,7 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// What `SQLite` puts beside a database, which is part of it.
+/// The endings of a database and of the files that `SQLite` puts beside it, which are part of it.
 const BESIDE: [&str; 4] = ["", "-wal", "-shm", "-journal"];
 
 /// Whether writing `target` would change what the user keeps at `path`.
@@ -96,7 +96,7 @@ fn check_place(target: &Target) -> Result<()> {
     let is_text = path.file_name().is_some_and(|name| name.to_str().is_some());
     if Target::Path(path.clone()).is_numbered() && !is_text {
         return refuse(
-            "`{n}` stands in a name that is no UTF-8".to_owned(),
+            "`{n}` stands in a name that is not UTF-8".to_owned(),
             "give it a name in UTF-8, or leave `{n}` out",
         );
     }
@@ -115,7 +115,7 @@ fn check_place(target: &Target) -> Result<()> {
         .unwrap_or(Path::new("."));
     if !there.is_dir() {
         return refuse(
-            format!("`{}` is no folder", there.display()),
+            format!("`{}` is not a folder", there.display()),
             "name a folder, or one that can be made",
         );
     }
@@ -128,7 +128,7 @@ fn check_place(target: &Target) -> Result<()> {
 /// Makes the folder of `target` if it is not there.
 ///
 /// # Errors
-/// Where the system refuses.
+/// The error of the system where it refuses.
 pub(crate) fn make_folder(target: &Target) -> Result<()> {
     match target {
         Target::Stdout => Ok(()),

@@ -20,7 +20,7 @@ struct DotEncoder<'a> {
     drawing: DotView<'a>,
 }
 
-/// Begins a file per window; without `{n}` one file with the single window or the union of all.
+/// Begins the files, one per window; without `{n}` one file with the single window or the union of all.
 pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,

@@ -1,4 +1,4 @@
-//! What an output format is: an encoder that takes frames and writes bytes, and the row that names it.
+//! The parts of an output format: an encoder that takes frames and writes bytes, and the row that names it.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -11,10 +11,10 @@ use crate::base::error::{Error, Result};
 use crate::draw::paint::raster::Pixels;
 use crate::draw::scene::Scene;
 
-/// What an encoder wants of every frame; each includes those before it.
+/// The data that an encoder needs of every frame; each includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Needs {
-    /// No frames at all: it writes from the sequence when that is over.
+    /// None: it writes from the sequence when that is over.
     Nothing,
     /// The drawing.
     Scene,
@@ -24,54 +24,54 @@ pub enum Needs {
     Indices,
 }
 
-/// One frame as all encoders of its size share it, on the core that drew it.
+/// One frame that all encoders of its size share, on the core that drew it.
 #[derive(Clone, Copy)]
 pub struct DrawnFrame<'a> {
-    /// What it shows and for how long.
+    /// The window it shows, and the time for which it is shown.
     pub time: FrameTime,
     /// The drawing.
     pub scene: &'a Scene,
-    /// The drawing as pixels; empty unless somebody needs them.
+    /// The drawing as pixels; empty unless an encoder needs them.
     pub pixels: &'a Pixels,
-    /// The palette of the whole sequence, 255 colours at most; one black unless somebody needs indices.
+    /// The palette of the whole sequence, 255 colours at most; only black unless an encoder needs indices.
     pub palette: &'a Palette,
-    /// The place in the palette of every pixel; empty unless somebody needs them.
+    /// The place in the palette of every pixel; empty unless an encoder needs them.
     pub indices: &'a [u8],
-    /// The same of the frame before; empty for the first.
+    /// The places in the palette of the pixels of the frame before; empty for the first.
     pub before: &'a [u8],
 }
 
-/// What an encoder makes of a frame: far smaller than its pixels, so that many may wait to be written.
+/// The packet that an encoder makes of a frame: far smaller than its pixels, so that many may wait to be written.
 #[derive(Debug)]
 pub enum Packet {
     /// Nothing, or nothing new.
     Nothing,
     /// Bytes as they are written, or a file of its own.
     Bytes(Vec<u8>),
-    /// What replaces an area of the frame before.
+    /// The bytes of pixels that replace an area of the frame before.
     Patch(Area, Vec<u8>),
     /// The drawing itself.
     Drawing(Box<Scene>),
 }
 
-/// Makes a packet of a frame. It runs on any core, for several frames at a time and in any order.
+/// A function that makes a packet of a frame. It runs on any core, for several frames at a time and in any order.
 pub(crate) type Pack = fn(&DrawnFrame<'_>) -> Result<Packet>;
 
-/// What was written.
+/// The files that an output wrote.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
     /// The file as it was asked for; `-` for standard output, `{n}` for a file per window.
     pub path: PathBuf,
-    /// How many files.
+    /// The number of files.
     pub files: usize,
-    /// Their bytes in all.
+    /// The number of their bytes in all.
     pub bytes: u64,
-    /// What the user should know, such as what was given up to stay small; lower case, no period.
+    /// Remarks for the user, such as the windows given up to stay small; lower case, no period.
     pub remarks: Vec<String>,
 }
 
 impl Written {
-    /// Nothing yet.
+    /// An output of which nothing is written yet.
     pub(crate) fn to(target: &Target) -> Self {
         Self {
             path: target.path().to_owned(),
@@ -79,14 +79,14 @@ impl Written {
         }
     }
 
-    /// One more file.
+    /// Counts one more file of so many bytes.
     pub(crate) fn add(&mut self, bytes: u64) {
         self.files += 1;
         self.bytes += bytes;
     }
 }
 
-/// What a format of single drawings does with a target.
+/// The drawings that a format of single drawings writes to a target.
 #[derive(Clone, Copy)]
 pub(crate) enum Single<'a> {
     /// A file per window, or the only window.
@@ -95,8 +95,8 @@ pub(crate) enum Single<'a> {
     Strip(&'a Scene),
 }
 
-/// How a drawing format uses a target: with `{n}`, or for one window, a file per window; else the strip, if there
-/// is one and it may stand here.
+/// The drawings for a target: with `{n}`, or for one window, a file per window; else the strip, if there is one and
+/// `strip` allows it.
 pub(crate) fn single<'a>(
     sequence: &Sequence<'a>,
     target: &Target,
@@ -119,24 +119,24 @@ pub(crate) fn single<'a>(
     }
 }
 
-/// A format at work on one output. What it has not finished leaves no trace when it is dropped.
+/// The writer of one output in a format. An unfinished output leaves no trace when it is dropped.
 pub trait Encoder: Send {
-    /// What it wants of every frame; nothing where it writes from the sequence when that is over.
+    /// The data that it needs of every frame; nothing where it writes from the sequence when that is over.
     fn needs(&self) -> Needs {
         Needs::Nothing
     }
 
-    /// Whether it plays: then it is given the staged frames too, not only the windows.
+    /// Whether it is an animation, which is given the staged frames too, not only the windows.
     fn plays(&self) -> bool {
         false
     }
 
-    /// What makes its packets, which [`Encoder::take`] is given in order.
+    /// The function that makes its packets, which [`Encoder::take`] is given in order.
     fn pack(&self) -> Pack {
         |_| Ok(Packet::Nothing)
     }
 
-    /// How many bytes a packet may have, per pixel of a frame.
+    /// The largest number of bytes of a packet, per pixel of a frame.
     fn packet_density(&self) -> f64 {
         1.0
     }
@@ -144,7 +144,8 @@ pub trait Encoder: Send {
     /// Begins, before the first packet, with the size of all frames and their palette.
     ///
     /// # Errors
-    /// [`Error::Io`] with the output's path where it cannot be written; [`Error::Output`] where the format cannot say it.
+    /// [`Error::Io`] with the output's path where it cannot be written; [`Error::Output`] where the format cannot hold
+    /// it.
     fn begin(&mut self, _size: (u32, u32), _palette: &Palette) -> Result<()> {
         Ok(())
     }
@@ -167,7 +168,7 @@ pub trait Encoder: Send {
 /// An output of one file that is written when the sequence is over.
 pub(crate) struct AtOnce<W> {
     target: Target,
-    /// The text, and what the user should know of it.
+    /// The function that makes the text, with remarks for the user.
     write: W,
 }
 
@@ -206,11 +207,11 @@ pub(crate) type Start = for<'a> fn(&'a Sequence<'a>, &Target) -> Result<Box<dyn 
 /// Whether a format holds one drawing of the whole mission: a film strip or a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OneDrawing {
-    /// It shows the sequence, or the graph itself.
+    /// No: it holds the sequence, or the graph itself.
     Never,
-    /// Where one was asked for.
+    /// Yes, where one was asked for.
     Asked,
-    /// Without `{n}` several windows become a film strip even unasked.
+    /// Yes: without `{n}` several windows become a film strip even unasked.
     Always,
 }
 
@@ -223,25 +224,25 @@ pub enum OneDrawing {
 pub struct OutputFormat {
     /// Its extension and its word for `--format`.
     pub word: &'static str,
-    /// What it is, for `--help` and the README.
+    /// Its description, for `--help` and the README.
     pub what: &'static str,
     /// Whether it shows the picture; the others write the graph itself, whose size no page limits.
     pub is_drawn: bool,
     /// Whether it shows the view; the others write the whole mission.
     pub is_viewed: bool,
-    /// Whether it holds all of the view one by one, whatever the picture draws as one.
+    /// Whether it holds all elements of the view one by one, even those that the picture draws as one.
     pub is_unfolded: bool,
-    /// Whether `--max-bytes` binds it.
+    /// Whether `--max-bytes` applies to it.
     pub is_limited: bool,
-    /// Whether one drawing of the whole may stand in it.
+    /// Whether it may hold one drawing of the whole.
     pub whole: OneDrawing,
-    /// What else it needs, checked before anything is read.
+    /// The check of anything else that it needs, done before anything is read.
     pub check: Option<fn(&Target) -> Result<()>>,
-    /// How an output begins.
+    /// The function that begins an output.
     pub start: Start,
 }
 
-/// What formats of drawings have in common.
+/// The properties that formats of drawings have in common.
 pub(crate) const PICTURE: OutputFormat = OutputFormat {
     word: "",
     what: "",
@@ -254,19 +255,19 @@ pub(crate) const PICTURE: OutputFormat = OutputFormat {
     start: nothing,
 };
 
-/// What formats that play have in common.
+/// The properties that animations have in common.
 pub(crate) const ANIMATION: OutputFormat = OutputFormat {
     is_limited: true,
     ..PICTURE
 };
 
-/// What formats of single images have in common.
+/// The properties that formats of single images have in common.
 pub(crate) const IMAGE: OutputFormat = OutputFormat {
     whole: OneDrawing::Always,
     ..PICTURE
 };
 
-/// What formats that hold the graph itself have in common.
+/// The properties that formats of the graph itself have in common.
 pub(crate) const DATA: OutputFormat = OutputFormat {
     is_drawn: false,
     is_viewed: false,

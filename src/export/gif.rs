@@ -16,7 +16,7 @@ const LONGEST: u64 = 65_535;
 
 struct Gif {
     target: Target,
-    /// The file until the first frame comes.
+    /// The file, until the first frame comes.
     sink: Option<OutputSink>,
     animation: Option<Animation<OutputSink>>,
 }
@@ -129,7 +129,7 @@ fn compressed(pixels: Vec<u8>) -> Vec<u8> {
     frame.buffer.into_owned()
 }
 
-/// A GIF being written. A frame is held back until the next one differs, since only then its time is known.
+/// A GIF being written. A frame is held back until the next one differs, since its time is known only then.
 struct Animation<W: Write> {
     encoder: gif::Encoder<W>,
     clear: u8,
@@ -243,7 +243,7 @@ mod tests {
         frame
     }
 
-    /// What a decoder makes of these frames: delays in hundredths and the colour of each pixel.
+    /// These frames as a decoder reads them: delays in hundredths and the colour of each pixel.
     fn played(frames: &[(Vec<u8>, u32)]) -> Vec<(u16, Vec<u8>)> {
         let palette = colours();
         let mut animation = Animation::new(Vec::new(), SIZE, &palette).unwrap();

@@ -19,7 +19,7 @@ pub(crate) fn start<'a>(
     AtOnce::start(target, || (text(sequence.data), Vec::new()))
 }
 
-/// What is said of nodes and edges: name and type. Times are seconds from the mission's start.
+/// The attributes of nodes and edges: name and type. Times are seconds from the mission's start.
 const KEYS: [(&str, &str); 7] = [
     ("label", "string"),
     ("kind", "string"),
@@ -61,7 +61,7 @@ fn text(mission: &Mission) -> String {
     xml.finish()
 }
 
-/// What is known of a node or edge, and its end.
+/// Writes the attributes of a node or edge, and its closing tag.
 fn inside(xml: &mut Xml, mission: &Mission, part: &SpellOf) {
     let second = |at| (mission.offset(at) as f64 / 1e9).to_string();
     let values = [

@@ -1,7 +1,7 @@
 //! The mission as one self-contained page: the graph drawn once, its history as runs, and the player that shows them.
 //!
-//! `player/` holds what the page is made of as it is written by people: its template, its look, and its script in
-//! parts, which are joined in order. [`data`] says what the script is given.
+//! `player/` holds the handwritten parts of the page: its template, its style sheet, and its script in parts, which are
+//! joined in order. [`data`] defines the data that the script is given.
 
 mod data;
 pub(crate) mod encoder;
@@ -42,21 +42,21 @@ const SCRIPT: [&str; 9] = [
     include_str!("html/player/keys.js"),
 ];
 
-/// What a page is made of.
+/// The parts of a page.
 pub(crate) struct HtmlPage<'a> {
     /// The whole sequence.
     pub sequence: &'a Sequence<'a>,
-    /// Everything one by one.
+    /// The graph with every element one by one.
     pub whole: PageGraph<'a>,
-    /// The picture, where that draws several as one.
+    /// The graph of the picture, where that draws several elements as one.
     pub folded: Option<PageGraph<'a>>,
-    /// How it looks.
+    /// The style.
     pub style: &'a Style,
-    /// How it looks where the reader prefers dark pages; `None` for always the same.
+    /// The style where the reader prefers dark pages; `None` for always the same.
     pub dark: Option<&'a Style>,
     /// The title, such as the bag's name.
     pub title: &'a str,
-    /// What is drawn in place of a graph, if there is none.
+    /// The drawing in place of a graph, if there is none.
     pub overview: Option<&'a Overview>,
 }
 
@@ -169,7 +169,7 @@ impl HtmlPage<'_> {
         signs::legend(&views, change)
     }
 
-    /// What the picture leaves out and what went wrong, a line each.
+    /// The notices of what the picture leaves out and what went wrong, a line each.
     fn notes(&self) -> String {
         let mut xml = Xml::default();
         for notice in self.sequence.notices.iter() {
@@ -199,7 +199,7 @@ impl HtmlPage<'_> {
         xml.finish()
     }
 
-    /// A graph as it is in the window at place `still`, which is what a reader without scripts sees.
+    /// Writes a graph as it is in the window at place `still`, which a reader without scripts sees.
     fn graph(
         &self,
         xml: &mut Xml,
@@ -253,7 +253,7 @@ impl HtmlPage<'_> {
         format!("window {} of {} · {at}", still + 1, frames.len())
     }
 
-    /// The date at which it begins, how long it is, and in what it is divided.
+    /// The date at which the mission begins, its length, and its division into windows.
     fn when(&self) -> String {
         let frames = &self.whole.view.frames;
         let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
@@ -328,14 +328,14 @@ fn fonts() -> String {
     css
 }
 
-/// Without indentation, empty lines and lines of comments, which readers of the files need and browsers do not.
+/// A text without indentation, empty lines and lines of comments, which readers of the files need and browsers do not.
 fn squeezed(text: &str) -> String {
     let lines = text.lines().map(str::trim);
     let lines = lines.filter(|line| !line.is_empty() && !line.starts_with("//"));
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The template with every `{{key}}` replaced; what is put in is never looked at again.
+/// The template with every `{{key}}` replaced; keys in a replacement are not replaced.
 fn fill(template: &str, value: impl Fn(&str) -> String) -> String {
     let mut out = String::with_capacity(1 << 18);
     let mut parts = template.split("{{");

@@ -1,4 +1,4 @@
-//! The evolution as JSON, as it is read back by every command.
+//! The mission as JSON, which every command reads back.
 
 use super::{Encoder, Written};
 use crate::base::error::Result;

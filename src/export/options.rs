@@ -1,4 +1,4 @@
-//! How a sequence runs and how its formats are written, as the user asked for it.
+//! The options of a sequence and of its formats.
 
 use std::path::PathBuf;
 
@@ -7,16 +7,17 @@ pub use crate::draw::figure::FigureOptions;
 pub use crate::draw::strip::Choice;
 pub use crate::mission::JsonForm;
 
-/// How the sequence runs.
+/// The options of a sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SequenceOptions {
-    /// How long a window is shown, in milliseconds, 20...
+    /// The time for which a window is shown, in milliseconds, ≥ 20.
     pub frame_ms: u32,
-    /// How many staged frames lead into a window in which something changed, 0...
+    /// The number of staged frames that lead into a window with a change, ≥ 0.
     pub tween: u32,
-    /// How many times longer such a window is shown, 1...
+    /// The factor by which such a window is shown longer, ≥ 1.
     pub hold_changes: u32,
-    /// Every how many windows one is shown, 1..; windows with a change in any case.
+    /// The step from one window that is shown to the next, in windows, ≥ 1; windows with a change are shown in any
+    /// case.
     pub every: usize,
     /// Whether windows without a change are left out altogether.
     pub changes_only: bool,
@@ -24,9 +25,9 @@ pub struct SequenceOptions {
     pub scale: f64,
     /// The most bytes that an animation may have.
     pub max_bytes: Option<u64>,
-    /// How DOT is written.
+    /// The profile in which DOT is written.
     pub dot_profile: Profile,
-    /// How JSON is written.
+    /// The form in which JSON is written.
     pub json: JsonForm,
     /// Whether tables of elements have a row per run of equal windows.
     pub has_runs: bool,
@@ -68,7 +69,7 @@ impl SequenceOptions {
     }
 }
 
-/// How a DOT file is written.
+/// The profile of a DOT file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Profile {
     /// As `rqt_graph` saves it: every place is in the file.
@@ -89,7 +90,7 @@ impl Profile {
     pub fn parse(word: &str) -> Result<Self> {
         let found = Self::ALL.iter().find(|(name, _)| *name == word);
         found.map(|(_, profile)| *profile).ok_or_else(|| {
-            let what = format!("`{word}` is no profile of DOT");
+            let what = format!("`{word}` is not a profile of DOT");
             Error::usage(what, "profiles: rqt, plain")
         })
     }

@@ -1,4 +1,4 @@
-//! One palette for a whole sequence: few enough colours for GIF, so well chosen that no frame shows it.
+//! One palette for a whole sequence: few enough colours for GIF, chosen so that frames look the same.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -6,14 +6,14 @@ use std::sync::OnceLock;
 /// A colour: red, green, blue.
 pub(crate) type Rgb = [u8; 3];
 
-/// How many of the most frequent colours are always in: more than a style has.
+/// The number of the most frequent colours that are always in: more than a style has.
 const THEME: usize = 40;
-/// How many further colours are considered.
+/// The number of further colours that are considered.
 const CANDIDATES: usize = 6000;
-/// Bits per channel of the cells that nearest colours are looked up in.
+/// Bits per channel of the cells in which nearest colours are looked up.
 const BITS: u32 = 4;
 
-/// Counts the colours of the frames that a palette is made from. Frames may come in any order.
+/// A count of the colours of the frames that a palette is made from. Frames may come in any order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Census(HashMap<Rgb, u64>);
 
@@ -102,8 +102,8 @@ fn runs(rgba: &[u8]) -> impl Iterator<Item = (Rgb, u32)> + '_ {
 #[derive(Clone, Debug)]
 pub struct Palette {
     colours: Vec<Rgb>,
-    /// For every cell of the colour cube, once it is asked for, the places of all colours that can be nearest to
-    /// something in it.
+    /// For every cell of the colour cube, once it is asked for, the places of all colours that can be nearest to a
+    /// colour in it.
     cells: Vec<OnceLock<Vec<u8>>>,
 }
 
@@ -137,10 +137,10 @@ impl Palette {
     }
 }
 
-/// How many colours a [`Matcher`] remembers: four times those of a frame.
+/// The number of colours that a [`Matcher`] remembers: four times those of a frame.
 const MET: u32 = 4096;
 
-/// Finds the places of colours, and remembers those that it met.
+/// A finder of the places of colours, which remembers those that it met.
 #[derive(Clone, Debug)]
 pub(crate) struct Matcher<'a> {
     palette: &'a Palette,
@@ -148,7 +148,7 @@ pub(crate) struct Matcher<'a> {
 }
 
 impl<'a> Matcher<'a> {
-    /// One that has met none.
+    /// A matcher that has met no colour.
     pub(crate) fn new(palette: &'a Palette) -> Self {
         let met = vec![None; MET as usize];
         Self { palette, met }
@@ -215,9 +215,9 @@ pub struct Area {
     pub x: usize,
     /// Rows from the top.
     pub y: usize,
-    /// Columns, 1...
+    /// The number of columns, ≥ 1.
     pub width: usize,
-    /// Rows, 1...
+    /// The number of rows, ≥ 1.
     pub height: usize,
 }
 

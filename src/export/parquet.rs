@@ -25,9 +25,9 @@ use arrow_schema::{DataType, Field, Schema, TimeUnit};
 
 use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn};
 
-/// How many rows a group has at most: its columns are held in memory, packed, until it is written.
+/// The largest number of rows in a group: its columns are held in memory, packed, until it is written.
 const MOST_ROWS: usize = 1 << 20;
-/// How many bytes of packed columns are held in memory before their group is written.
+/// The number of bytes of packed columns held in memory before their group is written.
 const MOST_HELD: usize = 16 << 20;
 
 /// A table being written.
@@ -74,7 +74,7 @@ impl<W: Write + Send> Rows<W> {
         Ok(())
     }
 
-    /// How many bytes of packed columns it holds in memory.
+    /// The number of bytes of packed columns that it holds in memory.
     pub(crate) fn held(&self) -> usize {
         self.writer.in_progress_size()
     }
@@ -166,7 +166,7 @@ fn held(texts: &TextColumn) -> Buffer {
     Buffer::from_slice_ref(&texts.bytes)
 }
 
-/// Ends as Arrow has them: with the 0 at which the first begins.
+/// The ends as Arrow has them: with the 0 at which the first begins.
 fn offsets(ends: &[i32]) -> OffsetBuffer<i32> {
     let all: Vec<i32> = std::iter::once(0).chain(ends.iter().copied()).collect();
     OffsetBuffer::new(ScalarBuffer::from(all))

@@ -13,15 +13,15 @@ use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
-/// How many pages wait to be pressed at most.
+/// The largest number of pages that wait to be written.
 const WAITING: usize = 4;
 
 struct Book<'a> {
     sequence: &'a Sequence<'a>,
-    /// The only page, if it is no sequence.
+    /// The only page, if it is not a sequence.
     strip: Option<&'a Scene>,
     target: Target,
-    /// Where pages go; a document cannot move between threads, so it has its own.
+    /// The channel for pages; a document cannot move between threads, so it has its own.
     sheets: SyncSender<PdfPage>,
     press: JoinHandle<std::result::Result<Vec<u8>, String>>,
 }

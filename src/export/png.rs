@@ -27,9 +27,9 @@ enum StillKind {
 struct Images<'a> {
     kind: StillKind,
     sequence: &'a Sequence<'a>,
-    /// The one drawing to write, if it is no sequence.
+    /// The one drawing to write, if it is not a sequence.
     strip: Option<&'a Scene>,
-    /// Whether the first window is enough.
+    /// Whether only the first window is written.
     is_poster: bool,
     target: Target,
     windows: usize,

@@ -1,4 +1,4 @@
-//! A report in Markdown for a pull request or a job summary: what changed, when, drawn and in tables.
+//! A report in Markdown for a pull request or a job summary: the changes with their times, drawn and in tables.
 
 mod changes;
 pub(crate) mod encoder;
@@ -21,12 +21,12 @@ use escape::{address, plain};
 const MOST_CHANGES: usize = 96 << 10;
 const MOST_TABLE: usize = 40 << 10;
 const MOST_NOTICES: usize = 16 << 10;
-/// A chart of more characters than this is left out: GitHub's Mermaid stops at 50,000.
+/// The largest number of characters of a chart; a longer one is left out, for GitHub's Mermaid stops at 50,000.
 const MOST_CHART: usize = 45_000;
 
-/// So many rows of a table are open; the rest folds.
+/// The largest number of rows of a table that are open; the rest folds.
 const MOST_OPEN: usize = 20;
-/// A chart of more edges than this is folded.
+/// The largest number of edges of an open chart; one of more is folded.
 const MOST_EDGES_OPEN: usize = 25;
 
 /// The report.
@@ -62,7 +62,7 @@ pub(crate) fn report(sequence: &Sequence<'_>) -> String {
     out
 }
 
-/// How a time is written: as a link into the player where one is known.
+/// The way to write a time: as a link into the player where one is known.
 struct ReportTimes<'a> {
     start: Stamp,
     player: Option<&'a (String, String)>,
@@ -82,7 +82,7 @@ impl ReportTimes<'_> {
     }
 }
 
-/// The first lines: what happened, and in what.
+/// The first lines: the changes in short, and the bag.
 fn verdict(sequence: &Sequence<'_>, view: &View) -> String {
     let title = title(sequence);
     let (Some(first), Some(last)) = (view.frames.first(), view.frames.last()) else {
@@ -130,7 +130,7 @@ fn title(sequence: &Sequence<'_>) -> String {
         .map_or_else(bag, |whole| whole.title.to_owned())
 }
 
-/// What the headlines of all windows count, in words.
+/// The number of headlines of all windows, in words.
 fn told(counts: &Counts) -> Vec<String> {
     let all = [
         (counts.nodes_added, "node", " started"),

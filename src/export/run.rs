@@ -1,4 +1,5 @@
-//! Runs a sequence once through all its outputs: each frame is drawn once, by all cores, and given to everyone in order.
+//! Runs a sequence once through all its outputs: each frame is drawn once, by all cores, and given to every output in
+//! order.
 
 mod raster_pool;
 mod size_limit;
@@ -18,16 +19,17 @@ use crate::export::palette::Palette;
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::{Encoder, Needs, Output, Packet, Written};
 
-/// Told after every batch of frames: how many are done, of how many. May break off the run.
+/// A function called after every batch of frames with the number of frames done and the number of all. It may break off
+/// the run.
 pub type Progress<'a> = dyn FnMut(usize, usize) -> ControlFlow<()> + 'a;
 
-/// Writes every output, in the order given, and tells what was written. Each file appears when it is whole. `steps`
-/// counts where the time goes.
+/// Writes every output, in the order given, and returns the files written. Each file appears when it is whole. `steps`
+/// counts the time of each step.
 ///
-/// A closed pipe ends that output and is no error.
+/// A closed pipe ends that output and is not an error.
 ///
 /// # Errors
-/// [`Error::Interrupted`] where `progress` breaks off, otherwise what the first failing output says; outputs that
+/// [`Error::Interrupted`] where `progress` breaks off, otherwise the error of the first failing output; outputs that
 /// were not finished leave no trace then.
 pub fn run(
     sequence: &Sequence<'_>,
@@ -68,7 +70,7 @@ struct OutputJob<'a> {
     output: &'a Output,
     encoder: Option<Box<dyn Encoder + 'a>>,
     has_begun: bool,
-    /// Why it ended early.
+    /// The error that ended it early.
     ended: Option<Error>,
 }
 
@@ -91,7 +93,7 @@ impl<'a> OutputJob<'a> {
         self.encoder.as_ref().is_some_and(|e| e.plays())
     }
 
-    /// What it wants of every frame; nothing once it has ended.
+    /// The data that it needs of every frame; none once it has ended.
     fn want(&self) -> FrameWant {
         let encoder = self.encoder.as_ref();
         FrameWant {
@@ -171,7 +173,7 @@ fn kind(error: &Error) -> Option<io::ErrorKind> {
     }
 }
 
-/// How many frames are drawn at a time.
+/// The number of frames that are drawn at a time.
 pub(crate) fn cores() -> usize {
     rayon::current_num_threads()
 }

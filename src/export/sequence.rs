@@ -1,4 +1,4 @@
-//! The sequence as it is shown: which window when and for how long, and what draws it.
+//! The sequence as it is shown: the windows in order with the time of each, and the drawings.
 
 pub use super::options::SequenceOptions;
 
@@ -15,13 +15,13 @@ use crate::draw::text::Fonts;
 use crate::mission::{Mission, Places};
 use crate::view::View;
 
-/// What draws windows.
+/// The drawings of the windows of a sequence.
 pub trait Drawings: Sync {
-    /// The drawing of a window, a place in [`View::frames`]; all drawings have one size. `phase` is how far the change
-    /// into it has come: 1 is the window itself.
+    /// The drawing of a window, a place in [`View::frames`]; all drawings have one size. `phase`, above 0 to 1, is the
+    /// part of the change into it that is done: 1 is the window itself.
     fn scene(&self, window: usize, phase: f64) -> Scene;
 
-    /// What all windows have in common, for outputs that draw the graph once; `None` where there is no such thing.
+    /// The graph of all windows, for outputs that draw the graph once; `None` where there is none.
     fn graph(&self) -> Option<UnionDrawings<'_>> {
         None
     }
@@ -35,9 +35,9 @@ pub trait Drawings: Sync {
 /// The graph of all windows, drawn once.
 #[derive(Clone, Debug)]
 pub struct UnionDrawings<'a> {
-    /// Every element.
+    /// The drawing of every element.
     pub union: Union,
-    /// How it looks.
+    /// The style of the drawing.
     pub style: &'a Style,
     /// The title of the picture.
     pub title: &'a str,
@@ -67,16 +67,16 @@ impl Drawings for Board<'_> {
     }
 }
 
-/// Everything one by one, whatever the picture draws as one: what pages and reports hold.
+/// The view with every element one by one, even those that the picture draws as one, for pages and reports.
 #[derive(Clone, Copy)]
 pub struct Unfolded<'a> {
-    /// All of it.
+    /// The view with everything opened.
     pub view: &'a View,
-    /// What draws it, if anything does.
+    /// The drawings of that view, if an output needs them.
     pub picture: Option<&'a dyn Drawings>,
-    /// Who lived when.
+    /// The life lines of the mission, if an output needs them.
     pub lives: Option<&'a LifeLines>,
-    /// From which relative change of a rate on it is told.
+    /// The least relative change of a rate that is told.
     pub rate_change: f64,
 }
 
@@ -85,27 +85,27 @@ pub struct Unfolded<'a> {
 pub struct Sequence<'a> {
     /// The whole sequence.
     pub mission: &'a Mission,
-    /// What data files hold: the whole sequence too, or the part that is viewed.
+    /// The mission that data files hold: the whole sequence too, or the part that is viewed.
     pub data: &'a Mission,
-    /// Where everything is drawn, if it is.
+    /// The places of everything, if it is drawn.
     pub places: Option<&'a Places>,
-    /// Everything worth saying.
+    /// The notices for the user.
     pub notices: &'a Notices,
-    /// What the picture shows of it.
+    /// The view of the mission that the picture shows.
     pub view: &'a View,
-    /// What draws a window.
+    /// The drawings of the windows.
     pub picture: &'a dyn Drawings,
-    /// The same with everything opened, where an output needs it.
+    /// The view with everything opened, where an output needs it.
     pub unfolded: Option<Unfolded<'a>>,
-    /// What turns a drawing into pixels.
+    /// The painter that turns a drawing into pixels.
     pub painter: &'a Painter,
-    /// What is written with.
+    /// The fonts for all text.
     pub fonts: &'a Fonts,
     /// The film strip, for outputs that hold all windows in one drawing.
     pub strip: Option<&'a Scene>,
     /// The lines that put the figure into LaTeX, if there is one.
     pub latex: Option<&'a str>,
-    /// How it runs.
+    /// The options of the sequence.
     pub options: SequenceOptions,
 }
 
@@ -114,14 +114,14 @@ pub struct Sequence<'a> {
 pub struct FrameTime {
     /// The window: a place in [`View::frames`].
     pub window: usize,
-    /// How far the change into this window has come, above 0 up to 1; 1 is the window itself.
+    /// The part of the change into this window that is done, above 0 up to 1; 1 is the window itself.
     pub phase: f64,
-    /// How long it is shown, in milliseconds.
+    /// The time for which it is shown, in milliseconds.
     pub ms: u32,
 }
 
 impl FrameTime {
-    /// Whether it shows the window itself and not the way there.
+    /// Whether it shows the window itself and not the change into it.
     pub fn is_settled(&self) -> bool {
         self.phase >= 1.0
     }
@@ -131,8 +131,8 @@ impl FrameTime {
 const STAGED_MS: (u32, u32) = (20, 100);
 
 impl Sequence<'_> {
-    /// The frames in order. Time is kept: staged frames take theirs from their window, and a window that is left
-    /// out gives its time to the one before.
+    /// The frames in order. The whole time stays the same: staged frames take theirs from their window, and a window
+    /// that is left out gives its time to the one before.
     pub fn frame_times(&self) -> Vec<FrameTime> {
         let changed: Vec<bool> = (0..self.view.frames.len())
             .map(|k| self.view.is_changed(k))

@@ -1,4 +1,4 @@
-//! One file while it is written: out of sight until it is whole, gone if it never gets there.
+//! One file while it is written: hidden until it is whole, removed if it never is.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -13,9 +13,9 @@ use crate::base::leftovers::Leftover;
 /// A file (or standard output) being written. Dropped without [`OutputSink::commit`], a file leaves no trace.
 #[derive(Debug)]
 pub(crate) struct OutputSink {
-    /// As it was asked for.
+    /// The path as it was asked for.
     path: PathBuf,
-    /// What is replaced: for a symbolic link, what it points to.
+    /// The path that is replaced: for a symbolic link, the one it points to.
     place: PathBuf,
     to: BufWriter<SinkTarget>,
     written: u64,
@@ -32,16 +32,16 @@ enum SinkTarget {
     Nameless(File),
     /// A file with a temporary name beside the final one.
     Named(NamedTempFile, Leftover),
-    /// Held back until it is known to be within the limit.
+    /// Bytes held back until they are known to be within the limit.
     Memory(Vec<u8>),
 }
 
 impl OutputSink {
-    /// Opens what will become `target`, whose folder is there. With `limit`, writing more bytes than that fails as
-    /// [`io::ErrorKind::FileTooLarge`].
+    /// Opens the file that will become `target`, whose folder is there. With `limit`, writing more bytes than that
+    /// fails as [`io::ErrorKind::FileTooLarge`].
     ///
     /// # Errors
-    /// Where the system refuses; the error names the final file.
+    /// The error of the system where it refuses, with the name of the final file.
     pub(crate) fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
         let way = match target {
             Target::Stdout if limit.is_some() => Ok(SinkTarget::Memory(Vec::new())),
@@ -71,13 +71,14 @@ impl OutputSink {
         &self.path
     }
 
-    /// What turns an I/O error of this file into ours.
+    /// The function that turns an I/O error of this file into ours.
     pub(crate) fn error(&self) -> impl FnOnce(io::Error) -> Error + use<> {
         Error::io("write", &self.path)
     }
 
     #[cfg(feature = "video")]
-    /// A handle that a child process can write to as its standard output; `None` where the bytes stay with us.
+    /// A handle that a child process can write to as its standard output; `None` where this process has to write the
+    /// bytes.
     ///
     /// # Errors
     /// Where the system refuses.
@@ -129,7 +130,7 @@ impl Write for OutputSink {
 }
 
 impl SinkTarget {
-    /// The size of what will be renamed; `None` for everything else.
+    /// The size of the file that will be renamed; `None` for everything else.
     fn size(&self) -> Option<u64> {
         let file = match self {
             #[cfg(target_os = "linux")]
@@ -161,7 +162,7 @@ impl Write for SinkTarget {
     }
 }
 
-/// Gives what was written its final name.
+/// Gives the written file its final name.
 fn publish(way: SinkTarget, path: &Path) -> io::Result<()> {
     match way {
         SinkTarget::Stdout(_) | SinkTarget::Special(_) => Ok(()),
@@ -183,7 +184,7 @@ fn publish(way: SinkTarget, path: &Path) -> io::Result<()> {
     }
 }
 
-/// A file in `folder` that nobody sees: without a name where the system can do that.
+/// A hidden file in `folder`: without a name where the system can do that.
 fn hidden(folder: &Path) -> io::Result<SinkTarget> {
     #[cfg(target_os = "linux")]
     if let Ok(file) = nameless(folder) {
@@ -194,7 +195,7 @@ fn hidden(folder: &Path) -> io::Result<SinkTarget> {
     Ok(SinkTarget::Named(file, left))
 }
 
-/// How temporary files are called, so that a left one tells whose it is.
+/// The builder of temporary files with names that tell whose they are.
 fn temporary() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".bagreel-").suffix(".part");

@@ -1,4 +1,4 @@
-//! Every node, topic and edge of a mission with the stretches of time in which it is there, for graphs of other tools.
+//! Every node, topic and edge of a mission with the times in which it is there, for the graph formats of other tools.
 
 use crate::base::time::Span;
 use crate::base::words::visible;
@@ -10,25 +10,25 @@ use crate::mission::{Mission, Window};
 pub(super) struct SpellOf {
     /// Its name in the file, which no other one has.
     pub(super) id: String,
-    /// What people read.
+    /// The label for people.
     pub(super) label: String,
     /// `node`, `topic`, `publish` or `subscribe`.
     pub(super) kind: &'static str,
     /// The names of both ends of an edge; empty for others.
     pub(super) ends: (String, String),
-    /// How well it is known at its best.
+    /// The strongest degree to which it is known.
     pub(super) degree: Degree,
-    /// What proves it, separated by blanks.
+    /// The words of its evidence, separated by blanks.
     pub(super) evidence: String,
     /// Messages in all windows; `None` where not known.
     pub(super) messages: Option<u64>,
-    /// When it is there: runs of windows, in order.
+    /// The times in which it is there: runs of windows, in order.
     pub(super) spells: Vec<Span>,
     /// Its rate in messages per second over each run of windows of one rate.
     pub(super) rates: Vec<(Span, f64)>,
 }
 
-/// What one window says of an element.
+/// The state of an element in one window.
 struct SeenInWindow {
     id: u32,
     degree: Degree,
@@ -144,7 +144,7 @@ impl SpellOf {
         }
     }
 
-    /// It is there in one more window, later than all before.
+    /// Adds one more window in which it is there, later than all before.
     fn add(&mut self, span: Span, seen: &SeenInWindow) {
         self.degree = self.degree.min(seen.degree);
         if let Some(count) = seen.count {

@@ -11,14 +11,14 @@ use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 
 struct SvgEncoder<'a> {
-    /// The one drawing to write, if it is no sequence.
+    /// The one drawing to write, if it is not a sequence.
     strip: Option<&'a Scene>,
     target: Target,
     windows: usize,
     written: Written,
 }
 
-/// Begins a file per window; without `{n}` the single window or the strip.
+/// Begins the files, one per window; without `{n}` the single window or the strip.
 ///
 /// # Errors
 /// [`Error::Usage`](crate::base::error::Error::Usage) for several windows without `{n}`.

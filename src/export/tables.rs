@@ -1,6 +1,6 @@
-//! The mission as tidy tables, as CSV or Parquet: one description of what they hold, two ways to write it.
+//! The mission as tidy tables, as CSV or Parquet: one description of their content, two ways to write it.
 //!
-//! Column names are in snake case and reserved in no dialect of SQL; what is empty is unknown.
+//! Column names are in snake case and reserved in no dialect of SQL; an empty cell is unknown.
 
 pub(crate) mod folder;
 mod mission;
@@ -113,7 +113,7 @@ pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
     TABLES.iter().map(fill).collect()
 }
 
-/// How many rows are gathered before they are written.
+/// The number of rows that are gathered before they are written.
 const MOST_ROWS: usize = 4096;
 
 fn write(

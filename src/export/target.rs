@@ -1,4 +1,5 @@
-//! Where outputs go: names with window numbers, checked before anything is read, and files that appear whole or not at all.
+//! The targets of outputs: names with window numbers, checked before anything is read, for files that appear whole or
+//! not at all.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -6,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
-/// What stands for the window's index in a name.
+/// The placeholder for the window's index in a name.
 pub(crate) const NUMBER: &str = "{n}";
 
-/// Where one output goes.
+/// The target of one output.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Target {
     /// Standard output (`-`).
@@ -27,7 +28,7 @@ impl Target {
         }
     }
 
-    /// What stands behind the name's last point, in lower case; `None` for standard output and names without one.
+    /// The part of the name behind its last point, in lower case; `None` for standard output and names without one.
     pub fn extension(&self) -> Option<String> {
         match self {
             Self::Stdout => None,
@@ -129,7 +130,7 @@ impl Target {
     }
 }
 
-/// What stands before the first `{n}` of a name and behind its last.
+/// The parts of a name before its first `{n}` and behind its last.
 fn around(name: &str) -> (&str, &str) {
     let before = name.split(NUMBER).next().unwrap_or_default();
     let after = name.rsplit(NUMBER).next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The lines that put a figure into `LaTeX`, beside the picture that is written with them.
+//! The lines that include a figure in `LaTeX`, written beside its picture.
 
 use super::{AtOnce, Encoder};
 use crate::base::error::{Error, Result};
@@ -19,7 +19,7 @@ pub(crate) fn start<'a>(
     AtOnce::start(target, move || (latex.to_owned(), Vec::new()))
 }
 
-/// Why these lines cannot be written.
+/// The error for lines without a figure.
 pub(crate) fn needs_figure(target: &Target) -> Error {
     Error::usage(
         format!("`{}` puts a figure into LaTeX", target.path().display()),

@@ -15,13 +15,13 @@ use crate::export::target::Target;
 
 /// The finest step of time in milliseconds; frames are repeated to fill theirs.
 const FINEST_MS: u32 = 20;
-/// Players stumble over fewer frames per second than this.
+/// The least number of frames per second; players have trouble with fewer.
 const FEWEST_PER_SECOND: f64 = 10.0;
 
-/// A kind of video: the container and how to get it from ffmpeg.
+/// A kind of video: the container and the arguments of ffmpeg for it.
 struct VideoKind {
     arguments: &'static [&'static str],
-    /// Container arguments for a pipe, which cannot be gone back in.
+    /// Arguments of the container for a pipe, in which ffmpeg cannot go back.
     piped: &'static [&'static str],
 }
 
@@ -77,7 +77,7 @@ struct Video<'a> {
     work: Option<FfmpegJob>,
 }
 
-/// A process that ends when nobody wants it any more.
+/// A process that is ended when it is dropped.
 struct Process(Child);
 
 impl Drop for Process {
@@ -91,9 +91,9 @@ impl Drop for Process {
 /// ffmpeg at work.
 struct FfmpegJob {
     child: Process,
-    /// Where frames go.
+    /// The pipe for frames.
     pipe: Option<ChildStdin>,
-    /// Hears what it says meanwhile: a pipe that nobody empties would stop it.
+    /// The thread that reads its messages meanwhile: a full pipe would stop it.
     ear: Option<JoinHandle<Vec<u8>>>,
     sink: OutputSink,
     /// The length of one repetition in milliseconds.
@@ -199,7 +199,7 @@ impl Video<'_> {
         })
     }
 
-    /// What ffmpeg says about its failure.
+    /// The error with the message of ffmpeg about its failure.
     fn complaint(&self, work: &mut FfmpegJob) -> Error {
         drop(work.pipe.take());
         let _ = work.child.0.wait();
@@ -282,7 +282,7 @@ impl FfmpegJob {
     }
 }
 
-/// The end of what a child process says, heard until it closes the pipe.
+/// The end of the messages of a child process, read until it closes the pipe.
 fn last_words(mut pipe: ChildStderr) -> Vec<u8> {
     let (mut said, mut buffer) = (Vec::new(), [0; 4096]);
     // Whatever can be read helps; a failure to read changes nothing.

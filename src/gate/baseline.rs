@@ -1,4 +1,4 @@
-//! Writes down what healthy runs have in common: the smallest expectation that holds in all of them, a line per element.
+//! Writes the expectation of healthy runs: the smallest one that holds in all of them, a line per element.
 
 mod draft;
 mod edit;
@@ -13,16 +13,17 @@ use crate::mission::Mission;
 pub(super) use draft::{Draft, NodeLine, TopicLine};
 pub(crate) use update::update;
 
-/// Names longer than this in the file, in bytes, are left out: YAML takes no longer keys, and ROS allows 255.
+/// The largest length of a name in the file, in bytes; longer ones are left out: YAML takes no longer keys, and ROS
+/// allows 255.
 const LONGEST: usize = 1000;
-/// What the lines before the first name take of a document's limits.
+/// The share of a document's limits that the lines before the first name take.
 const HEAD: usize = 1 << 16;
 
 /// An expectation that was written.
 #[derive(Debug, Default)]
 pub(crate) struct Written {
     pub(crate) text: String,
-    /// How many nodes and topics found no room in it.
+    /// The number of nodes and topics that found no room in it.
     pub(crate) left_out: usize,
 }
 
@@ -61,7 +62,7 @@ fn written(draft: &Draft, from: &str, period: Period) -> Written {
     }
 }
 
-/// What is left of the limits of a document that can be read again.
+/// The rest of the limits within which a document can be read again.
 struct Room {
     bytes: usize,
     values: usize,
@@ -69,7 +70,7 @@ struct Room {
 }
 
 impl Room {
-    /// A section with a line per name, without those that find no room; nothing if none does.
+    /// A section with a line per name, without those that find no room; empty if none does.
     fn section<'a>(
         &mut self,
         key: &str,
@@ -91,7 +92,7 @@ impl Room {
         out
     }
 
-    /// Whether a line finds room, which it then takes.
+    /// Takes the room for a line; whether there was enough.
     fn takes(&mut self, line: &str) -> bool {
         // A pair is two values, and so is what opens a mapping or a list with its first member; a comma begins another.
         let signs = line
@@ -119,7 +120,7 @@ fn length(nanos: i64) -> String {
     }
 }
 
-/// Text as YAML: as it is where it can be nothing else, in quotes otherwise.
+/// Text as YAML: as it is where YAML takes it for a text, in quotes otherwise.
 fn scalar(text: &str) -> String {
     const WORDS: [&str; 9] = ["true", "false", "null", "yes", "no", "on", "off", "y", "n"];
     let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '/' | '_' | '-' | '.');

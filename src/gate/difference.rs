@@ -1,4 +1,4 @@
-//! What differs between two missions: who is there, who talks to whom, how often, and what happened in which order.
+//! The differences between two missions: in nodes, topics and edges, in rates, and in the events and their order.
 
 mod elements;
 mod happened;
@@ -11,7 +11,7 @@ use crate::mission::Mission;
 pub(crate) use report::{DIFF_FORMATS, DiffFormat, DiffSubject};
 pub(crate) use union::{Side, union};
 
-/// In which of two missions something is.
+/// The one of two missions, or both, that have something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Where {
     /// Only in the first.
@@ -25,21 +25,21 @@ pub(crate) enum Where {
 /// One thing that differs.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Difference {
-    /// What kind of thing: `node`, `topic`, `publishes`, `subscribes`, `type`, `rate`, …
+    /// The kind of thing: `node`, `topic`, `publishes`, `subscribes`, `type`, `rate`, …
     pub(crate) kind: &'static str,
-    /// Whose: the name of a node or topic, or both of an edge.
+    /// The name of the node or topic it is about, or both names of an edge.
     pub(crate) name: String,
     pub(crate) side: Where,
-    /// What the first mission has; empty for nothing.
+    /// The value in the first mission; empty for none.
     pub(crate) first: String,
-    /// What the second has.
+    /// The value in the second mission; empty for none.
     pub(crate) second: String,
-    /// Whether the missions tell. What one has no evidence of is not absent from it.
+    /// Whether both missions can tell. An element without evidence in one is not absent from it.
     pub(crate) is_known: bool,
 }
 
 impl Difference {
-    /// Something that only one has.
+    /// The difference of something that only one mission has.
     fn only(kind: &'static str, name: impl Into<String>, side: Where, what: &str) -> Self {
         let (first, second) = match side {
             Where::Second => (String::new(), what.to_owned()),
@@ -55,7 +55,7 @@ impl Difference {
         }
     }
 
-    /// Something that both have, each in its way.
+    /// The difference of something that both missions have with different values.
     fn changed(
         kind: &'static str,
         name: impl Into<String>,
@@ -73,8 +73,8 @@ impl Difference {
     }
 }
 
-/// All that differs, elements before what happened to them, each kind by name. A rate must differ by more than the
-/// share `rate_change`, and by more than chance explains.
+/// All differences, elements before events, each kind by name. A rate must differ by more than the share `rate_change`,
+/// and by more than chance explains.
 pub(crate) fn differences(first: &Mission, second: &Mission, rate_change: f64) -> Vec<Difference> {
     let (a, b) = (Facts::new(first), Facts::new(second));
     let mut all = elements::differences(&a, &b, rate_change);

@@ -1,4 +1,4 @@
-//! What a mission is expected to be: the nouns of `graph.yaml`, each with its place in the file.
+//! The expectation of a mission: the values of `graph.yaml`, each with its place in the file.
 
 mod fields;
 mod parse;
@@ -15,7 +15,7 @@ pub(crate) use parse::read;
 /// The first line of every expectation.
 pub(crate) const SCHEMA: &str = "bagreel.expect/1";
 
-/// A value and where it stands.
+/// A value and its place in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct At<T> {
     pub(crate) at: YamlPlace,
@@ -36,28 +36,28 @@ pub(crate) struct Expectation {
     pub(crate) allow: Vec<AllowedFinding>,
 }
 
-/// What is expected of a name.
+/// The expectation of a name.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Named<T> {
     pub(crate) name: Pattern,
-    /// Where the name stands.
+    /// The place of the name.
     pub(crate) at: YamlPlace,
-    /// Where what is said of it begins.
+    /// The place at which its facts begin.
     pub(crate) body: YamlPlace,
     pub(crate) facts: T,
 }
 
-/// What of the bag that the file does not name.
+/// The policy for elements of the bag that the file does not name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Policy {
     pub(crate) at: YamlPlace,
     pub(crate) nodes: Unlisted,
     pub(crate) topics: Unlisted,
-    /// Of topics whose publishers are listed.
+    /// The policy for publishers of topics whose publishers are listed.
     pub(crate) publishers: Unlisted,
 }
 
-/// How bad it is that something is not named.
+/// The severity of something that is not named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unlisted {
     Allow,
@@ -65,14 +65,14 @@ pub(crate) enum Unlisted {
     Error,
 }
 
-/// What can be expected of a node.
+/// The facts that can be expected of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeFacts {
-    /// It must not be there.
+    /// Whether it must not be there.
     pub(crate) forbidden: bool,
-    /// It need not be there.
+    /// Whether it need not be there.
     pub(crate) optional: bool,
-    /// It need not stay to the end.
+    /// Whether it need not stay to the end.
     pub(crate) may_end: bool,
     pub(crate) restarts: Option<At<Range>>,
     /// The state that it is in at the end.
@@ -81,17 +81,17 @@ pub(crate) struct NodeFacts {
     pub(crate) within: Option<At<i64>>,
 }
 
-/// What can be expected of a topic.
+/// The facts that can be expected of a topic.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TopicFacts {
     pub(crate) forbidden: bool,
     pub(crate) optional: bool,
-    /// Its rate is judged up to its last message only.
+    /// Whether its rate is judged up to its last message only.
     pub(crate) may_end: bool,
     pub(crate) kind: Option<At<String>>,
-    /// Who publishes it: these and nobody else.
+    /// The nodes that publish it: these and no others.
     pub(crate) by: Option<At<Vec<At<Pattern>>>>,
-    /// Who subscribes it: these at least.
+    /// The nodes that subscribe it: these at least.
     pub(crate) to: Option<At<Vec<At<Pattern>>>>,
     /// Messages per second in every window.
     pub(crate) hz: Option<At<Range>>,
@@ -102,9 +102,9 @@ pub(crate) struct TopicFacts {
     pub(crate) latched: Option<At<bool>>,
     /// Words that its quality of service must hold.
     pub(crate) qos: Option<At<String>>,
-    /// When rate and gaps are judged.
+    /// The time in which rate and gaps are judged; the whole mission if `None`.
     pub(crate) during: Option<During>,
-    /// In which windows they are.
+    /// The condition on the windows in which they are judged; all if `None`.
     pub(crate) whilst: Option<While>,
 }
 
@@ -125,12 +125,12 @@ pub(crate) struct Rule {
     pub(crate) demand: Demand,
 }
 
-/// What a rule asks for.
+/// The demand of a rule.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Demand {
-    /// Of each of these nodes.
+    /// Facts of each of these nodes.
     Nodes(Vec<At<Pattern>>, NodeFacts),
-    /// Of a topic.
+    /// Facts of a topic.
     Topic(At<Pattern>, Box<TopicFacts>),
     /// That nodes begin one after the other.
     Order(Vec<At<Pattern>>),
@@ -140,18 +140,18 @@ pub(crate) enum Demand {
         expect: Event,
         within: i64,
     },
-    /// How many reconfigurations there are.
+    /// That the number of reconfigurations lies in a range.
     Changes { during: Option<During>, many: Range },
 }
 
-/// Something that the ledger may tell of.
+/// An event that the ledger may tell of.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Event {
     pub(crate) kind: EventKind,
     pub(crate) name: Pattern,
-    /// Who or what before.
+    /// The sender or value before; any if `None`.
     pub(crate) from: Option<Pattern>,
-    /// Who or what after.
+    /// The sender or value after; any if `None`.
     pub(crate) to: Option<Pattern>,
 }
 
@@ -198,7 +198,7 @@ pub(crate) struct AllowedFinding {
     pub(crate) at: YamlPlace,
     pub(crate) finding: super::FindingKind,
     pub(crate) name: Pattern,
-    /// It does not hold for bags that begin at this time or later.
+    /// The time from which on it does not hold, by the beginning of the bag; `None` for always.
     pub(crate) until: Option<At<Stamp>>,
     pub(crate) why: String,
 }

@@ -1,4 +1,4 @@
-//! What a mission answers when it is asked by name: who is there, when, how often, and whether the bag can tell at all.
+//! The facts of a mission by name: its nodes and topics, their times and rates, and whether the bag can tell at all.
 
 mod cause;
 mod tempo;
@@ -19,14 +19,15 @@ use crate::mission::ledger::{Entry, Kind};
 
 pub(crate) use tempo::{Rate, TopicSilence};
 
-/// Robots are shut down before their recorder is: what ends so shortly before the mission does, stays.
+/// The time in nanoseconds before the mission's end within which an end does not count: robots are shut down before
+/// their recorder.
 pub(crate) const SHUTDOWN_NS: i64 = 5_000_000_000;
 
-/// A mission, with what is asked often worked out once.
+/// A mission, with facts that are asked for often worked out once.
 pub(crate) struct Facts<'a> {
     pub(crate) mission: &'a Mission,
     degrees: Degrees,
-    /// Messages of each topic.
+    /// The number of messages of each topic.
     messages: Vec<u64>,
     /// Whether a tool rewrote the bag, so that it names false publishers.
     is_rewritten: bool,
@@ -39,16 +40,16 @@ pub(crate) struct Facts<'a> {
     edges: [Vec<Vec<u32>>; 2],
 }
 
-/// How well each element is known at its best.
+/// The strongest degree to which each element is known.
 struct Degrees {
     nodes: Vec<Degree>,
     publishes: Vec<Degree>,
     subscribes: Vec<Degree>,
 }
 
-/// Evidence that says what should be, not what was. A file of the user's says what was.
+/// Words of evidence for what should be, not for what was. A file of the user's tells what was.
 const DECLARING: [&str; 2] = ["source", "launch"];
-/// Evidence that names every node that is there, of ROS 1 every one that sends something recorded.
+/// Words of evidence that names every node of ROS 1 that sends something recorded.
 const NAMING: [&str; 5] = [
     "connection",
     "statistics",
@@ -154,7 +155,7 @@ impl<'a> Facts<'a> {
             .collect()
     }
 
-    /// Whether a topic has messages, or somebody who could send some.
+    /// Whether a topic was seen, not only declared: with messages, with a seen publisher, or without a seen subscriber.
     pub(crate) fn is_there(&self, topic: TopicId) -> bool {
         let elements = &self.mission.elements;
         let any = |of: usize, edges: &[Edge]| {
@@ -167,7 +168,7 @@ impl<'a> Facts<'a> {
                 || !any(1, &elements.subscribes))
     }
 
-    /// Messages of a topic.
+    /// The number of messages of a topic.
     pub(crate) fn messages(&self, topic: TopicId) -> u64 {
         self.messages[topic as usize]
     }
@@ -201,7 +202,8 @@ impl<'a> Facts<'a> {
         nodes.iter().any(sure)
     }
 
-    /// Who publishes a topic, with how well that is known; what only code and launch files say is declared.
+    /// The publishers of a topic: the node, the publication, and the degree to which it is known; one that only code
+    /// and launch files tell is declared.
     pub(crate) fn publishers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
         let own = self.edges[0][topic as usize].iter();
         own.map(|id| {
@@ -212,7 +214,7 @@ impl<'a> Facts<'a> {
         .collect()
     }
 
-    /// Who subscribes a topic, the same way.
+    /// The subscribers of a topic, in the same form.
     pub(crate) fn subscribers(&self, topic: TopicId) -> Vec<(NodeId, u32, Degree)> {
         let own = self.edges[1][topic as usize].iter();
         own.map(|id| {
@@ -257,7 +259,8 @@ impl<'a> Facts<'a> {
             && known.iter().any(|(.., degree)| *degree <= Degree::Stated)
     }
 
-    /// Whether the bag lists subscribers, so that a node that is not listed is none: everywhere, or of these nodes.
+    /// Whether the bag lists subscribers, so that a node that is not listed is not a subscriber: everywhere, or of
+    /// these nodes.
     pub(crate) fn tells_subscribers(&self, nodes: &[NodeId]) -> bool {
         self.mission.elements.subscribes.iter().any(|edge| {
             let own = nodes.contains(&edge.node) && has(edge.evidence, &["links"]);
@@ -265,7 +268,7 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// When nodes are there, taken together; in order, none overlapping.
+    /// The times in which any of these nodes is there; in order, none overlapping.
     pub(crate) fn lives(&self, nodes: &[NodeId]) -> Vec<Span> {
         let mut all: Vec<Span> = Vec::new();
         for id in nodes {
@@ -287,13 +290,13 @@ impl<'a> Facts<'a> {
         joined
     }
 
-    /// The windows in which a node is, of a mission of which nothing finer is known.
+    /// The windows in which a node is, for a mission without finer times.
     fn windows_of(&self, node: NodeId) -> impl Iterator<Item = Span> + use<'a> {
         let rows = self.mission.graphs.rows(Element::Node(node));
         rows.filter_map(|(at, _)| Some(self.mission.windows.get(at)?.span))
     }
 
-    /// From when to when somebody published a topic, as far as the bag tells, and how many messages.
+    /// The time in which a node published a topic, as far as the bag tells, and the number of its messages.
     pub(crate) fn sent(&self, node: NodeId, edge: u32) -> Option<(Span, u64)> {
         let mission = self.mission;
         let runs = match mission.elements.runs(Element::Publish(edge)) {
@@ -341,7 +344,7 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// When a role first appeared, as well as it is known: the time, and between which the truth lies.
+    /// The time at which a role first appeared, as well as it is known, with its bounds.
     pub(crate) fn began(&self, nodes: &[NodeId]) -> Option<Bound> {
         let first = self.lives(nodes).first()?.start;
         let started = self.entries(nodes, Kind::Started);
@@ -361,18 +364,18 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// A moment of the mission, for people.
+    /// A moment of the mission as text for people.
     pub(crate) fn clock(&self, at: Stamp) -> String {
         words::offset_seconds(self.mission.offset(at))
     }
 
-    /// A stretch of the mission, for people.
+    /// A stretch of the mission as text for people.
     pub(crate) fn stretch(&self, span: Span) -> String {
         format!("{}–{}", self.clock(span.start), self.clock(span.end))
     }
 }
 
-/// How well each element is known at its best, and how many messages each topic has.
+/// The strongest degree to which each element is known, and the number of messages of each topic.
 fn summed(mission: &Mission) -> (Degrees, Vec<u64>) {
     let elements = &mission.elements;
     let mut degrees = Degrees {

@@ -1,4 +1,4 @@
-//! What can be found wrong, each kind a row in [`KINDS`]; and one thing found.
+//! The kinds of findings, each a row in [`KINDS`]; and one finding.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -35,7 +35,7 @@ pub(crate) enum FindingKind {
     AllowUnused,
 }
 
-/// All kinds in their order: the word, what it says, and what decides it.
+/// All kinds in their order: the word, the meaning, and the way it is decided.
 pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::NodeMissing,
@@ -200,7 +200,7 @@ impl FindingKind {
     }
 }
 
-/// How bad a finding is, the worst first.
+/// The severity of a finding, the worst first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Severity {
     Error,
@@ -223,56 +223,56 @@ impl Severity {
     }
 }
 
-/// Why something is as it is: what the ledger tells, by which findings are grouped.
+/// The cause of findings, as the ledger tells it, by which they are grouped.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Cause {
-    /// When it happened, if the ledger tells.
+    /// The time at which it happened, if the ledger tells.
     pub(crate) time: Option<Stamp>,
-    /// What: `/lidar stopped at 04:50`.
+    /// The event in words: `/lidar stopped at 04:50`.
     pub(crate) text: String,
 }
 
 impl Cause {
-    /// Whether it says what the findings about this name say themselves.
+    /// Whether it is about this name, so that the findings about the name say it themselves.
     pub(crate) fn is_about(&self, name: &str) -> bool {
         let rest = self.text.strip_prefix(name);
         rest.is_some_and(|rest| rest.starts_with(' '))
     }
 }
 
-/// One thing found. All its texts are visible: control characters are spelled out.
+/// One finding. All its texts are visible: control characters are spelled out.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Finding {
     pub(crate) kind: FindingKind,
     pub(crate) severity: Severity,
-    /// Where the file says what was expected.
+    /// The place of the expectation in the file.
     pub(crate) place: YamlPlace,
     /// The node or topic that it is about.
     pub(crate) name: String,
-    /// One sentence.
+    /// The finding in one sentence.
     pub(crate) says: String,
-    /// What was seen, in few words.
+    /// The observed value, in few words.
     pub(crate) seen: String,
-    /// What was expected.
+    /// The expected value.
     pub(crate) expected: String,
-    /// When.
+    /// The time it is about, if it is about one.
     pub(crate) when: Option<Span>,
     /// Lines that tell more.
     pub(crate) details: Vec<String>,
-    /// What caused it.
+    /// The cause, if it is known.
     pub(crate) cause: Option<Cause>,
-    /// What to do.
+    /// Hints for the user.
     pub(crate) help: Vec<String>,
     /// The name in the file that `baseline --update` would write anew.
     pub(crate) accept: Option<String>,
-    /// Why it is forgiven.
+    /// The reason why it is forgiven.
     pub(crate) why: Option<String>,
-    /// How many before it in the file look the same to [`Self::fingerprint`].
+    /// The number of findings before it in the file that look the same to [`Self::fingerprint`].
     pub(crate) nth: usize,
 }
 
 impl Finding {
-    /// A finding about a name, an error until something else is said.
+    /// A finding about a name, of severity [`Severity::Error`].
     pub(crate) fn new(
         kind: FindingKind,
         name: &str,
@@ -297,7 +297,7 @@ impl Finding {
         }
     }
 
-    /// That the bag does not tell, and why.
+    /// A finding that the bag does not tell, with the reason in `says`.
     pub(crate) fn unknown(
         kind: FindingKind,
         name: &str,
@@ -310,26 +310,26 @@ impl Finding {
         }
     }
 
-    /// What was seen instead of what.
+    /// The finding with the observed and the expected value.
     pub(crate) fn saw(mut self, seen: impl fmt::Display, expected: impl fmt::Display) -> Self {
         self.seen = visible(&seen.to_string()).into_owned();
         self.expected = visible(&expected.to_string()).into_owned();
         self
     }
 
-    /// When it was so.
+    /// The finding with its time.
     pub(crate) fn at(mut self, when: Span) -> Self {
         self.when = Some(when);
         self
     }
 
-    /// One more line.
+    /// The finding with one more line.
     pub(crate) fn detail(mut self, text: impl fmt::Display) -> Self {
         self.details.push(visible(&text.to_string()).into_owned());
         self
     }
 
-    /// A way out.
+    /// The finding with one more hint.
     pub(crate) fn hint(mut self, text: impl fmt::Display) -> Self {
         self.help.push(visible(&text.to_string()).into_owned());
         self
@@ -351,7 +351,7 @@ impl Finding {
         }
     }
 
-    /// What of it stays the same from run to run: who else publishes does, numbers do not.
+    /// The part of it that stays the same from run to run: unexpected publishers do, numbers do not.
     fn look(&self) -> String {
         let who = match self.kind {
             FindingKind::PublisherUnexpected => self.seen.as_str(),

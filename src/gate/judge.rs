@@ -21,17 +21,17 @@ use crate::mission::Mission;
 /// One fact of the file, judged.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Checked {
-    /// What it is about: `topic /scan hz`, or a rule's `id`.
+    /// Its title: `/scan hz`, or a rule's `id`.
     pub(crate) title: String,
-    /// Where it stands.
+    /// Its place in the file.
     pub(crate) place: YamlPlace,
-    /// What was found; nothing where it is kept.
+    /// The findings; none where it is kept.
     pub(crate) findings: Vec<Finding>,
-    /// Whether there was nothing to judge, because what it is about is not there.
+    /// Whether there was nothing to judge, because its node or topic is not there.
     pub(crate) is_moot: bool,
 }
 
-/// What became of a fact.
+/// The judgement of a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Judgement {
     Kept,
@@ -69,19 +69,19 @@ impl Verdict {
         all
     }
 
-    /// How many findings are so bad.
+    /// The number of findings of this severity.
     pub(crate) fn count(&self, severity: Severity) -> usize {
         let all = self.checks.iter().flat_map(|c| &c.findings);
         all.filter(|f| f.severity == severity).count()
     }
 
-    /// How many facts came out so.
+    /// The number of facts with this judgement.
     pub(crate) fn facts(&self, judgement: Judgement) -> usize {
         let all = self.checks.iter();
         all.filter(|c| c.judgement() == judgement).count()
     }
 
-    /// Makes errors of what cannot be decided.
+    /// Makes errors of findings that cannot be decided.
     pub(crate) fn decide(&mut self) {
         let all = self.checks.iter_mut().flat_map(|c| &mut c.findings);
         for finding in all.filter(|f| f.severity == Severity::Unknown) {
@@ -137,22 +137,22 @@ struct Judge<'a> {
     names_nodes: bool,
     expectation: &'a Expectation,
     checks: Vec<Checked>,
-    /// How many names were looked for among those that are there.
+    /// The number of names that were looked for among those that are there.
     told: Cell<usize>,
 }
 
-/// So many names that are not there are told the nearest one; with more the file is of another robot.
+/// The largest number of missing names for which the nearest one is told; with more the file is of another robot.
 const NEAR: usize = 50;
 
 impl Judge<'_> {
-    /// How to go on where a name is not there: the nearest one.
+    /// The hint where a name is not there: the nearest one.
     fn near<'k>(&self, pattern: &Pattern, known: impl Iterator<Item = &'k str>) -> Option<String> {
         self.told.set(self.told.get() + 1);
         let near = (self.told.get() <= NEAR).then(|| nearest(pattern.as_str(), known));
         Some(format!("the nearest name in the bag is `{}`", near??))
     }
 
-    /// Notes what was found of one fact.
+    /// Notes the findings of one fact.
     fn note(&mut self, title: impl Into<String>, place: YamlPlace, findings: Vec<Finding>) {
         self.checks.push(Checked {
             title: title.into(),
@@ -173,7 +173,7 @@ impl Judge<'_> {
     }
 }
 
-/// That a node is not there, as a cause of findings.
+/// The absence of a node as a cause of findings.
 fn absence(name: &str) -> Cause {
     Cause {
         time: None,
@@ -182,7 +182,7 @@ fn absence(name: &str) -> Cause {
 }
 
 impl Unlisted {
-    /// How bad a finding under this policy is; `None` for no finding at all.
+    /// The severity of a finding under this policy; `None` for no finding at all.
     fn severity(self) -> Option<Severity> {
         match self {
             Self::Allow => None,

@@ -1,9 +1,9 @@
-//! Patterns with blanks: `*` stands for any characters but `/`, `**` for any at all, `?` for one that is not `/`.
+//! Patterns with wildcards: `*` stands for any characters but `/`, `**` for any at all, `?` for one that is not `/`.
 
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// A name that may hold blanks.
+/// A name that may hold wildcards.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Pattern {
     text: String,
@@ -74,7 +74,7 @@ impl Pattern {
         fits.last().copied().unwrap_or(false)
     }
 
-    /// A blank may stand for nothing.
+    /// Lets wildcards stand for nothing.
     fn skip_blanks(&self, fits: &mut [bool]) {
         for (at, part) in self.parts.iter().enumerate() {
             if fits[at] && matches!(part, PatternPart::Some | PatternPart::All) {
@@ -84,7 +84,7 @@ impl Pattern {
     }
 }
 
-/// Many names and patterns, of which somebody asks whether a name is one of them.
+/// A set of names and patterns that can be asked whether a name is one of them.
 #[derive(Debug, Default)]
 pub(crate) struct NamePatterns<'a> {
     exact: BTreeSet<&'a str>,

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::base::time::{Moment, Span};
 
-/// Numbers from one to another, both included; an open end allows everything on its side.
+/// A range of numbers from one to another, both included; an open end allows everything on its side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Range {
     pub(crate) from: Option<f64>,
@@ -12,7 +12,7 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    /// Reads a range of numbers, 0 or more; `None` if it is none, or if nothing lies in it.
+    /// Reads a range of numbers ≥ 0; `None` if it is not a range, or if nothing lies in it.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (from, to) = text.split_once("..")?;
         let range = Self {
@@ -72,7 +72,7 @@ pub(crate) struct During {
 }
 
 impl During {
-    /// Reads a stretch; `None` if it is none.
+    /// Reads a stretch; `None` if it is not one.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (from, to) = text.split_once("..")?;
         let moment = |text: &str| match text.trim() {
@@ -86,7 +86,7 @@ impl During {
         (during.from.is_some() || during.to.is_some()).then_some(during)
     }
 
-    /// Where it lies in a mission, within it.
+    /// The stretch of a mission, within its time.
     pub(crate) fn on(&self, mission: Span) -> Span {
         let start = self.from.map_or(mission.start, |m| m.on(mission));
         let end = self.to.map_or(mission.end, |m| m.on(mission));

@@ -1,4 +1,4 @@
-//! Verdicts in the formats of those who read them: people, programs, and the services that run jobs.
+//! Verdicts in formats for people, for programs, and for the services that run jobs.
 
 mod github;
 mod gitlab;
@@ -16,7 +16,7 @@ use super::judge::Verdict;
 use crate::base::words::{self, visible};
 use crate::mission::Mission;
 
-/// What was judged, and how the user called it.
+/// The subject of a report: the mission, with the names that the user typed.
 #[derive(Clone, Debug)]
 pub(crate) struct Subject<'a> {
     pub(crate) mission: &'a Mission,
@@ -24,7 +24,7 @@ pub(crate) struct Subject<'a> {
     pub(crate) bags: Vec<String>,
     /// The expectation, as it was typed.
     pub(crate) file: String,
-    /// Names and addresses of what stands beside the report.
+    /// Names and addresses of links in the report.
     pub(crate) links: Vec<(String, String)>,
 }
 
@@ -33,9 +33,9 @@ pub(crate) struct Subject<'a> {
 pub(crate) struct Format {
     /// Its word, in `--format` and before a colon in `-o`.
     pub(crate) word: &'static str,
-    /// What file names of it end in.
+    /// The endings of its file names.
     pub(crate) endings: &'static [&'static str],
-    /// What it is, for the help.
+    /// Its description, for the help.
     pub(crate) what: &'static str,
     pub(crate) write: fn(&Subject<'_>, &Verdict) -> String,
 }
@@ -126,7 +126,7 @@ impl Subject<'_> {
         }
     }
 
-    /// The command that accepts what was seen of a name; of everything that was found without one.
+    /// The command that accepts the findings about a name; all findings without one.
     fn accept(&self, name: Option<&str>) -> String {
         let bags: Vec<String> = self.bags.iter().map(|bag| quoted(bag)).collect();
         let only = name.map_or_else(String::new, |name| format!(" --only {}", quoted(name)));
@@ -136,7 +136,7 @@ impl Subject<'_> {
 }
 
 impl Verdict {
-    /// What is broken, in words: `2 errors, 1 warning`; empty where nothing is.
+    /// The number of errors and warnings in words: `2 errors, 1 warning`; empty without any.
     fn broken(&self) -> String {
         let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
         let counts = counts.map(|(severity, word)| (self.count(severity), word));
@@ -145,7 +145,7 @@ impl Verdict {
         words.join(", ")
     }
 
-    /// What was found, in words: `2 errors, 1 warning, 1 unknown`.
+    /// The number of findings in words: `2 errors, 1 warning, 1 unknown`.
     fn summary(&self) -> String {
         let broken = self.broken();
         let mut parts: Vec<String> = Some(broken).into_iter().filter(|b| !b.is_empty()).collect();
@@ -175,7 +175,7 @@ fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', "'\\''"))
 }
 
-/// What a kind of finding means, for `--explain`; `None` for a word that is none.
+/// The meaning of a kind of finding, for `--explain`; `None` for an unknown word.
 pub(crate) fn explain(word: &str) -> Option<String> {
     let (_, word, says, more) = KINDS.iter().find(|(_, own, ..)| *own == word)?;
     let more = wrapped(more);
@@ -204,7 +204,7 @@ fn wrapped(text: &str) -> String {
     out
 }
 
-/// Findings by what caused them, in the order of the worst of each; what stands alone has no cause of its own.
+/// The findings grouped by cause, in the order of the worst of each; those without a cause stand alone.
 fn grouped<'a>(findings: &[&'a Finding]) -> Vec<(Option<&'a str>, Vec<&'a Finding>)> {
     let mut groups: Vec<(Option<&str>, Vec<&Finding>)> = Vec::new();
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Reads every bag once and takes in what it holds.
+//! Reads every bag once and gathers its evidence.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -54,8 +54,8 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     })
 }
 
-/// What to look at, without the payloads of bags that are larger than what is compared of them: an index would be of no
-/// use if every payload were read.
+/// The options of collecting, without the payloads of bags too large to be compared: an index would be of no use if
+/// every payload were read.
 fn affordable(reading: &Reading) -> collector::CollectOptions {
     let mut options = reading.collect.clone();
     let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
@@ -67,7 +67,7 @@ fn affordable(reading: &Reading) -> collector::CollectOptions {
     options
 }
 
-/// Every input once; a bag that was named twice would count twice.
+/// Every input once, with a notice for those named twice, which would count twice.
 fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     let mut seen = BTreeSet::new();
     let (mut once, mut twice) = (Vec::new(), Vec::new());
@@ -90,10 +90,10 @@ fn each_once(inputs: &[Input]) -> Result<(Vec<Input>, Vec<Notice>)> {
     Ok((once, twice))
 }
 
-/// What is said of a bag that is whole and empty.
+/// The words for a bag that is whole and empty.
 pub(super) const NOTHING_RECORDED: &str = "it was closed before anything was recorded";
 
-/// The error for bags without a message, with what was lost on the way.
+/// The error for bags without a message, with the losses on the way.
 fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
     let lost: Vec<String> = notices
         .iter()
@@ -113,7 +113,7 @@ fn no_messages(inputs: &[Input], notices: &Notices) -> Error {
     }
 }
 
-/// The time that all bags cover, if every one of them tells without being read.
+/// The time that all bags cover; `None` unless every one of them tells its own without being read.
 pub(super) fn known_span(readers: &mut [Box<dyn Reader>]) -> Result<Option<Span>> {
     let mut all: Option<Span> = None;
     for reader in readers {

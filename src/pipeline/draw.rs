@@ -1,4 +1,4 @@
-//! From the evolution to the picture: choose what is shown, and make it readable on its page.
+//! From the mission to the picture: the choice of what is shown, made readable on its page.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -15,15 +15,15 @@ use crate::mission::phases::knows_publishers;
 use crate::mission::{Mission, Place, Places};
 use crate::view::{Mode, View, ViewOptions, outline, view};
 
-/// What the picture of a mission is.
+/// The kind of picture of a mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Body {
-    /// A graph; a board where of most messages nobody knows the publisher.
+    /// A graph, or a board where the publishers of most messages are unknown.
     #[default]
     Auto,
     /// The computation graph.
     Graph,
-    /// Topics over time.
+    /// The board of topics over time.
     Board,
 }
 
@@ -38,29 +38,29 @@ impl Body {
     }
 }
 
-/// What to draw and how.
+/// The options of the picture.
 #[derive(Clone)]
 #[non_exhaustive]
 pub struct Drawing {
-    /// Graph or board.
+    /// The kind of picture: graph or board.
     pub body: Body,
-    /// What is shown.
+    /// The choice of what is shown.
     pub view: ViewOptions,
     /// Colours, strokes and fonts.
     pub style: Style,
-    /// What text is set in.
+    /// The fonts for all text.
     pub fonts: Fonts,
-    /// Page, title, orientation.
+    /// The page with its title and orientation.
     pub page: PageOptions,
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
-    /// Where it will be seen, if that decides the page: see [`Drawing::seen`].
+    /// The place where it will be seen, if that decides the page: see [`Drawing::seen`].
     pub(crate) purpose: Option<Purpose>,
     /// Whether to grow the page and collapse namespaces until the text can be read.
     pub is_fitted: bool,
-    /// What lays out.
+    /// The layout engine.
     pub engine: &'static (dyn Engine + Sync),
-    /// Places of an earlier drawing, which are kept; what is new finds room beside them.
+    /// Places of an earlier drawing, which are kept; new elements are placed beside them.
     pub kept: Option<Places>,
 }
 
@@ -68,7 +68,7 @@ impl Drawing {
     /// The light style on a page of 1280×720 that may grow, as the command line has it.
     ///
     /// # Errors
-    /// None that a user can cause: the built-in style is tested.
+    /// None that a user can cause: the built-in style is known to be valid.
     pub fn new() -> crate::base::error::Result<Self> {
         Ok(Self {
             body: Body::default(),
@@ -86,7 +86,8 @@ impl Drawing {
 }
 
 impl Drawing {
-    /// The same for somebody who sees it there: page, size of text and furniture follow from that, whatever they were.
+    /// The same drawing for this place where it is seen: page, size of text and furniture follow from it, whatever they
+    /// were.
     #[must_use]
     pub fn seen(self, purpose: Purpose) -> Self {
         Self {
@@ -109,7 +110,7 @@ const READABLE: f64 = 9.0;
 /// The largest page that `--fit auto` grows to.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
 
-/// What is shown, on which page, and where.
+/// A view with its page and its layout.
 pub(super) struct Composed {
     pub(super) view: View,
     pub(super) options: ViewOptions,
@@ -188,7 +189,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     }
 }
 
-/// What is shown where nothing is drawn: everything asked for, without places.
+/// The view where nothing is drawn: everything asked for, without places.
 pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
     Composed {
         view: view(mission, &drawing.view).0,
@@ -199,7 +200,7 @@ pub(super) fn unplaced(mission: &Mission, drawing: &Drawing) -> Composed {
     }
 }
 
-/// What is shown where only the data itself is written: nothing.
+/// The view where only the data itself is written: an empty one.
 pub(super) fn unseen(drawing: &Drawing) -> Composed {
     Composed {
         view: View::default(),
@@ -210,19 +211,19 @@ pub(super) fn unseen(drawing: &Drawing) -> Composed {
     }
 }
 
-/// A layout of what some options show.
+/// A layout of the view that some options give.
 struct Attempt {
-    /// Without its windows where there is no layout.
+    /// The view; without its windows where there is no layout.
     view: View,
     notices: Notices,
-    /// `None` where so many boxes cannot be read, however they stand.
+    /// The layout; `None` where there are too many boxes to be read in any layout.
     layout: Option<Layout>,
     /// The size of its smallest text in pixels.
     text: f64,
 }
 
 impl Attempt {
-    /// A layout, if there is hope that it can be read or `--fit none` does not ask.
+    /// An attempt with a layout if it may be readable or `--fit none` was given, else without.
     fn new(
         mission: &Mission,
         drawing: &Drawing,
@@ -245,7 +246,7 @@ impl Attempt {
         Self::drawn(mission, drawing, options, page)
     }
 
-    /// A layout in any case.
+    /// An attempt with a layout in any case.
     fn drawn(
         mission: &Mission,
         drawing: &Drawing,
@@ -269,7 +270,7 @@ impl Attempt {
         }
     }
 
-    /// The same on a larger page.
+    /// The same attempt on a larger page.
     fn grown(
         self,
         mission: &Mission,
@@ -370,7 +371,7 @@ fn outermost(name: &str) -> Option<&str> {
     name.get(..end)
 }
 
-/// How many namespaces are tried to be opened again.
+/// The largest number of collapsed namespaces that are tried to be opened again.
 const MOST_REOPENED: usize = 24;
 
 /// Opens namespaces that were collapsed on the way and need not have been, the outermost first.
@@ -396,7 +397,7 @@ fn open_again(
     }
 }
 
-/// What `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
+/// The notices about what `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
 fn told(drawing: &Drawing, collapsed: &[Arc<str>], got: &PageOptions, text: f64) -> Notices {
     let mut notices = Notices::new();
     let is_readable = text >= drawing.readable();
@@ -447,7 +448,7 @@ fn so_that(is_readable: bool) -> &'static str {
     }
 }
 
-/// Where an earlier drawing had each item; `None` for those that are new.
+/// The place of each item in an earlier drawing; `None` for new ones.
 fn known(view: &View, kept: &Places) -> Vec<Option<Rect>> {
     let places: BTreeMap<(&str, &str), Rect> = kept
         .boxes

@@ -28,22 +28,22 @@ use crate::view::{View, ViewOptions, filtered, nothing};
 #[derive(Clone)]
 #[non_exhaustive]
 pub struct Render {
-    /// What to read.
+    /// The inputs and how they are read.
     pub reading: Reading,
-    /// What to draw.
+    /// The options of the picture.
     pub drawing: Drawing,
-    /// How the sequence runs.
+    /// The options of the sequence.
     pub sequence: options::SequenceOptions,
     /// Files and folders of the user's that are read beside the inputs, and never overwritten.
     pub kept: Vec<PathBuf>,
-    /// What to write.
+    /// The outputs to write.
     pub outputs: Vec<Output>,
     /// Whether data files hold the viewed graph only.
     pub is_filtered: bool,
 }
 
 impl Render {
-    /// Reads so and writes these, everything else as the command line has it.
+    /// A job that reads `reading` and writes `outputs`, with everything else as the command line has it.
     ///
     /// # Errors
     /// As [`Drawing::new`].
@@ -59,15 +59,15 @@ impl Render {
     }
 }
 
-/// What came of it.
+/// The outcome of `bagreel render`.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Rendered {
     /// The mission, as it was read.
     pub mission: Mission,
-    /// Everything worth saying, of the mission and of how it was drawn.
+    /// All notices, about the mission and about its drawing.
     pub notices: Notices,
-    /// What was written, in the order asked for.
+    /// The files written, by output in the order asked for.
     pub written: Vec<Written>,
 }
 
@@ -95,7 +95,7 @@ pub(crate) fn check(job: &Render) -> Result<()> {
     export::check(&job.outputs, &kept)
 }
 
-/// A figure needs an output that holds it, and lines for LaTeX need a figure.
+/// Refuses a figure without an output that holds it, and lines for LaTeX without a figure.
 fn check_figure(job: &Render) -> Result<()> {
     let holds = |o: &Output| o.format.whole != OneDrawing::Never && o.format.word != "tex";
     if job.sequence.figure.is_some() && !job.outputs.iter().any(holds) {
@@ -235,13 +235,14 @@ fn captions(mission: &Mission) -> Vec<String> {
     mission.windows.iter().map(|w| name(w.span.end)).collect()
 }
 
-/// More frames than this are told before they are drawn.
+/// The number of frames above which a note is given before they are drawn.
 const MANY_FRAMES: usize = 2000;
-/// Milliseconds of one core for a frame, and for each of its megapixels: measured with `tests/bench/drawing.rs`, and
-/// half as much again.
+/// Milliseconds of one core for a frame, and for each of its megapixels: one and a half times the time measured with
+/// `tests/bench/drawing.rs`.
 const FRAME_MS: (f64, f64) = (4.0, 13.0);
 
-/// What to know before a job of very many frames begins: how many, for how long, and what would be sensible.
+/// The note before a job of very many frames: their number, the time it takes, and a sensible alternative; `None` for
+/// others.
 fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     let is_drawn = |o: &Output| o.format.is_drawn && o.format.whole != OneDrawing::Asked;
     let frames = sequence.frame_times().len();
@@ -268,7 +269,7 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
     ))
 }
 
-/// So many life lines fit below a frame.
+/// The number of life lines that fit below a frame.
 const MOST_LIVES: usize = 14;
 
 /// Writes a mission whose picture is the topic board.

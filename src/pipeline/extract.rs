@@ -22,31 +22,31 @@ use crate::view::NameFilter;
 pub struct Extract {
     /// Bags, whose messages become one table, or one set of tables.
     pub inputs: Vec<Input>,
-    /// A file; the folder of the tables with `fields`.
+    /// The file to write; with `fields` the folder of the tables.
     pub target: Target,
-    /// How tables are written.
+    /// The format of the tables.
     pub format: TableFormat,
     /// Whether messages are decoded.
     pub fields: bool,
     /// The topics to take.
     pub topics: NameFilter,
-    /// Leave out what lies before.
+    /// The moment before which messages are left out.
     pub start: Option<Moment>,
-    /// Leave out what lies after.
+    /// The moment after which messages are left out.
     pub end: Option<Moment>,
 }
 
-/// What came of it.
+/// The outcome of `bagreel extract`.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Extracted {
-    /// How many tables were written.
+    /// The number of tables written.
     pub tables: usize,
-    /// How many rows they have together.
+    /// The number of their rows in all.
     pub rows: u64,
-    /// Messages that could not be decoded.
+    /// The number of messages that could not be decoded.
     pub undecoded: u64,
-    /// What is worth saying.
+    /// The notices for the user.
     pub notices: Notices,
 }
 
@@ -71,8 +71,8 @@ impl Extract {
         inputs.map(|i| bag::open(i, &options)).collect()
     }
 
-    /// The part of the bags that is asked for; `None` for all of it. Where no tail tells when they begin and end, they
-    /// are read for it.
+    /// The part of the bags that is asked for; `None` for all of it. Bags whose tails do not tell when they begin and
+    /// end are read for it.
     fn range(&self, watch: &mut dyn Watch) -> Result<Option<Span>> {
         if self.start.is_none() && self.end.is_none() {
             return Ok(None);
@@ -89,7 +89,7 @@ impl Extract {
         span.map(|span| window::range(&division, span)).transpose()
     }
 
-    /// As [`Extract::open`]; what flows by cannot be read twice.
+    /// As [`Extract::open`], but refuses pipes, which cannot be read twice.
     fn open_files(&self) -> Result<Vec<Box<dyn Reader>>> {
         if self.inputs.iter().any(Input::is_pipe) {
             return Err(Error::usage(
@@ -110,7 +110,7 @@ impl Extract {
     }
 }
 
-/// The error for a user who broke off.
+/// Fails with [`Error::Interrupted`] if the user asked to stop.
 fn stop(watch: &dyn Watch) -> Result<()> {
     if watch.stopped() {
         return Err(Error::Interrupted);
@@ -118,7 +118,7 @@ fn stop(watch: &dyn Watch) -> Result<()> {
     Ok(())
 }
 
-/// What is said of a bag of which something was lost.
+/// The notice about a bag of which something was lost without one.
 fn of_report(report: &Report, notices: &Notices) -> Option<Notice> {
     use crate::base::notice::NoticeKind::Damaged;
     let silent = !report.complete && !notices.any_loss();

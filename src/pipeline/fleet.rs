@@ -1,12 +1,13 @@
-//! Many bags as two tables: what is counted of each bag by itself, what merges, and what is only known at the end.
+//! Many bags as two tables: counts of each bag by itself, counts merged, and the mission made of them at the end.
 //!
 //! ```text
 //! plan ──> count (each bag, or each part of its time, anywhere) ──> merge ──> finish (each mission)
 //! ```
 //!
-//! A [`FleetPlan`] names the bags and fixes where windows begin, before anything is counted. [`count()`] is a pure function of
-//! one bag and reads its index only. [`merge`] makes one of what was counted of the parts of a bag. [`finish()`] makes the
-//! [`Mission`](crate::Mission) of one mission's counts: states, changes and all that needs the whole.
+//! A [`FleetPlan`] names the bags and fixes where windows begin, before anything is counted. [`count`] is a pure
+//! function of one bag and reads its index only. [`merge`] makes one list of the counts of the parts of a bag.
+//! [`finish`] makes the [`Mission`](crate::Mission) of one mission's counts: states, changes and all that needs the
+//! whole.
 
 #[cfg(feature = "parquet")]
 pub mod arrow;

@@ -1,4 +1,4 @@
-//! Judging: read the expectation, read the mission, hold one against the other, write what was found.
+//! Judging: reads the expectation and the mission, holds one against the other, writes the findings.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -32,14 +32,14 @@ pub(crate) struct Check {
     /// The bags as they were typed.
     pub(crate) bags: Vec<String>,
     pub(crate) links: Vec<(String, String)>,
-    /// Whether what cannot be decided is an error.
+    /// Whether undecidable facts are errors.
     pub(crate) is_strict: bool,
-    /// A file that Markdown is written behind, not over.
+    /// A file that Markdown is appended to.
     pub(crate) append_to: Option<PathBuf>,
 }
 
 impl Check {
-    /// What the reports are about.
+    /// The subject of the reports.
     pub(crate) fn subject<'a>(&self, mission: &'a Mission) -> Subject<'a> {
         // Services that show findings beside the file compare its name with those of the repository.
         let file = self.expect.display().to_string();
@@ -53,7 +53,7 @@ impl Check {
     }
 }
 
-/// What came of it.
+/// The outcome of `bagreel check`.
 pub(crate) struct CheckResult {
     pub(crate) mission: Mission,
     pub(crate) verdict: Verdict,
@@ -110,11 +110,11 @@ pub(crate) struct DiffJob {
     pub(crate) drawing: Drawing,
 }
 
-/// What came of it.
+/// The outcome of `bagreel diff`.
 pub(crate) struct Compared {
     pub(crate) missions: Vec<Mission>,
     pub(crate) differences: Vec<Difference>,
-    /// What is worth knowing of the pictures.
+    /// Remarks for the user about the pictures.
     pub(crate) remarks: Vec<String>,
 }
 
@@ -165,27 +165,27 @@ const MOVING: [&str; 5] = ["gif", "apng", "html", "mp4", "webm"];
 
 /// The whole job of `bagreel baseline`.
 pub(crate) struct Baseline {
-    /// Each a run of its own.
+    /// The runs to write down, each read by itself.
     pub(crate) runs: Vec<Reading>,
-    /// The expectation to bring up to date, if one is.
+    /// The expectation to bring up to date; `None` to write a new one.
     pub(crate) update: Option<PathBuf>,
     /// The names to bring up to date; all if empty.
     pub(crate) only: Vec<String>,
     pub(crate) output: Target,
 }
 
-/// What came of it.
+/// The outcome of `bagreel baseline`.
 pub(crate) struct BaselineWritten {
     pub(crate) missions: Vec<Mission>,
-    /// Facts that were written anew.
+    /// The number of facts that were written anew.
     pub(crate) changed: usize,
-    /// Findings that are left.
+    /// The number of findings that are left.
     pub(crate) left: usize,
-    /// Nodes and topics that found no room.
+    /// The number of nodes and topics left out for lack of room.
     pub(crate) left_out: usize,
 }
 
-/// Writes down what runs have in common, or brings an expectation up to date.
+/// Writes an expectation that holds in all runs, or brings one up to date.
 ///
 /// # Errors
 /// Where the expectation or a run cannot be read, or the output cannot be written.

@@ -12,22 +12,23 @@ use crate::mission::activity::Activity;
 use crate::mission::ledger::Phase;
 use crate::mission::phases::{of_spans, phases};
 
-/// Where phases and their names come from.
+/// The source of phases and of their names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Phases {
-    /// They are found, and told by what they change.
+    /// They are found, and named by what they change.
     #[default]
     Found,
     /// There are none.
     None,
-    /// From a file: lines `0:38 navigation` say when they begin; lines without a time name those that are found.
+    /// A file: lines `0:38 navigation` give the time at which a phase begins; lines without a time name those that are
+    /// found.
     File(PathBuf),
-    /// From a file of `seconds|text` lines, or from a string topic of the bags.
+    /// A file of `seconds|text` lines, or a string topic of the bags.
     Captions(String),
 }
 
 impl Phases {
-    /// The topic whose texts they are; `None` where they come from elsewhere.
+    /// The topic whose texts name them; `None` where they come from elsewhere.
     pub(super) fn topic(&self) -> Option<&str> {
         match self {
             Self::Captions(from) if !Path::new(from).is_file() => Some(from),
@@ -41,7 +42,8 @@ impl Phases {
     }
 }
 
-/// What phases are made of: what lives when, the texts of the topic that tells them, and those of an earlier run.
+/// The sources of phases: the activity of the mission, the texts of the topic that tells them, and the phases of an
+/// earlier run.
 pub(super) struct Basis<'a> {
     pub(super) elements: &'a Elements,
     pub(super) activity: &'a Activity,
@@ -52,8 +54,8 @@ pub(super) struct Basis<'a> {
 /// The phases that `reading` asks for.
 ///
 /// # Errors
-/// [`Error::BadFile`] for a line that says no phase, more names than phases, or times out of order; [`Error::Usage`]
-/// for captions of which there are none.
+/// [`Error::BadFile`] for a line that is not a phase, more names than phases, or times out of order; [`Error::Usage`]
+/// for captions that are not there.
 pub(super) fn wanted(reading: &Reading, basis: Basis<'_>) -> Result<Vec<Phase>> {
     match &reading.phases {
         Phases::None => Ok(Vec::new()),
@@ -75,8 +77,8 @@ impl Basis<'_> {
         }
     }
 
-    /// Phases that begin at these times, sorted, under these names. What comes before the first of them is a phase
-    /// under a name of our own.
+    /// Phases that begin at these times, sorted, under these names. The time before the first of them is a phase under
+    /// a name of our own.
     fn at(&self, begins: &[(Stamp, String)]) -> Vec<Phase> {
         let whole = self.activity.span();
         let begins = begins.iter().filter(|(at, _)| *at < whole.end);
@@ -105,7 +107,7 @@ impl Basis<'_> {
     }
 }
 
-/// One line: when it begins, if it says so, and its name.
+/// One line: the time at which a phase begins, if it is given, in nanoseconds after the mission's start, and its name.
 type CaptionLine = (Option<i64>, String);
 
 fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
@@ -197,7 +199,7 @@ fn captions_of_file(text: &str, path: &Path) -> Result<Vec<(i64, String)>> {
         captions.push(caption.ok_or_else(|| Error::BadFile {
             path: path.to_owned(),
             line: number + 1,
-            reason: format!("`{line}` is no caption"),
+            reason: format!("`{line}` is not a caption"),
             hint: "write `seconds|text`, such as `90|picking`".to_owned(),
         })?);
     }
@@ -221,6 +223,9 @@ mod tests {
             ]
         );
         let error = read("0|a\nsoon|b\n").unwrap_err();
-        assert_eq!(error.to_string(), "`c.txt` line 2: `soon|b` is no caption");
+        assert_eq!(
+            error.to_string(),
+            "`c.txt` line 2: `soon|b` is not a caption"
+        );
     }
 }

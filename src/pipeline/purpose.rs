@@ -1,10 +1,10 @@
-//! Where a picture will be seen, and what page that asks for: its text must be read there.
+//! The place where a picture will be seen, and the page that suits it: its text must be readable there.
 
 use crate::base::error::{Error, Result};
 use crate::base::geometry::Size;
 use crate::draw::picture::PageOptions;
 
-/// Where the picture will be seen.
+/// The place where the picture will be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// On a repository's front page, which is at most 830 pixels wide.
@@ -19,7 +19,7 @@ pub enum Purpose {
 
 /// Pixels per millimetre on paper, 96 to the inch.
 const PX_PER_MM: f64 = 96.0 / 25.4;
-/// The highest that a drawing may be on paper, in millimetres.
+/// The largest height of a drawing on paper, in millimetres.
 const HIGHEST: f64 = 225.0;
 /// The smallest text of the style's furniture, in its pixels.
 const FURNITURE: f64 = 10.5;
@@ -41,7 +41,7 @@ impl Purpose {
         let found = Self::ALL.iter().find(|(name, _)| *name == word);
         found.map(|(_, purpose)| *purpose).ok_or_else(|| {
             Error::usage(
-                format!("`{word}` is no place where pictures are seen"),
+                format!("`{word}` is not a place where pictures are seen"),
                 "places: readme, slide, column, page",
             )
         })
@@ -89,7 +89,7 @@ impl Purpose {
         }
     }
 
-    /// What to do where the graph cannot be made readable.
+    /// The advice where the graph cannot be made readable.
     pub(crate) fn advice(self) -> &'static str {
         match self {
             Self::Readme | Self::Slide => {

@@ -1,4 +1,5 @@
-//! From bags to the mission: collect, conclude, find the phases, divide time, build the graphs; each value is made once.
+//! From bags to the mission: collects, concludes, finds the phases, divides time, builds the graphs; each value is made
+//! once.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,34 +24,34 @@ use crate::mission::activity::{self, Activity, Cell};
 use crate::mission::ledger::{self, Ledger};
 use crate::mission::{Mission, Window, read_json};
 
-/// What to read and how.
+/// The inputs of a mission and the options of reading them.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Reading {
-    /// Bags of one mission, or one evolution.
+    /// Bags of one mission, or one mission's own JSON.
     pub inputs: Vec<Input>,
     /// Whether to read everything by a second reader too, and compare.
     pub verify: bool,
-    /// How time is divided.
+    /// The division of time into windows.
     pub division: Division,
     /// Whether to merge runs of windows without a change.
     pub skip_unchanged: bool,
-    /// What to look at while reading.
+    /// The options of collecting evidence.
     pub collect: collector::CollectOptions,
-    /// What is added to what the bags tell.
+    /// The additions to what the bags tell.
     pub conclude: conclude::ConcludeOptions,
-    /// Windows of silence before something that never speaks again counts as gone.
+    /// The number of windows of silence after which an element that never speaks again counts as gone.
     pub grace: usize,
     /// The source code to read once the recording's day is known; takes the place of `conclude.code`.
     pub code: Option<SourceCode>,
-    /// The share by which a rate must change to count, 0...
+    /// The share by which a rate must change to count, ≥ 0.
     pub rate_change: f64,
-    /// Where phases and their names come from.
+    /// The source of phases and of their names.
     pub phases: Phases,
 }
 
 impl Default for Reading {
-    /// Nothing yet, with every option as the command line has it.
+    /// No inputs, with every option as the command line has it.
     fn default() -> Self {
         Self {
             inputs: Vec::new(),
@@ -68,7 +69,8 @@ impl Default for Reading {
 }
 
 impl Reading {
-    /// Bags of one mission by their paths or URLs, or one mission's own JSON, with every option as the command line has it.
+    /// The reading of one mission's bags by their paths or URLs, or of its own JSON, with every option as the command
+    /// line has it.
     pub fn of<P: Into<PathBuf>>(paths: impl IntoIterator<Item = P>) -> Self {
         let inputs = paths.into_iter().map(|path| Input::parse(path.into()));
         Self {
@@ -77,7 +79,7 @@ impl Reading {
         }
     }
 
-    /// The same with phases from elsewhere.
+    /// The same reading with phases from another source.
     #[must_use]
     pub fn with_phases(mut self, phases: Phases) -> Self {
         self.collect.texts_of = phases.topic().map(str::to_owned);
@@ -94,8 +96,8 @@ pub fn read(reading: &Reading, watch: &mut dyn Watch) -> Result<Mission> {
     explain(reading, watch).map(|(mission, _)| mission)
 }
 
-/// Reads the inputs into a mission, with every piece of evidence on the elements that `reading` asks about, sorted
-/// by time. An evolution that is read holds no such pieces.
+/// Reads the inputs into a mission, with every piece of evidence on the elements that `reading` asks about, sorted by
+/// time. A mission read from JSON holds no such pieces.
 ///
 /// # Errors
 /// As [`read`].
@@ -122,7 +124,7 @@ pub fn explain(reading: &Reading, watch: &mut dyn Watch) -> Result<(Mission, Vec
     Ok((mission, findings.lines))
 }
 
-/// The path of the evolution that is the only input; `None` for bags.
+/// The path of the mission's JSON that is the only input; `None` for bags.
 ///
 /// # Errors
 /// Where it cannot be read.
@@ -135,7 +137,7 @@ pub(crate) fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
     }
 }
 
-/// Refuses what only bags can be asked.
+/// Refuses options that only apply to bags.
 fn refuse(reading: &Reading, path: &Path) -> Result<()> {
     let source = reading.code.is_some().then_some("`--source` adds to bags");
     let division = &reading.division;
@@ -187,7 +189,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     Ok(mission)
 }
 
-/// What follows from what was read, with the source code as it was on the recording's day.
+/// The findings from everything read, with the source code as it was on the recording's day.
 fn concluded(collected: &Collected, reading: &Reading) -> Result<Findings> {
     let mut options = reading.conclude.clone();
     if let Some(wanted) = &reading.code {
@@ -247,7 +249,7 @@ fn mission(
     })
 }
 
-/// The windows: equal ones, or from turn to turn.
+/// The windows: equal ones, or from change to change.
 fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
     let windows = match reading.division.cut {
         None => return window::divide(&reading.division, span),
@@ -266,7 +268,7 @@ fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
     Ok(windows)
 }
 
-/// The graphs on the grid that no `--period` moves.
+/// The graphs on the grid of cells, which does not depend on `--period`.
 fn activity(
     history: &History,
     span: Span,
@@ -281,7 +283,7 @@ fn activity(
     })
 }
 
-/// What happened, and in which phases.
+/// The ledger: the events of the mission, and its phases.
 fn told(
     history: &History,
     activity: &Activity,
@@ -307,7 +309,7 @@ fn told(
     })
 }
 
-/// The windows with their graphs, and what changed from each to the next.
+/// The windows, and the changes from each to the next.
 fn list(windows: &Windows, windowed: &Windowed, history: &History, ledger: &Ledger) -> Vec<Window> {
     let graphs = windows.spans.iter().copied().zip(&windowed.graphs);
     let changes = ledger::explain(graphs, &history.elements, ledger);

@@ -18,7 +18,7 @@ pub fn survey_file(rows: &[SurveyRow], format: TableFormat) -> Result<Vec<u8>> {
     writer::whole(format, &survey_table(rows))
 }
 
-/// How deep below the folder bags are looked for.
+/// The depth below the folder to which bags are searched.
 const DEEPEST: usize = 16;
 
 /// Whether `input` is a folder of bags, and not one recording with nothing beside it.
@@ -37,7 +37,7 @@ pub fn is_survey(input: &Input) -> bool {
     !is_one
 }
 
-/// What was found of the bags below a folder.
+/// The survey of the bags below a folder.
 pub struct Survey {
     /// One row per bag, sorted by path; a bag that cannot be read has a row that says why.
     pub rows: Vec<SurveyRow>,
@@ -166,7 +166,7 @@ fn numbered(path: &Path) -> Option<String> {
     is_number.then(|| stem.to_owned())
 }
 
-/// Whether a path is a bag by its first bytes, or calls itself one: a broken bag has its row too.
+/// Whether a path is a bag by its first bytes, or has the ending of one: a broken bag has its row too.
 fn is_bag(path: &Path) -> bool {
     let named = path.is_file()
         && bag::FORMATS

@@ -1,4 +1,5 @@
-//! Everything one by one on a page of a screen's shape: what pages and reports show, whatever the picture folds.
+//! The view with every element one by one, on a page of a screen's shape, for pages and reports, whatever the picture
+//! folds.
 
 use super::Drawing;
 use crate::base::geometry::Size;
@@ -16,7 +17,7 @@ pub(super) fn opened(mission: &Mission, drawing: &Drawing, outputs: &[Output]) -
     is_asked.then(|| view(mission, &drawing.view.opened(&mission.elements)).0)
 }
 
-/// What draws it; `None` where no output is a page.
+/// The picture of that view; `None` where no output is a page.
 pub(super) fn drawn<'a>(
     view: &'a View,
     drawing: &'a Drawing,

@@ -1,4 +1,4 @@
-//! `--verify`: everything a second time by an independent reader, and what both count.
+//! `--verify`: reads everything a second time by an independent reader, and compares the counts of both.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use crate::base::time::Span;
 use crate::graph::window::divide;
 use crate::graph::{TopicCount, counts};
 
-/// What a second reading says of the bags.
+/// The outcome of a second reading of the bags.
 pub(super) struct Verified {
     pub(super) reports: Vec<Report>,
     pub(super) notices: Vec<Notice>,
@@ -20,7 +20,7 @@ pub(super) struct Verified {
 /// Reads the bags again and compares what both readings count.
 ///
 /// # Errors
-/// Where somebody stops it; a bag that cannot be read again is a notice.
+/// Where the user stops it; a bag that cannot be read again is a notice.
 pub(super) fn verify(
     first: &Collected,
     reading: &Reading,
@@ -41,7 +41,7 @@ pub(super) fn verify(
     }
 }
 
-/// Notices where the second reader counts otherwise than the first, and what it could not verify.
+/// The notices where the second reader counts otherwise than the first, and about bags that it could not verify.
 fn compare(first: &Collected, second: &Collected, reading: &Reading) -> Result<Verified> {
     let windows = divide(&reading.division, first.range)?;
     let (ours, theirs) = (
@@ -89,7 +89,7 @@ fn counted(collected: &Collected, windows: &[Span]) -> Result<BTreeSet<TopicCoun
     Ok(counts(&collected.recorded, windows)?.into_iter().collect())
 }
 
-/// Says of which bags not everything could be verified.
+/// The notices about bags of which not everything could be verified.
 fn unverified(first: &Collected, second: &Collected) -> Vec<Notice> {
     let both = first.reports.iter().zip(&second.reports);
     let notice = |(bag, again): (&Report, &Report)| {

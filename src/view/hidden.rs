@@ -110,7 +110,7 @@ mod tests {
     use crate::view::testing::mission;
     use crate::view::{Hide, NameFilter, ViewOptions, view};
 
-    /// What is told, as `count text`.
+    /// The notices, each as `count text`.
     fn told(window: &str, options: &ViewOptions) -> Vec<String> {
         let (_, notices) = view(&mission(&[window]), options);
         notices

@@ -333,7 +333,7 @@ fn arrow((from, to, kind): ArrowEnds, members: Vec<Element>) -> Arrow {
 }
 
 /// The collapsed namespaces that topics are part of: that of all their publishers; without any, that of their name.
-/// What several boxes publish is told by the arrows alone.
+/// Topics that several boxes publish are told by the arrows alone, so they are in none.
 fn inside(
     elements: &Elements,
     collapse: &Collapse<'_>,

@@ -1,7 +1,7 @@
 //! The lives of elements by the ledger: one without a beginning in it was there before, one without an end stays.
 //!
-//! What the picture shows follows from this and not from what happened to be heard in a window, so that nothing comes,
-//! goes or changes its look without an entry that says so.
+//! The picture follows from these and not from the messages that fall into a window, so that nothing comes, goes or
+//! changes its look without an entry that says so.
 
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Edge, Element, Elements};

@@ -1,4 +1,4 @@
-//! What can be typed behind `diff`, `baseline` and `check`.
+//! The arguments of `diff`, `baseline` and `check`.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -46,7 +46,7 @@ pub(crate) struct DiffArgs {
 }
 
 impl DiffArgs {
-    /// Which part of the missions is compared.
+    /// The part of the missions that is compared.
     pub(crate) fn time(&self) -> GateTime {
         GateTime {
             period: None,

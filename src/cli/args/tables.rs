@@ -1,4 +1,4 @@
-//! What can be typed after `bagreel tables`.
+//! The arguments of `bagreel tables`.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! What the script of a page is given: names, facts and runs as JSON, deflated where that is long.
+//! The data for the script of a page: names, facts and runs as JSON, deflated where that is long.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -24,49 +24,49 @@ use crate::mission::ledger::Kind;
 use crate::view::runs::ElementRuns;
 use crate::view::{Arrow, ArrowKind, Frame, Item};
 
-/// From this many bytes on, data is deflated.
+/// The number of bytes from which on data is deflated.
 const LONG: usize = 1_000_000;
 
-/// What the script is given. This is the one place that says so; `player/data.js` reads it.
+/// The data for the script, defined here alone; `player/data.js` reads it.
 ///
 /// Times are seconds since the start of the first window. An *element* is a number: items first, then arrows in the
 /// order in which they are painted, both of the graph with everything one by one unless said otherwise. A *run list*
 /// is `[windows since the run before, value, …]`; a value holds until the next.
 #[derive(Serialize)]
 struct PageData<'a> {
-    /// Everything one by one; then the picture, if that draws several as one.
+    /// The graph with every element one by one; then that of the picture, if that draws several elements as one.
     graphs: Vec<GraphData<'a>>,
-    /// Sentences that `facts` point at.
+    /// The sentences that `facts` refer to.
     words: Vec<String>,
-    /// Of each window, its start and its end.
+    /// The start and the end of each window.
     starts: Vec<f64>,
     ends: Vec<f64>,
     /// Milliseconds since 1970 at the start of the first window, and the date.
     epoch: i64,
     date: String,
-    /// Of each window with headlines: what they say.
+    /// The headlines of each window that has any.
     told: Vec<ToldData>,
     /// Start, end and name of each phase.
     phases: Vec<(f64, f64, String)>,
     /// The life lines, from top to bottom.
     rows: Vec<RowData>,
-    /// Hand-overs: when, and from which row to which.
+    /// Hand-overs: the time, the row before and the row after.
     hands: Vec<(f64, usize, usize)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
-    /// What each window shows, where two missions are compared; absent otherwise.
+    /// The titles of the two windows where two missions are compared; absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     sides: Option<[&'static str; 2]>,
     /// The window to begin with.
     still: usize,
-    /// From which relative change of a rate on it is told.
+    /// The least relative change of a rate that is told.
     change: f64,
 }
 
 /// A graph.
 #[derive(Serialize)]
 struct GraphData<'a> {
-    /// Per item.
+    /// Per item: its name.
     names: Vec<String>,
     /// Per item: 0 node, 1 topic, 2 group of topics, 3 namespace.
     kinds: Vec<u8>,
@@ -83,22 +83,23 @@ struct GraphData<'a> {
     /// Per element, run lists: of classes, of rates, of lifecycle states, and of changes of rates, whose values hold
     /// for one window. Empty lists at the end are left out.
     lives: Vec<&'a ElementRuns>,
-    /// Per item of the picture: which items it stands for.
+    /// Per item of the picture: the items it stands for.
     holds: Vec<Vec<u32>>,
 }
 
-/// What a window tells: its place, how many headlines there are, the words of the three chips, and of the first
-/// [`MOST_TOLD`] when, which sign (0 came, 1 went, 2 changed), of which element (-1 of none that is drawn), what.
+/// The headlines of a window: its place, the number of headlines, the words of the three chips, and for each of the
+/// first [`MOST_TOLD`] headlines its time, its sign (0 came, 1 went, 2 changed), its element (-1 for one that is not
+/// drawn), its words.
 #[derive(Serialize)]
 struct ToldData(usize, usize, [String; 3], Vec<(f64, u8, i64, String)>);
 
-/// A life line: its element (-1 for a namespace's title), its name, 1 below such a title, its lives as
-/// `[start, end, flags, …]` (1 it began, 2 it ended, 4 by inference only), and when it sent as
-/// `[start, end, ninths of its highest rate, …]`.
+/// A life line: its element (-1 for a namespace's title), its name, 1 below such a title, its lives as `[start, end,
+/// flags, …]` (1 it began, 2 it ended, 4 by inference only), and its times of sending as `[start, end, ninths of its
+/// highest rate, …]`.
 #[derive(Serialize)]
 struct RowData(i64, String, u8, Vec<f64>, Vec<f64>);
 
-/// So many headlines of one window are written out.
+/// The largest number of headlines of one window that are written out.
 const MOST_TOLD: usize = 200;
 
 /// The data as JSON that is safe between the tags of a page.
@@ -148,12 +149,12 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         .replace('<', "\\u003c")
 }
 
-/// Seconds since a moment.
+/// A moment from which seconds are counted.
 #[derive(Clone, Copy)]
 struct PageClock(Stamp);
 
 impl PageClock {
-    /// Whole milliseconds, rounded down, as everywhere.
+    /// The seconds from that moment to `at`, rounded down to whole milliseconds, as everywhere.
     fn secs(self, at: Stamp) -> f64 {
         at.since(self.0).div_euclid(1_000_000) as f64 / 1e3
     }
@@ -322,7 +323,7 @@ fn rounded(rect: Rect) -> [i64; 4] {
     [whole(rect.x), whole(rect.y), whole(rect.w), whole(rect.h)]
 }
 
-/// Sentences, each once.
+/// A table of sentences, each once.
 #[derive(Default)]
 struct Words {
     list: Vec<String>,
@@ -341,7 +342,7 @@ impl Words {
     }
 }
 
-/// More members than this are counted.
+/// The largest number of members that are named; more are only counted.
 const MOST_MEMBERS: usize = 12;
 
 fn facts_of(
@@ -391,7 +392,7 @@ fn facts_of(
         .collect()
 }
 
-/// Of topics: their types, and with which quality of service they are offered.
+/// The types of topics, and the quality of service with which they are offered.
 fn types(elements: &Elements, members: &[Element]) -> Vec<String> {
     let mut topics = members.iter().filter_map(|m| topic(elements, *m));
     let types = topics.clone().flat_map(|t| t.types.iter());

@@ -20,7 +20,7 @@ pub(crate) fn start<'a>(
     AtOnce::start(target, move || (page(sequence, &style), Vec::new()))
 }
 
-/// The page of everything one by one, and of the picture where that folds something.
+/// The page with every element one by one, and with the picture where that folds something.
 fn page(sequence: &Sequence<'_>, style: &Style) -> String {
     let overview = sequence.picture.overview();
     let opened = sequence

@@ -22,7 +22,7 @@ const MARKS: [Mark; 9] = [
     Mark::Inside,
 ];
 
-/// The definitions of all badges: what happens to two windows that are compared may not happen in any.
+/// Writes the definitions of all badges, for a comparison of two windows may need one that no window shows.
 pub(super) fn badges(xml: &mut Xml, style: &Style) {
     xml.open("defs");
     for mark in MARKS {
@@ -34,7 +34,7 @@ pub(super) fn badges(xml: &mut Xml, style: &Style) {
 const BOX: &str = "<rect x=\"5\" y=\"4\" width=\"26\" height=\"12\" rx=\"2\"/>";
 const LINE: &str = "<path d=\"M3 10h24\"/><path d=\"M34 10l-8-4v8z\"/>";
 
-/// What the signs that occur in these views mean, as HTML.
+/// The meaning of the signs that occur in these views, as HTML.
 pub(super) fn legend(views: &[&View], rate_change: f64) -> String {
     let mut out = String::new();
     let mut told: Vec<String> = Vec::new();

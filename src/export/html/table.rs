@@ -1,4 +1,4 @@
-//! What changed as a table of HTML, for readers without scripts, for paper, and for links into the mission.
+//! The changes as a table of HTML, for readers without scripts, for paper, and for links into the mission.
 
 use crate::base::words;
 use crate::base::words::visible;
@@ -6,17 +6,17 @@ use crate::draw::paint::xml::Xml;
 use crate::draw::picture::title::SIDES;
 use crate::view::{Frame, View};
 
-/// More windows with changes than this are counted.
+/// The largest number of windows with changes that have a row; more are only counted.
 const MOST_ROWS: usize = 200;
 
-/// So many phrases are written out in one row; the rest is counted.
+/// The largest number of phrases that are written out in one row; the rest is counted.
 const MOST_PHRASES: usize = 5;
 
 fn is_told(frame: &Frame) -> bool {
     !frame.headlines.is_empty()
 }
 
-/// How many windows there are, and how many of them have changes.
+/// The number of windows, and of those with changes, in words.
 pub(super) fn summary(view: &View) -> String {
     let all = view.frames.len();
     if view.compares {
@@ -29,7 +29,7 @@ pub(super) fn summary(view: &View) -> String {
     }
 }
 
-/// A row per window with changes: its time as a link, and what changed in words.
+/// A row per window with changes: its time as a link, and its changes in words.
 pub(super) fn rows(view: &View) -> String {
     let mut xml = Xml::default();
     let Some(start) = view.frames.first().map(|f| f.span.start) else {

@@ -18,7 +18,7 @@ struct Charts<'a> {
     target: Target,
 }
 
-/// Begins a file per window; without `{n}` one file with the single window or the union of all.
+/// Begins the files, one per window; without `{n}` one file with the single window or the union of all.
 pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,
@@ -58,7 +58,8 @@ impl Encoder for Charts<'_> {
     }
 }
 
-/// What Mermaid refuses to draw unless it is configured otherwise (its `maxEdges` and `maxTextSize`).
+/// The numbers of edges and of characters above which Mermaid refuses to draw unless it is configured otherwise (its
+/// `maxEdges` and `maxTextSize`).
 const MOST: (usize, usize) = (500, 50_000);
 
 fn too_large(target: &Target, edges: usize, bytes: usize) -> Option<String> {

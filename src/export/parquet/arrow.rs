@@ -1,4 +1,4 @@
-//! A table in memory as an Arrow record batch, for whoever shares our memory; and rows of one taken back.
+//! A table in memory as an Arrow record batch, for programs that share our memory; and rows of one taken back.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What changed when, in full names: a row per window, and a row per phase.
+//! The changes with their times, in full names: a row per window, and a row per phase.
 
 use super::escape::plain;
 use super::{MOST_CHANGES, MOST_OPEN, ReportTimes, tables};
@@ -9,9 +9,9 @@ use crate::mission::events::sentence_with;
 use crate::mission::ledger::Kind;
 use crate::view::{Frame, Headline, View};
 
-/// So many names are given of things of one kind.
+/// The largest number of names given of things of one kind.
 const MOST_NAMES: usize = 12;
-/// So many things are told one by one of a window.
+/// The largest number of things of a window that are told one by one.
 const MOST_TOLD: usize = 12;
 
 /// The phases, folded; nothing where there is only one.
@@ -51,7 +51,7 @@ pub(super) fn table(mission: &Mission, view: &View, times: &ReportTimes<'_>) -> 
     out
 }
 
-/// What of things of one kind is told together.
+/// The kinds of headlines of which several are told together, with their words.
 const TOGETHER: [(Kind, &str, &str); 5] = [
     (Kind::Started, "node", "started"),
     (Kind::Stopped, "node", "stopped"),
@@ -60,7 +60,7 @@ const TOGETHER: [(Kind, &str, &str); 5] = [
     (Kind::Vanished, "connection", "ended"),
 ];
 
-/// `2 nodes started: /a, /b; /t handed over: /a → /b`, as Markdown.
+/// The changes of a window as Markdown: `2 nodes started: /a, /b; /t handed over: /a → /b`.
 fn told(mission: &Mission, frame: &Frame) -> String {
     let elements = &mission.elements;
     let mut parts = Vec::new();
@@ -85,13 +85,13 @@ fn told(mission: &Mission, frame: &Frame) -> String {
     parts.join("; ")
 }
 
-/// Topics of unknown publishers come and go by themselves.
+/// Whether headlines of this kind are told together; topics of unknown publishers come and go by themselves.
 fn is_together(headline: &Headline) -> bool {
     let kinds = TOGETHER.iter().any(|(kind, ..)| *kind == headline.kind);
     kinds && !matches!(headline.what, Element::Topic(_))
 }
 
-/// The role of a node, the name of a topic, both ends of an edge.
+/// The name of an element: the role of a node, the name of a topic, both ends of an edge.
 fn name(elements: &Elements, what: Element) -> String {
     let (node, topic) = elements.ends(what);
     let node = node.map(|id| &*elements.nodes[id as usize].role);

@@ -7,7 +7,7 @@ use crate::export::sequence::Sequence;
 use crate::export::target::Target;
 use crate::export::{AtOnce, Encoder};
 
-/// Begins the report; it follows what is in the file already if that is the file to append to.
+/// Begins the report; it follows the text already in the file if that is the file to append to.
 ///
 /// # Errors
 /// As [`AtOnce::start`]; as [`file::read_text`] for the file to append to.

@@ -1,10 +1,10 @@
-//! Words from a bag inside Markdown: no markup, no HTML, no mention, no link comes of them.
+//! Words from a bag escaped for Markdown, so that they make no markup, no HTML, no mention and no link.
 
 use std::fmt::Write as _;
 
 use crate::base::words::visible;
 
-/// Longer words are cut, so that one hostile name cannot fill a report.
+/// The largest number of characters of a text; a longer one is cut, so that one hostile name cannot fill a report.
 const LONGEST: usize = 600;
 
 /// `text` as it is, in one line of Markdown or a cell of a table.

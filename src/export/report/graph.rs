@@ -9,9 +9,9 @@ const MOST_EDGES: usize = 60;
 /// The most boxes that are drawn.
 const MOST_ITEMS: usize = 80;
 
-/// Everything that changed during the mission with what it is connected to, as one window, and how many edges were
-/// left out; `None` where nothing changed. An element is marked added or removed if it is there only at the end or
-/// only at the start, else changed if it ever was.
+/// Everything that changed during the mission with what it is connected to, as one window, and the number of edges left
+/// out; `None` where nothing changed. An element is marked added or removed if it is there only at the end or only at
+/// the start, else changed if it ever was.
 pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     let last = view.frames.len().checked_sub(1)?;
     let items = fates(&view.items_shown, last);
@@ -65,7 +65,7 @@ pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     Some((seen, left_out))
 }
 
-/// What became of each element until the window at place `last`: its last state, with a mark for the whole mission.
+/// The outcome of each element up to the window at place `last`: its last state, with a mark for the whole mission.
 fn fates(all: &[Showing], last: usize) -> BTreeMap<u32, Shown> {
     let fates = all.iter().filter_map(|showing| fate(showing, last));
     fates.map(|shown| (shown.id, shown)).collect()

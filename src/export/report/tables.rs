@@ -47,7 +47,7 @@ pub(super) fn folded(summary: &str, inside: &str) -> String {
     )
 }
 
-/// In how many windows each was, and the sum of its rates there.
+/// The number of windows in which each element was, and the sum of its rates there.
 #[derive(Clone, Copy, Default)]
 struct WindowsOf {
     windows: usize,
@@ -80,7 +80,7 @@ fn seen(mission: &Mission, first: Option<Stamp>, last: Option<Stamp>) -> String 
     }
 }
 
-/// How it is known, but for what holds of everybody.
+/// The words of its evidence, without those that hold of every element.
 fn words(evidence: Evidence) -> String {
     let words = evidence.words().filter(|word| *word != "rosout_rule");
     words.collect::<Vec<_>>().join(", ")
@@ -163,7 +163,7 @@ pub(super) fn topics(mission: &Mission, view: &View, most: usize) -> String {
     table(&heads, rows, most).map_or(String::new(), |table| folded(&summary, &table))
 }
 
-/// How well the graph is known, as sentences, and what the bags are.
+/// The strength of the evidence for the graph, as sentences, and the bags.
 pub(super) fn evidence(mission: &Mission) -> String {
     let info = info(mission);
     let parts = [

@@ -1,4 +1,4 @@
-//! Those who draw: each core draws rows of frames that follow each other and makes packets of them at once, so that
+//! The cores that draw: each draws rows of frames that follow each other and makes packets of them at once, so that
 //! only frames in flight take memory, however many windows there are.
 
 use std::ops::{ControlFlow, Range};
@@ -15,21 +15,21 @@ use crate::export::palette::{Census, Matcher, Palette};
 use crate::export::sequence::{FrameTime, Sequence};
 use crate::export::{DrawnFrame, Needs, Pack, Packet};
 
-/// At most this many bytes of packets wait to be written.
+/// The largest number of bytes of packets that wait to be written.
 const MOST_BYTES: f64 = 48e6;
-/// At most this many frames are drawn in a row: enough that little is drawn twice where rows meet, few enough that
+/// The largest number of frames drawn in a row: enough that little is drawn twice where rows meet, few enough that
 /// progress is seen.
 const MOST_IN_A_ROW: usize = 8;
 /// Rows per core that are not written yet: one in the making, one that waits.
 const ROWS_AHEAD: usize = 2;
-/// How many frames a palette is made from, at most: some of those with a change, some of all.
+/// The largest number of frames that a palette is made from: some of those with a change, some of all.
 const SAMPLES: usize = 12;
 
-/// What an output wants of every frame.
+/// The data that an output needs of every frame.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameWant {
     pub(crate) needs: Needs,
-    /// Whether it wants staged frames too.
+    /// Whether it is given staged frames too.
     pub(crate) plays: bool,
     pub(crate) pack: Pack,
     /// Bytes of a packet per pixel, at most.
@@ -39,7 +39,7 @@ pub(crate) struct FrameWant {
 /// A frame, drawn and packed.
 pub(crate) struct Packed {
     pub(crate) frame_time: FrameTime,
-    /// Its size in pixels; 0 where nobody needs pixels.
+    /// Its size in pixels; 0 where no output needs pixels.
     pub(crate) size: (u32, u32),
     /// A packet per output.
     pub(crate) packets: Vec<Packet>,
@@ -55,7 +55,7 @@ pub(crate) struct RasterPool<'a> {
 }
 
 impl<'a> RasterPool<'a> {
-    /// Ready to draw these frames.
+    /// The cores for these frames, with their palette.
     pub(crate) fn new(
         sequence: &'a Sequence<'a>,
         frame_times: &'a [FrameTime],
@@ -85,7 +85,7 @@ impl<'a> RasterPool<'a> {
     /// Draws all frames and gives them to `take`, row by row in order, until it breaks off.
     ///
     /// # Errors
-    /// Where a frame cannot be drawn or packed, and what `take` says.
+    /// Where a frame cannot be drawn or packed, and the errors of `take`.
     pub(crate) fn run(
         &self,
         mut take: impl FnMut(Vec<Packed>) -> Result<ControlFlow<()>>,
@@ -180,7 +180,7 @@ struct Artist<'a> {
     pool: &'a RasterPool<'a>,
     canvas: Canvas<'a>,
     matcher: Matcher<'a>,
-    /// The frame on the canvas.
+    /// The place of the frame on the canvas.
     at: Option<usize>,
     indices: Vec<u8>,
     before: Vec<u8>,

@@ -7,12 +7,12 @@ use crate::export::{Output, Written};
 
 /// Sizes that are tried while all windows are shown.
 const SCALES: [f64; 4] = [0.85, 0.7, 0.6, 0.5];
-/// Every how many windows one is shown, at the last of these sizes.
+/// The steps from one window that is shown to the next, at the last of these sizes.
 const EVERY: [usize; 4] = [2, 3, 5, 10];
 /// Sizes that are tried when only changes are shown.
 const LAST_SCALES: [f64; 4] = [0.5, 0.35, 0.25, 0.15];
 
-/// Writes `output` within `max_bytes` and says what was given up.
+/// Writes `output` within `max_bytes`; a remark says what was given up.
 ///
 /// # Errors
 /// [`Error::Output`] where nothing is small enough; otherwise as [`super::run`].
@@ -42,7 +42,7 @@ pub(crate) fn fit(
     })
 }
 
-/// What is tried, in order.
+/// The options that are tried, in order.
 fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
     let plain = SequenceOptions {
         tween: 0,
@@ -69,7 +69,7 @@ fn steps(asked: &SequenceOptions) -> Vec<SequenceOptions> {
     steps
 }
 
-/// What `now` lacks of `asked`, in words.
+/// The things that `now` lacks of `asked`, in words.
 fn given_up(asked: &SequenceOptions, now: &SequenceOptions) -> String {
     let mut words = Vec::new();
     if now.tween < asked.tween {

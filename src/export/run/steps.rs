@@ -1,4 +1,4 @@
-//! Where the time of drawing goes: the seconds of each step, summed over all cores.
+//! The time of drawing: the time of each step, summed over all cores.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;

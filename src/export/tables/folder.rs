@@ -1,4 +1,4 @@
-//! A folder of tables while they are written: out of sight until all of them are whole, and few files open at a time.
+//! A folder of tables while they are written: hidden until all of them are whole, with few files open at a time.
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
@@ -41,7 +41,7 @@ impl Folder {
         })
     }
 
-    /// A new file that will be called `name`, which no other one is.
+    /// A new file that will have the name `name`, which no other one has.
     pub(crate) fn file(&mut self, name: String) -> Part {
         let path = self.hidden.path().join(&name);
         self.names.push(name);
@@ -82,8 +82,8 @@ impl Write for Part {
 /// The longest name of a file, in bytes, that every system takes, its ending left out.
 const LONGEST: usize = 200;
 
-/// The name of a topic's file: `/base/scan` is `base.scan`. What is neither letter, digit, `_` nor `-` is written as its
-/// bytes, `%2E`, so that no name leaves the folder; different topics differ but for the slash in front.
+/// The name of a topic's file: `/base/scan` is `base.scan`. A character that is neither letter, digit, `_` nor `-` is
+/// written as its bytes, `%2E`, so that no name leaves the folder; different topics differ but for the slash in front.
 pub(crate) fn file_stem(topic: &str) -> String {
     let mut stem = String::new();
     for byte in topic.strip_prefix('/').unwrap_or(topic).bytes() {

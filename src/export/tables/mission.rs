@@ -1,4 +1,4 @@
-//! The tables of a mission: their columns, and what fills them.
+//! The tables of a mission: their columns, and the functions that fill them.
 
 use std::borrow::Cow;
 
@@ -11,15 +11,15 @@ use crate::graph::{Edge, EdgeState, Element, NodeId};
 use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Mission, Window};
 
-/// Takes a row.
+/// A function that takes a row.
 pub(super) type RowTaker<'a> = &'a mut dyn FnMut(&[TableCell<'_>]);
 
-/// A table: its word in the file's name, its columns, and what fills it.
+/// A table: its word in the file's name, its columns, and the function that fills it.
 pub(super) struct Table {
     pub(super) word: &'static str,
     pub(super) columns: &'static [(&'static str, ColumnKind)],
     pub(super) fill: fn(&Mission, RowTaker<'_>),
-    /// The same by runs of equal windows, where it is about windows.
+    /// The function that fills it by runs of equal windows, where it is about windows.
     pub(super) fill_runs: Option<fn(&Mission, RowTaker<'_>)>,
 }
 
@@ -296,7 +296,7 @@ fn changes(mission: &Mission, row: RowTaker<'_>) {
     }
 }
 
-/// What a change says beside its time: `from_hz to_hz from_value to_value`.
+/// The cells of a change beside its time: `from_hz to_hz from_value to_value`.
 type DetailCells<'a> = [TableCell<'a>; 4];
 
 const NO_DETAIL: DetailCells<'static> = [
@@ -324,7 +324,7 @@ fn values<'a>(from: impl Into<Cow<'a, str>>, to: impl Into<Cow<'a, str>>) -> Det
     ]
 }
 
-/// The kind of a change, what it is about, when it was, and its detail.
+/// The kind of a change, its element, its time, and its detail.
 fn told<'a>(
     mission: &Mission,
     change: &'a Change,

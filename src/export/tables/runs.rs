@@ -70,7 +70,7 @@ impl StateRun {
         }
     }
 
-    /// Messages in it, and how many a second; unknown where windows overlap and count messages twice.
+    /// The number of its messages, and their number per second; unknown where windows overlap and count messages twice.
     fn sent(&self, mission: &Mission) -> (Option<u64>, Option<f64>) {
         let is_one = self.first == self.last || mission.step == mission.period;
         let count = self.count.filter(|_| is_one);

@@ -1,4 +1,4 @@
-//! Where the rows of a table go: CSV or Parquet, into anything that takes bytes.
+//! The writer of a table's rows: CSV or Parquet, into anything that takes bytes.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::base::table::Batch;
 #[cfg(feature = "parquet")]
 use crate::export::parquet;
 
-/// How a table is written.
+/// The format of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableFormat {
     /// Comma-separated values, stamps as nanoseconds since 1970.
@@ -100,7 +100,7 @@ impl<W: Write + Send> Writer<W> {
         }
     }
 
-    /// How many bytes of packed rows it holds in memory.
+    /// The number of bytes of packed rows that it holds in memory.
     pub(crate) fn held(&self) -> usize {
         match self {
             Self::Csv(_) => 0,
@@ -125,7 +125,7 @@ impl<W: Write + Send> Writer<W> {
         }
     }
 
-    /// Ends the table and gives back what it was written to.
+    /// Ends the table and returns the sink that it was written to.
     pub(crate) fn finish(self) -> io::Result<W> {
         match self {
             Self::Csv(rows) => rows.finish(),

@@ -1,4 +1,4 @@
-//! What runs have in common, by name: what holds in each of them, widened by no more than noise needs.
+//! The facts that runs have in common, by name: those that hold in each of them, widened by no more than noise needs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,21 +11,21 @@ use crate::graph::{NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::ledger::Kind;
 
-/// Topics with fewer messages have no rate.
+/// The least number of messages of a topic with a rate.
 const FEWEST: u64 = 5;
-/// A rate may differ by this share from run to run.
+/// The share by which a rate may differ from run to run.
 const SHARE: f64 = 0.1;
-/// And by so many times the spread between windows.
+/// The number of times the spread between windows by which a rate may differ besides.
 const SPREADS: f64 = 3.0;
 
-/// What holds in all runs.
+/// The facts that hold in all runs.
 #[derive(Debug, Default)]
 pub(crate) struct Draft {
     pub(crate) nodes: BTreeMap<String, NodeLine>,
     pub(crate) topics: BTreeMap<String, TopicLine>,
 }
 
-/// What holds of a node.
+/// The facts that hold of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeLine {
     pub(crate) optional: bool,
@@ -34,7 +34,7 @@ pub(crate) struct NodeLine {
     pub(crate) lifecycle: Option<String>,
 }
 
-/// What holds of a topic.
+/// The facts that hold of a topic.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TopicLine {
     pub(crate) optional: bool,
@@ -94,7 +94,7 @@ impl TopicLine {
 }
 
 impl Draft {
-    /// What all of these runs have in common.
+    /// The facts that all of these runs have in common.
     pub(crate) fn of(runs: &[Mission]) -> Self {
         let runs: Vec<Facts<'_>> = runs.iter().map(Facts::new).collect();
         Self {
@@ -203,7 +203,7 @@ impl TopicInRun<'_> {
         own.types.iter().map(|t| (**t).to_owned()).collect()
     }
 
-    /// Who publishes it, where that is known of all.
+    /// The nodes that publish it; `None` unless all of them are known.
     fn by(&self) -> Option<BTreeSet<String>> {
         let known = self.facts.publishers(self.id);
         let sure = known
@@ -217,7 +217,7 @@ impl TopicInRun<'_> {
             .then(|| names.map(|node| self.facts.role(node).to_owned()).collect())
     }
 
-    /// Who subscribes it, as far as that is measured or stated.
+    /// The nodes that subscribe it, as far as that is measured or stated.
     fn to(&self) -> BTreeSet<String> {
         let known = self.facts.subscribers(self.id);
         let sure = known
@@ -230,8 +230,9 @@ impl TopicInRun<'_> {
     }
 }
 
-/// The range around the median rate that noise explains, and that holds every window seen; `None` for what comes in
-/// bursts, where it would hold everything. What is not even may differ by the square root of its count, as chance does.
+/// The range around the median rate that noise explains, and that holds every window seen; `None` for topics that come
+/// in bursts, where it would hold everything. The count of an uneven topic may differ by its square root, as chance
+/// does.
 fn band(rates: &[Rate], is_even: bool) -> Option<Range> {
     let count: u64 = rates.iter().map(|r| r.count).sum();
     let mut values: Vec<f64> = rates.iter().map(Rate::hz).collect();
@@ -258,7 +259,7 @@ fn band(rates: &[Rate], is_even: bool) -> Option<Range> {
     })
 }
 
-/// To three digits, by `round`.
+/// The value to three digits, rounded by `round`.
 fn rounded(value: f64, round: fn(f64) -> f64) -> f64 {
     let power = 2.0 - libm::floor(libm::log10(value));
     let scale = libm::pow(10.0, libm::fabs(power));

@@ -1,12 +1,12 @@
-//! Changes one value of a YAML text and leaves every other character as it is.
+//! An editor of YAML that changes one value and leaves every other character as it is.
 
 use crate::base::yaml::{BadYaml, YamlData, YamlPart, YamlPlace, parse_placed};
 
-/// A text under way.
+/// A YAML text being edited.
 #[derive(Clone, Debug)]
 pub(super) struct EditedText(pub(super) String);
 
-/// A pair of a mapping.
+/// A pair of a mapping: the key, its place, and the value.
 type Pair = (String, YamlPlace, YamlPart);
 
 impl EditedText {
@@ -159,7 +159,7 @@ impl EditedText {
         }
     }
 
-    /// Where the value of a pair ends.
+    /// The byte at which the value of a pair ends.
     fn end(&self, pair: &Pair) -> usize {
         let colon = self.after_key(pair.1);
         match &pair.2.data {
@@ -187,7 +187,7 @@ impl EditedText {
         start + line[..end].trim_end().len()
     }
 
-    /// The place behind what closes the bracket or quote at `start`.
+    /// The byte behind the one that closes the bracket or quote at `start`.
     fn close(&self, start: usize) -> usize {
         let mut depth = 0_usize;
         let mut chars = self.0[start..].char_indices().peekable();
@@ -226,7 +226,7 @@ impl EditedText {
         self.0[self.offset(part.at)..].starts_with(['{', '['])
     }
 
-    /// The place behind the colon of a key.
+    /// The byte behind the colon of a key.
     fn after_key(&self, at: YamlPlace) -> usize {
         let start = self.offset(at);
         let key = match self.0[start..].chars().next() {

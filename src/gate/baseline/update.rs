@@ -1,4 +1,4 @@
-//! Brings an expectation up to date: what no longer holds is written anew, every other character stays.
+//! Brings an expectation up to date: facts that no longer hold are written anew, every other character stays.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -23,13 +23,13 @@ const MOST: usize = 1000;
 pub(crate) struct Update {
     /// The whole file.
     pub(crate) text: String,
-    /// How many facts were written anew.
+    /// The number of facts that were written anew.
     pub(crate) changed: usize,
-    /// Findings that only the author of a rule can resolve.
+    /// The number of findings that only the author of a rule can resolve.
     pub(crate) left: usize,
 }
 
-/// Writes anew what these runs break: of all names, or of those that `only` holds.
+/// Writes anew the facts that these runs break: of all names, or of those that `only` holds.
 ///
 /// # Errors
 /// As [`read`], and where the file is written in a way that cannot be changed in place.
@@ -109,7 +109,7 @@ fn unchanged(path: &Path, bad: &BadYaml) -> Error {
     }
 }
 
-/// What the runs break.
+/// The findings of these runs.
 fn broken(expectation: &Expectation, runs: &[Mission]) -> Vec<Finding> {
     let verdicts = runs.iter().map(|run| judge(expectation, run));
     let findings = verdicts
@@ -139,7 +139,7 @@ fn fact(kind: FindingKind) -> &'static str {
     }
 }
 
-/// The work under way.
+/// An update being made.
 struct Work<'a> {
     text: EditedText,
     expectation: &'a Expectation,
@@ -148,7 +148,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Writes anew what one finding is about; `name` is the entry's.
+    /// Writes anew the fact that one finding is about; `name` is the entry's.
     fn accept(&mut self, name: &str, finding: &Finding) -> Result<(), BadYaml> {
         let key = fact(finding.kind);
         match finding.kind {
@@ -193,7 +193,7 @@ impl Work<'_> {
         }
     }
 
-    /// What is in no run is expected no more; what is in some need not be there.
+    /// Removes an entry that is in no run, and makes one optional that is in some.
     fn lost(&mut self, section: &str, name: &str, is_in_some: bool) -> Result<(), BadYaml> {
         if is_in_some {
             self.text.set(section, name, "optional", "true")
@@ -215,7 +215,7 @@ impl Work<'_> {
         }
     }
 
-    /// The value of a node's key that holds in all runs; of a pattern, for all that it stands for.
+    /// The value of a node's key that holds in all runs; for a pattern, the one that holds of all nodes it stands for.
     fn of_node(&self, name: &str, key: &str) -> Option<String> {
         let pattern = Pattern::new(name);
         let lines = self
@@ -294,7 +294,7 @@ impl Work<'_> {
     }
 }
 
-/// Rounded up to two digits.
+/// The nanoseconds rounded up to two digits.
 fn two_digits(nanos: i64) -> i64 {
     let mut step = 1;
     while nanos / step >= 100 {
@@ -306,7 +306,7 @@ fn two_digits(nanos: i64) -> i64 {
         .saturating_mul(step)
 }
 
-/// Rounded up to a second.
+/// The nanoseconds rounded up to a whole second.
 fn whole(nanos: i64) -> i64 {
     const SECOND: i64 = 1_000_000_000;
     nanos.saturating_add(SECOND - 1) / SECOND * SECOND

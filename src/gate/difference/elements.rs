@@ -1,4 +1,4 @@
-//! Which nodes, topics and edges are in one mission only, and what of those in both is not the same.
+//! The nodes, topics and edges that are in one mission only, and the differences of those in both.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,12 +10,12 @@ use crate::gate::pattern::Pattern;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::ledger::Kind;
 
-/// Fewer messages tell no rate.
+/// The least number of messages that tell a rate.
 const FEWEST: u64 = 5;
-/// Rates differ if chance makes such a difference less often than 3 standard deviations.
+/// The number of standard deviations beyond which rates differ by more than chance.
 const SIGMAS: f64 = 3.0;
 
-/// All of them.
+/// All differences of elements.
 pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>, rate_change: f64) -> Vec<Difference> {
     let (ours, theirs) = (nodes(a), nodes(b));
     let mut all: Vec<Difference> = presence("node", &keys(&ours), &keys(&theirs)).collect();
@@ -70,7 +70,7 @@ fn presence<'a>(
     })
 }
 
-/// The roles that are sure to be there, without tools.
+/// The roles that are measured or stated to be there, without tools.
 fn nodes<'a, 'f>(facts: &'f Facts<'a>) -> BTreeMap<&'a str, &'f [NodeId]> {
     let sure = |nodes: &[NodeId]| facts.is_sure(nodes) && !facts.is_tool(nodes);
     facts.roles().filter(|(_, nodes)| sure(nodes)).collect()
@@ -113,7 +113,7 @@ fn node(
     }
 }
 
-/// When nodes ended, if they did not stay.
+/// The time at which nodes ended in words, if they did not stay.
 fn end(facts: &Facts<'_>, nodes: &[NodeId]) -> Option<String> {
     let end = facts.lives(nodes).last()?.end;
     let is_over = facts.mission.span.end.since(end) > SHUTDOWN_NS;

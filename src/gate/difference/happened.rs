@@ -1,4 +1,4 @@
-//! What happened in one mission only, in another order, or at another time of its phase.
+//! The differences in events: those in one mission only, in another order, or at another time of their phase.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,25 +9,25 @@ use crate::gate::facts::Facts;
 use crate::graph::Element;
 use crate::mission::ledger::{Entry, Kind};
 
-/// Times of two runs differ by so much without anybody's doing.
+/// The difference in nanoseconds up to which times of two runs count as the same.
 const APART_NS: i64 = 5_000_000_000;
-/// More entries are not put in order: the work is their square.
+/// The largest number of entries that are put in order: the work is their square.
 const MOST: usize = 2000;
 
-/// What an entry is about, and the how manyeth of its kind it is.
+/// The key of an entry: its kind, the name it is about, and its number among the entries of both, counted from 1.
 type Key = (Kind, String, usize);
 
 /// An entry, told without the mission.
 struct ToldEntry {
     key: Key,
     time: Stamp,
-    /// How far its time is not sure, in nanoseconds.
+    /// The uncertainty of its time, in nanoseconds.
     doubt: i64,
     /// The place of its phase.
     phase: usize,
 }
 
-/// All of them.
+/// All differences in events.
 pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>) -> Vec<Difference> {
     let (first, second) = (told(a), told(b));
     let mut all = only(&first, &second, a, Where::First);
@@ -84,7 +84,8 @@ fn about(facts: &Facts<'_>, entry: &Entry) -> Option<String> {
     }
 }
 
-/// What one mission tells and the other does not, of what is in both. Starts and stops there are told of the elements.
+/// The events that one mission tells and the other does not, about elements of both. Starts and stops are told of the
+/// elements.
 fn only(own: &[ToldEntry], other: &[ToldEntry], facts: &Facts<'_>, side: Where) -> Vec<Difference> {
     let known: BTreeSet<&Key> = other.iter().map(|t| &t.key).collect();
     let wanted = [Kind::HandedOver, Kind::Silent, Kind::Lifecycle];
@@ -110,7 +111,7 @@ fn name((kind, name, count): &Key) -> String {
     }
 }
 
-/// Whether an entry of both stands at another time of its phase.
+/// The difference of an entry that stands at another time of its phase in the other mission, if it does.
 fn moved(
     (a, one): (&Facts<'_>, &ToldEntry),
     (b, other): (&Facts<'_>, &ToldEntry),

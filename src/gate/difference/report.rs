@@ -54,7 +54,7 @@ fn sign(difference: &Difference) -> char {
     }
 }
 
-/// `only in a.bag`, or `15 Hz → 7.4 Hz`.
+/// A difference in words: `only in a.bag`, or `15 Hz → 7.4 Hz`.
 fn how(subject: &DiffSubject, difference: &Difference) -> String {
     let told = |text: &str| {
         if text == "present" {
@@ -76,7 +76,7 @@ fn how(subject: &DiffSubject, difference: &Difference) -> String {
     format!("only in {in_one}{}{doubt}", told(what))
 }
 
-/// `a.bag and b.bag: 4 differences, 1 unknown`.
+/// The summary: `a.bag and b.bag: 4 differences, 1 unknown`.
 fn summary(subject: &DiffSubject, all: &[Difference]) -> String {
     let known = all.iter().filter(|d| d.is_known).count();
     let unknown = match all.len() - known {

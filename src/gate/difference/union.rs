@@ -1,4 +1,4 @@
-//! Two missions as one that can be drawn: the elements of both by role, and a ledger that tells what differs.
+//! Two missions as one that can be drawn: the elements of both by role, and a ledger of the differences.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,19 +16,19 @@ use crate::mission::{Activity, Mission, Window};
 
 use super::{Difference, Where};
 
-/// Which of the two pictures is drawn.
+/// The picture of two missions that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// One picture with what both have.
+    /// One picture with the elements of both.
     Both,
-    /// First the first mission, then both.
+    /// Two windows: first the first mission alone, then both.
     Each,
 }
 
-/// The length of a window of the picture, whose time means nothing.
+/// The length of a window of the picture in nanoseconds; its time means nothing.
 const SECOND: i64 = 1_000_000_000;
 
-/// What one mission has, by role and topic.
+/// The elements of one mission, by role and topic.
 #[derive(Default)]
 struct MissionSide {
     nodes: BTreeMap<String, (Degree, Evidence)>,
@@ -94,7 +94,7 @@ impl MissionSide {
     }
 }
 
-/// The mission of both. What one mission has no evidence of is drawn as the other has it.
+/// The mission of both. An element without evidence in one mission is drawn as the other has it.
 pub(crate) fn union(
     first: &Mission,
     second: &Mission,
@@ -295,7 +295,7 @@ fn graph(elements: &Elements, seen: &MissionSide) -> Graph {
     }
 }
 
-/// The ledger under way.
+/// The ledger being made.
 struct UnionLedger<'a> {
     a: &'a MissionSide,
     b: &'a MissionSide,
@@ -308,10 +308,10 @@ struct UnionLedger<'a> {
     entries: Vec<Entry>,
 }
 
-/// What came (true) or went, by kind and name.
+/// Whether something came (true) or went (false), by kind and name.
 type Turned<'a> = BTreeMap<(&'static str, &'a str), bool>;
 
-/// What is in one mission only, as far as the other would tell.
+/// The elements in one mission only, as far as the other would tell of them.
 fn turned(differing: &[Difference]) -> Turned<'_> {
     let known = differing
         .iter()
@@ -352,7 +352,7 @@ impl UnionLedger<'_> {
         self.turned.get(&(kind, name)).copied()
     }
 
-    /// Edges come and go with their nodes, or by themselves.
+    /// Adds the entries of edges, which come and go with their nodes, or by themselves.
     fn edges(&mut self, wholes: &BTreeMap<u32, EntryId>) {
         let elements = self.elements;
         let name = |edge: &Edge| {
@@ -390,7 +390,7 @@ impl UnionLedger<'_> {
         }
     }
 
-    /// Marks what both have and is not the same.
+    /// Adds the entry of something that both have with different values.
     fn change(&mut self, difference: &Difference) {
         if difference.side != Where::Both {
             return;
@@ -453,7 +453,7 @@ impl UnionLedger<'_> {
     }
 }
 
-/// What is told of something that came, or went.
+/// The kind of entry for an edge or topic that came, or went.
 fn appeared(came: bool) -> Kind {
     if came { Kind::Appeared } else { Kind::Vanished }
 }

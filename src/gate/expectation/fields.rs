@@ -1,4 +1,4 @@
-//! The keys of a mapping: each known, each of the right kind, or an error that tells where and what was meant.
+//! The keys of a mapping: each known, each of the right kind, or an error with the place and the nearest known key.
 
 use std::path::Path;
 
@@ -10,14 +10,14 @@ use crate::base::nearest::nearest;
 use crate::base::time::parse_nanos;
 use crate::base::yaml::{YamlData, YamlPart};
 
-/// The document under way.
+/// The document being read.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'a> {
     pub(super) path: &'a Path,
 }
 
 impl<'a> Document<'a> {
-    /// What is wrong at a place, and the way out.
+    /// The error at a place, with a hint.
     pub(super) fn bad(
         self,
         at: YamlPlace,
@@ -33,7 +33,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// A word that is not one of those known.
+    /// The error for a word that is not one of those known.
     pub(super) fn unknown<'w>(
         self,
         at: YamlPlace,
@@ -51,7 +51,7 @@ impl<'a> Document<'a> {
         )
     }
 
-    /// The pairs of a mapping; none of what is left empty.
+    /// The pairs of a mapping; none of an empty value.
     pub(super) fn pairs(
         self,
         part: &'a YamlPart,
@@ -68,7 +68,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The members of a list; none of what is left empty.
+    /// The members of a list; none of an empty value.
     pub(super) fn list(self, part: &'a YamlPart, what: &str) -> Result<&'a [YamlPart]> {
         match &part.data {
             YamlData::List(list) => Ok(list),

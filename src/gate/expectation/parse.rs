@@ -1,4 +1,4 @@
-//! Reads `graph.yaml`. Whatever is not known is an error with its line, its column, and the nearest name.
+//! Reads `graph.yaml`. An unknown key or word is an error with its line, its column, and the nearest known one.
 
 use std::path::Path;
 
@@ -43,7 +43,7 @@ const TOPIC: &[&str] = &[
     "latched",
     "qos",
 ];
-/// The keys that say what a rule is about, each with those that go with it.
+/// The keys that give the form of a rule, each with those that go with it.
 const FORMS: &[(&str, &[&str])] = &[
     ("node", NODE),
     ("nodes", NODE),
@@ -112,7 +112,7 @@ const ALLOW: &[&str] = &["finding", "name", "until", "why"];
 /// Reads an expectation.
 ///
 /// # Errors
-/// [`crate::Error::BadExpectation`] for what is no YAML, unfolds without end, or says something that is not known.
+/// [`crate::Error::BadExpectation`] for a text that is not YAML, unfolds without end, or holds an unknown key or word.
 pub(crate) fn read(text: &str, path: &Path) -> Result<Expectation> {
     let document = Document { path };
     let whole = parse_placed(text).map_err(|bad| {
@@ -171,7 +171,7 @@ fn policy(file: &Fields<'_>, top: YamlPlace) -> Result<Policy> {
     Ok(policy)
 }
 
-/// A mapping from names to what is expected of them.
+/// Reads a mapping from names to their expectations.
 fn section<T>(
     file: &Fields<'_>,
     key: &'static str,
@@ -194,7 +194,7 @@ fn section<T>(
     Ok(all)
 }
 
-/// The members of a list.
+/// Reads the members of a list.
 fn each<T>(
     file: &Fields<'_>,
     key: &str,
@@ -405,7 +405,7 @@ fn allowance(document: Document<'_>, part: &YamlPart) -> Result<AllowedFinding> 
     })
 }
 
-/// The end of a day in UTC, or a point in time.
+/// Reads the end of a day in UTC, or a point in time.
 fn day(text: &str) -> Option<Stamp> {
     const DAY: i64 = 86_400_000_000_000;
     let midnight = Moment::parse(&format!("{text}T00:00:00Z"));

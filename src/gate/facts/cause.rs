@@ -1,4 +1,4 @@
-//! Why something is as it is, as far as the ledger tells.
+//! The causes of findings, as far as the ledger tells.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,8 @@ use crate::graph::{Element, NodeId, TopicId};
 use crate::mission::ledger::Kind;
 
 impl Facts<'_> {
-    /// What the ledger tells about why a topic changed around a time: its publishers, and those who feed them.
+    /// The cause in the ledger for the change of a topic around a time: an event of its publishers, or of the nodes
+    /// that feed them.
     pub(crate) fn cause_for_topic(&self, topic: TopicId, around: Span) -> Option<Cause> {
         let direct: BTreeSet<NodeId> = self.publishers(topic).iter().map(|p| p.0).collect();
         let fed: BTreeSet<TopicId> = {

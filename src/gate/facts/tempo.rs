@@ -1,14 +1,14 @@
-//! How often topics come, window by window, and for how long they are silent.
+//! The rates of topics, window by window, and their silences.
 
 use super::{Facts, SHUTDOWN_NS};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, Row, TopicId};
 use crate::mission::Window;
 
-/// A recorder has found the topics that are there when it starts after so long.
+/// The time in nanoseconds after which a recorder has found all topics that are there when it starts.
 const FOUND_NS: i64 = 2_500_000_000;
 
-/// How often a topic was sent in a window.
+/// The rate of a topic in a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rate {
     /// The window's place.
@@ -30,12 +30,12 @@ impl Rate {
         self.count as f64 / self.seconds()
     }
 
-    /// The same with a message more, which may have come a moment too late for this window.
+    /// Messages per second with a message more, which may have come a moment too late for this window.
     pub(crate) fn at_most(&self) -> f64 {
         (self.count + 1) as f64 / self.seconds()
     }
 
-    /// The same with a message less.
+    /// Messages per second with a message less.
     pub(crate) fn at_least(&self) -> f64 {
         self.count.saturating_sub(1) as f64 / self.seconds()
     }
@@ -69,14 +69,14 @@ impl<'a> Facts<'a> {
         })
     }
 
-    /// The windows in which a topic is, each with what it does there.
+    /// The windows in which a topic is, each with its row of the graph.
     fn rows(&self, topic: TopicId) -> impl Iterator<Item = (&'a Window, Row)> + use<'a> {
         let windows = &self.mission.windows;
         let rows = self.mission.graphs.rows(Element::Topic(topic));
         rows.filter_map(|(at, row)| Some((windows.get(at)?, row)))
     }
 
-    /// Messages of a topic in each window.
+    /// The number of messages of a topic in each window.
     pub(crate) fn counts(&self, topic: TopicId) -> Vec<u64> {
         let mut all = vec![0; self.mission.windows.len()];
         for (at, row) in self.mission.graphs.rows(Element::Topic(topic)) {
@@ -204,9 +204,9 @@ fn begun(window: Span, first: Stamp) -> Option<Span> {
 /// A time without messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TopicSilence {
-    /// When it was, or the window that it is in.
+    /// The time of the silence, or the window that it is in.
     pub(crate) span: Span,
-    /// How long it lasted.
+    /// Its length in nanoseconds.
     pub(crate) nanos: i64,
 }
 

@@ -7,7 +7,7 @@ use crate::gate::expectation::AllowedFinding;
 use crate::gate::finding::{Finding, FindingKind, Severity};
 
 impl Judge<'_> {
-    /// Forgives what is allowed, and tells of allowances that forgave nothing.
+    /// Forgives findings that are allowed, and adds findings for allowances that forgave nothing.
     pub(super) fn allow(&mut self) {
         let start = self.facts.mission.span.start;
         let mut unused = Vec::new();
@@ -29,7 +29,7 @@ impl Judge<'_> {
     }
 }
 
-/// Forgives the findings that an allowance means; answers whether there were any.
+/// Forgives the findings that an allowance means; returns whether there were any.
 fn forgive(checks: &mut [Checked], allowance: &AllowedFinding, start: Stamp) -> bool {
     let mut is_used = false;
     let all = checks.iter_mut().flat_map(|c| &mut c.findings);

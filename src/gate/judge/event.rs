@@ -1,4 +1,4 @@
-//! Which entries of the ledger an event of a rule means.
+//! The entries of the ledger that an event of a rule means.
 
 use super::Judge;
 use crate::gate::expectation::{Event, EventKind};

@@ -1,4 +1,4 @@
-//! What is expected of nodes: to be there, to stay, to come in time, not to restart, to end in a state.
+//! The judgement of nodes: to be there, to stay, to come in time, not to restart, to end in a state.
 
 use super::{Judge, absence};
 use crate::base::time::Span;
@@ -36,7 +36,7 @@ impl Judge<'_> {
         }
     }
 
-    /// Judges what is said of a node beside that it is there. `title` begins what the facts are called.
+    /// Judges the facts of a node other than its presence. `title` begins the titles of the facts.
     pub(super) fn node_facts(&mut self, title: &str, pattern: &Pattern, facts: &NodeFacts) {
         let roles = self.facts.nodes(pattern);
         let wanted = [
@@ -84,7 +84,7 @@ impl Judge<'_> {
         found.collect()
     }
 
-    /// Whether a node is there, and stays.
+    /// The findings on whether a node is there, and stays.
     pub(super) fn presence(
         &self,
         pattern: &Pattern,
@@ -109,7 +109,7 @@ impl Judge<'_> {
             .collect()
     }
 
-    /// That the bag does not tell whether a node is there.
+    /// The finding that the bag does not tell whether a node is there.
     fn unnamed(&self, kind: FindingKind, name: &str, at: YamlPlace) -> Finding {
         let (why, hint) = if self.facts.is_rewritten() {
             (

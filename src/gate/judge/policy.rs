@@ -1,4 +1,4 @@
-//! What the file does not name: allowed, or a finding where its policy closes the world.
+//! The judgement of elements that the file does not name: allowed, or findings where its policy forbids them.
 
 use super::Judge;
 use crate::gate::expectation::Demand;
@@ -7,7 +7,7 @@ use crate::gate::pattern::{NamePatterns, Pattern};
 use crate::graph::NodeId;
 
 impl Judge<'_> {
-    /// Judges what is not named.
+    /// Judges the elements that are not named.
     pub(super) fn policy(&mut self) {
         let policy = self.expectation.policy;
         if policy.nodes.severity().is_some() {

@@ -1,4 +1,4 @@
-//! How often and how evenly topics come: in every whole window, or in those that a rule means.
+//! The judgement of rates and gaps of topics: in every whole window, or in those that a rule means.
 
 use super::Judge;
 use crate::base::time::Span;
@@ -10,7 +10,7 @@ use crate::gate::range::Range;
 use crate::graph::TopicId;
 
 impl Judge<'_> {
-    /// Whether a topic's rate lies in its range, in as many windows as it must.
+    /// The findings on whether a topic's rate lies in its range, in as many windows as it must.
     pub(super) fn rate(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(range) = facts.hz.as_ref().map(|hz| hz.value) else {
             return Vec::new();
@@ -42,7 +42,7 @@ impl Judge<'_> {
             .collect()
     }
 
-    /// Where no window is judged: a condition that never held is kept, all else cannot be told.
+    /// The findings where no window is judged: none for a condition that never held, else that it cannot be told.
     fn no_window(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         if facts.whilst.is_some() {
             return Vec::new();
@@ -65,7 +65,7 @@ impl Judge<'_> {
         rates
     }
 
-    /// In which windows a condition holds.
+    /// Whether a condition holds, for each window.
     fn holds(&self, whilst: &While) -> Vec<bool> {
         let windows = &self.facts.mission.windows;
         let mut holds = vec![false; windows.len()];
@@ -140,7 +140,7 @@ impl Judge<'_> {
         Some(finding)
     }
 
-    /// Whether a topic was never silent for too long.
+    /// The findings on whether a topic was never silent for too long.
     pub(super) fn gap(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         let Some(most) = facts.max_gap.as_ref().map(|gap| gap.value) else {
             return Vec::new();

@@ -13,9 +13,10 @@ use crate::graph::lives::Bound;
 use crate::mission::events::sentence;
 use crate::mission::ledger::Entry;
 
-/// A reaction may be told so long before what it reacts to: the last sign of who is gone comes a period before its end.
+/// The time in nanoseconds by which a reaction may be told before its cause: the last sign of a node that is gone comes
+/// a period before its end.
 const BEFORE_NS: i64 = 1_000_000_000;
-/// So many entries are written out.
+/// The number of entries that are written out.
 const TOLD: usize = 6;
 
 impl Judge<'_> {
@@ -81,7 +82,7 @@ impl Judge<'_> {
         }
     }
 
-    /// That the mission ended before a node had to be there.
+    /// The finding that the mission ended before a node had to be there.
     fn too_short(&self, name: &At<Pattern>, within: i64) -> Finding {
         let (name, at) = (name.value.as_str(), name.at);
         let long = words::duration(self.facts.mission.span.nanos());
@@ -258,7 +259,7 @@ fn order_of(names: &[At<Pattern>]) -> String {
     names.join(", ")
 }
 
-/// What happened, after a name: `was removed`.
+/// The words for an event that happened, to follow a name: `was removed`.
 fn past(event: &Event) -> String {
     match event.kind {
         EventKind::Added => "appeared".to_owned(),
@@ -271,7 +272,7 @@ fn past(event: &Event) -> String {
     }
 }
 
-/// What should happen: `/cmd_vel handed over to /teleop`.
+/// The words for an event that should happen: `/cmd_vel handed over to /teleop`.
 fn told(event: &Event) -> String {
     let name = &event.name;
     match (event.kind, &event.to) {

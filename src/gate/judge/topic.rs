@@ -1,4 +1,4 @@
-//! What is expected of topics: to be there, of which type, from whom, to whom, and of which quality.
+//! The judgement of topics: to be there, with their type, publishers, subscribers and quality of service.
 
 use super::{Judge, absence};
 use crate::base::words;
@@ -8,7 +8,7 @@ use crate::gate::finding::{Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::graph::TopicId;
 
-/// So many names are told in one line.
+/// The number of names that are told in one line.
 const NAMED: usize = 6;
 
 impl Judge<'_> {
@@ -34,7 +34,7 @@ impl Judge<'_> {
         }
     }
 
-    /// Judges what is said of a topic beside that it is there.
+    /// Judges the facts of a topic other than its presence.
     pub(super) fn topic_facts(&mut self, title: &str, pattern: &Pattern, facts: &TopicFacts) {
         let topics = self.facts.topics(pattern);
         let wanted = [

@@ -1,4 +1,5 @@
-//! GitHub's annotations: workflow commands at lines of the expectation, and the text, since the rest of them is dropped.
+//! GitHub's annotations: workflow commands at lines of the expectation, followed by the text, since GitHub drops the
+//! annotations beyond its limit.
 
 use std::fmt::Write as _;
 
@@ -6,7 +7,7 @@ use super::{Subject, text};
 use crate::gate::finding::{Finding, Severity};
 use crate::gate::judge::Verdict;
 
-/// A step shows so many annotations of one kind; more are dropped without a word.
+/// The number of annotations of one kind that a step shows; GitHub drops more without a word.
 const MOST: usize = 10;
 
 /// The report; ends in a new line.
@@ -58,14 +59,14 @@ fn annotation(
     );
 }
 
-/// Text behind a command.
+/// Text behind a command, escaped.
 fn data(text: &str) -> String {
     text.replace('%', "%25")
         .replace('\r', "%0D")
         .replace('\n', "%0A")
 }
 
-/// A property of a command.
+/// A property of a command, escaped.
 fn property(text: &str) -> String {
     data(text).replace(':', "%3A").replace(',', "%2C")
 }

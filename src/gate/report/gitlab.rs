@@ -27,7 +27,7 @@ struct Lines {
     begin: usize,
 }
 
-/// The report; ends in a new line. What is forgiven is left out.
+/// The report; ends in a new line. Forgiven findings are left out.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings().into_iter();
     let told = findings.filter(|f| f.severity != Severity::Allowed);

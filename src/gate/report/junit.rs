@@ -1,4 +1,4 @@
-//! XML as `JUnit` has it: a test case for every fact of the file, those that are kept too; what cannot be decided is skipped.
+//! XML as `JUnit` has it: a test case for every fact of the file, kept ones too; undecidable ones are skipped.
 
 use super::Subject;
 use crate::draw::paint::xml::Xml;
@@ -31,7 +31,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     xml.finish() + "\n"
 }
 
-/// A warning passes, as it does for the exit code.
+/// Whether a fact fails: a warning passes, as it does for the exit code.
 fn is_failed(check: &Checked) -> bool {
     check.findings.iter().any(|f| f.severity == Severity::Error)
 }

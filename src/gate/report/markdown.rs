@@ -1,4 +1,5 @@
-//! A summary in Markdown for a pull request or a job: its first line is enough, its table says what and when.
+//! A summary in Markdown for a pull request or a job: its first line tells the outcome, its table the findings with
+//! their times.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -14,9 +15,9 @@ use crate::gate::judge::{Judgement, Verdict};
 /// The most bytes of each part; together with a chart they stay below 256 KiB, a quarter of what a job's summary may hold.
 const MOST_ROWS: usize = 96 << 10;
 const MOST_LISTED: usize = 24 << 10;
-/// So many findings are seen at a glance; the rest unfolds.
+/// The number of findings that are open; the rest is folded.
 const SHOWN: usize = 12;
-/// So many causes are told.
+/// The largest number of causes that are told.
 const CAUSES: usize = 3;
 
 /// The report; ends in a new line.
@@ -57,7 +58,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     out
 }
 
-/// The one line that says it all.
+/// The first line: the outcome in short.
 fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let mission = subject.mission;
     let any = |severity| verdict.count(severity) > 0;
@@ -87,7 +88,7 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
     )
 }
 
-/// What several findings follow from.
+/// Writes the causes of several findings, those of most findings first.
 fn causes(groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
     let several = groups.iter().filter(|(_, group)| group.len() > 1);
     let several = several.filter_map(|(cause, group)| Some(((*cause)?, group.len())));
@@ -105,7 +106,7 @@ fn causes(groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
     }
 }
 
-/// The findings of one cause one after the other.
+/// Writes the table of findings, those of one cause one after the other.
 fn table(facts: &Facts<'_>, groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
     let rows = groups.iter().flat_map(|(_, group)| {
         let is_alone = group.len() == 1;
@@ -235,7 +236,8 @@ fn command(text: &str) -> String {
     format!("{fence}sh\n{text}\n{fence}")
 }
 
-/// A word inside a comment, by which an action finds what it wrote before: nothing that ends the comment.
+/// A word inside a comment, by which an action finds the text that it wrote before, without characters that end the
+/// comment.
 fn mark(name: &str) -> String {
     let harmless = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
     let mark: String = name

@@ -1,4 +1,4 @@
-//! The graph around what was found, as a Mermaid flow chart: what is gone, what is new, what changed, and what they touch.
+//! The graph around findings, as a Mermaid flow chart: elements that are gone, new or changed, and their neighbours.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -12,15 +12,15 @@ use crate::graph::Edge;
 const MOST_EDGES: usize = 60;
 /// The most boxes that are drawn.
 const MOST_ITEMS: usize = 80;
-/// Mermaid draws no chart of more than 50,000 characters; what boxes and edges take of them.
+/// The largest size of the boxes in bytes; Mermaid draws no chart of more than 50,000 characters.
 const MOST_BOXES: usize = 36 << 10;
-/// A name of more characters is cut.
+/// The largest number of characters of a name; a longer one is cut.
 const LONGEST: usize = 80;
 
 /// A box: whether it is a topic, and its name.
 type MermaidBox<'a> = (bool, &'a str);
 
-/// What became of a box.
+/// The fate of a box.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum BoxFate {
     Gone,
@@ -28,7 +28,7 @@ enum BoxFate {
     Changed,
 }
 
-/// The chart; `None` where nothing that was found has a place in the graph. Ends in a new line.
+/// The chart; `None` where no finding has a place in the graph. Ends in a new line.
 pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
     let mut marked: BTreeMap<MermaidBox<'_>, (BoxFate, String)> = BTreeMap::new();
     for finding in findings {
@@ -75,7 +75,7 @@ fn class(finding: &Finding) -> Option<(MermaidBox<'_>, BoxFate)> {
     Some(((!is_node, &finding.name), class))
 }
 
-/// What stands behind the name in its box: what was expected, and what was seen.
+/// The text behind the name in its box: the expected and the observed value.
 fn label(finding: &Finding) -> String {
     match finding.kind {
         FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle => {
@@ -85,7 +85,7 @@ fn label(finding: &Finding) -> String {
     }
 }
 
-/// Edges of what is marked, and those that are missing; the latter first, and dotted.
+/// The edges of marked boxes, and those that are missing; the latter first, and dotted (true).
 fn edges<'a>(
     facts: &Facts<'a>,
     marked: &BTreeMap<MermaidBox<'_>, (BoxFate, String)>,

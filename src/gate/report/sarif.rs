@@ -9,10 +9,10 @@ use crate::base::words;
 use crate::gate::finding::{Finding, KINDS, Severity};
 use crate::gate::judge::Verdict;
 
-/// GitHub shows so many results of a run, and rejects a file with more than five times as many.
+/// The number of results of a run that GitHub shows; it rejects a file with more than five times as many.
 const MOST: usize = 5000;
 
-/// The report; ends in a new line. What cannot be decided is a note; what is forgiven is suppressed.
+/// The report; ends in a new line. Undecidable findings are notes; forgiven ones are suppressed.
 pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let findings = verdict.findings();
     let found = kinds(&findings);

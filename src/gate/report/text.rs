@@ -1,4 +1,4 @@
-//! Findings for people, as compilers tell them: what, where in the file, what was seen, how to go on.
+//! Findings for people, as compilers tell them: the finding, its place in the file, the observed value, and hints.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -27,7 +27,7 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     out.replace("##[", "#\\#[")
 }
 
-/// `nav.mcap against graph.yaml: 2 errors, 1 warning, 31 rules kept`.
+/// The last line: `nav.mcap against graph.yaml: 2 errors, 1 warning, 31 rules kept`.
 fn last_line(subject: &Subject<'_>, verdict: &Verdict) -> String {
     let kept = verdict.facts(Judgement::Kept);
     format!(

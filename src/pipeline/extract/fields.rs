@@ -17,11 +17,11 @@ use crate::pipeline::Watch;
 
 /// The column in front of a message's fields: its log time.
 const TIME: &str = "time_ns";
-/// Bytes of messages that wait in one table before its rows are written.
+/// The number of bytes of messages that wait in one table before its rows are written.
 const MOST_WAITING: usize = 4 << 20;
-/// The same in all tables together.
+/// The same number for all tables together.
 const MOST_WAITING_IN_ALL: usize = 32 << 20;
-/// Bytes of packed rows that all tables hold in memory.
+/// The number of bytes of packed rows that all tables hold in memory.
 const MOST_HELD_IN_ALL: usize = 64 << 20;
 
 pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
@@ -60,7 +60,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     })
 }
 
-/// What could not be decoded.
+/// The messages that could not be decoded: their number, and notices about them.
 #[derive(Default)]
 struct Lost {
     messages: u64,
@@ -95,7 +95,7 @@ struct FieldTables {
     folder: Folder,
     format: TableFormat,
     all: Vec<FieldTable>,
-    /// Names of files, in lower case: some systems know no other.
+    /// Names of files taken so far, in lower case: some systems do not tell cases apart.
     names: BTreeSet<String>,
     waiting: usize,
     failed: Option<io::Error>,
@@ -153,7 +153,7 @@ impl FieldTables {
         true
     }
 
-    /// Writes the tables in which most waits, until half of all is written.
+    /// Writes the tables with the most bytes waiting, until half of all bytes are written.
     fn make_room(&mut self) {
         let mut order: Vec<usize> = (0..self.all.len()).collect();
         order.sort_by_key(|at| std::cmp::Reverse(self.all[*at].waiting));
@@ -208,7 +208,7 @@ impl FieldTables {
         )
     }
 
-    /// Keeps what packed rows take in memory within bounds.
+    /// Keeps the memory for packed rows within bounds.
     fn unload(&mut self) -> io::Result<()> {
         let writers = || self.all.iter().filter_map(|t| t.writer.as_ref());
         if writers().map(Writer::held).sum::<usize>() < MOST_HELD_IN_ALL {
@@ -218,8 +218,8 @@ impl FieldTables {
         writers.try_for_each(Writer::unload)
     }
 
-    /// Writes the rest, one table after another, and gives all of them their names. Answers how many tables and rows
-    /// there are; a topic without a decoded message has no table.
+    /// Writes the rest, one table after another, and gives all of them their names. Returns the number of tables and of
+    /// rows; a topic without a decoded message has no table.
     fn finish(mut self) -> io::Result<Result<(usize, u64)>> {
         let (mut tables, mut rows) = (0, 0);
         for at in 0..self.all.len() {
@@ -240,17 +240,17 @@ impl FieldTables {
     }
 }
 
-/// Where the messages of one connection go.
+/// The target of the messages of one connection.
 struct MessageTarget {
     topic: String,
     type_name: String,
-    /// The table, or why there is none; neither for topics that are not asked for.
+    /// The place of the table, or the reason why there is none; `None` for topics that are not asked for.
     table: Option<Result<usize, String>>,
-    /// Messages stamped and not seen since.
+    /// The number of messages stamped and not seen since.
     missing: u64,
 }
 
-/// Takes in one bag.
+/// The reader's visitor of one bag.
 struct OfBag<'a> {
     job: &'a Extract,
     tables: &'a mut FieldTables,
@@ -260,7 +260,7 @@ struct OfBag<'a> {
 }
 
 impl OfBag<'_> {
-    /// Counts what was announced and never came.
+    /// Counts messages that were announced and never came.
     fn settle(&mut self) {
         let mut reasons: BTreeMap<usize, &str> = BTreeMap::new();
         for (at, source) in self.sources.iter().enumerate() {

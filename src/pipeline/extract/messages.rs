@@ -1,4 +1,4 @@
-//! A row per message, in order of time over all bags: what the index tells, without a payload.
+//! A row per message, in order of time over all bags, from the index, without payloads.
 
 use super::{Extract, Extracted, of_report, stop};
 use crate::bag::{Connection, ConnectionId, Message, Sink as Takes, Want};
@@ -24,7 +24,7 @@ const COLUMNS: &[(&str, ColumnKind)] = &[
     ("size_bytes", ColumnKind::I64),
 ];
 
-/// How many rows are gathered before they are written.
+/// The number of rows that are gathered before they are written.
 const MOST_ROWS: usize = 16 * 1024;
 
 /// Reads all times first, which takes little memory (what does not fit goes to an unnamed file), then writes them
@@ -53,7 +53,7 @@ pub(super) fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted>
     })
 }
 
-/// Where messages come from: what stands in all rows of one connection.
+/// The source of messages: the cells that are the same in all rows of one connection.
 struct RowSource {
     topic: TopicName,
     type_name: Arc<str>,
@@ -66,7 +66,7 @@ struct RowSource {
 #[derive(Default)]
 struct Taken {
     stamps: Stamps,
-    /// By place: the series of this number.
+    /// The source of each series, by the number of the series.
     sources: Vec<RowSource>,
     series: Vec<SeriesId>,
     notices: Notices,
@@ -89,7 +89,7 @@ impl Taken {
 /// The series of a connection: of messages whose size is known, and of the others.
 type Series = Option<[SeriesId; 2]>;
 
-/// Takes in one bag.
+/// The reader's visitor of one bag.
 struct OfBag<'a> {
     taken: &'a mut Taken,
     filter: &'a NameFilter,

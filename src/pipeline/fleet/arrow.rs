@@ -42,7 +42,7 @@ pub fn mission_batches(mission: &Mission) -> Result<Vec<(&'static str, RecordBat
         .collect()
 }
 
-/// The rows of a table `counts`, wherever it has been.
+/// The counts in the rows of a table `counts`, whichever program made it.
 ///
 /// # Errors
 /// [`Error::Usage`] for a column that is missing, of another type, or unknown where it must be known.

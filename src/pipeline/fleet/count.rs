@@ -1,4 +1,5 @@
-//! The map: what one bag says, or a part of its time, from its index alone; a pure function of the bag and the plan.
+//! The map: the counts of one bag, or of a part of its time, from its index alone; a pure function of the bag and the
+//! plan.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -16,19 +17,19 @@ use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::times::{SeriesId, Stamps};
 
-/// How to count.
+/// The options of counting.
 #[derive(Clone, Copy, Debug)]
 pub struct Tally {
     /// The length of a window.
     pub period: Period,
-    /// How much to know of messages.
+    /// The detail in which messages are counted.
     pub detail: CountDetail,
     /// Only messages inside this part of the bag's time; `None` for all of it.
     pub part: Option<Span>,
 }
 
 impl Tally {
-    /// All of a bag, in windows of this length.
+    /// The options for all of a bag, in windows of this length.
     pub fn of(period: Period) -> Self {
         Self {
             period,
@@ -38,13 +39,13 @@ impl Tally {
     }
 }
 
-/// What was counted of a bag.
+/// The counts of a bag.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CountedBag {
-    /// Sorted by window, topic, type and node.
+    /// The counts, sorted by window, topic, type and node.
     pub counts: Vec<Count>,
-    /// The bag itself, whatever became of it.
+    /// The bag itself, whether or not it could be read.
     pub bag: FleetBag,
 }
 
@@ -127,7 +128,7 @@ fn row(planned: &PlannedBag, tally: &Tally) -> FleetBag {
 }
 
 impl FleetBag {
-    /// Takes in what became of the bag.
+    /// Takes in the outcome of reading the bag.
     fn take(&mut self, report: &Report, taken: &BagTally) {
         let lost: Vec<String> = taken
             .notices
@@ -177,24 +178,24 @@ fn read(
     bag::open(input, &options)?.read(tally.part, taken)
 }
 
-/// Who sends what: topic, type and publisher.
+/// The key of a sender: topic, type and publisher.
 type SenderKey = (Arc<str>, Arc<str>, Option<Arc<str>>);
 
-/// What is known of one sender's messages.
+/// The messages of one sender.
 #[derive(Default)]
 struct SentMessages {
-    /// Of messages whose sizes are known, and of the others.
+    /// The series of messages whose sizes are known, and of the others.
     series: Vec<SeriesId>,
-    /// Counted without times, by the start of their window.
+    /// Numbers of messages counted without times, by the start of their window.
     lumps: BTreeMap<Stamp, u64>,
 }
 
-/// All that was told of a bag.
+/// All facts gathered from a bag.
 struct BagTally {
     origin: Stamp,
     period: Period,
     senders: BTreeMap<SenderKey, SentMessages>,
-    /// By connection.
+    /// The sender and the series of each connection.
     sources: Vec<(SenderKey, [SeriesId; 2])>,
     stamps: Stamps,
     notices: Notices,
@@ -250,7 +251,7 @@ impl BagTally {
         Ok(all)
     }
 
-    /// What one sender sent in each window, by the window's start.
+    /// The messages of one sender in each window, by the window's start.
     fn windows(&self, sent: &SentMessages) -> io::Result<BTreeMap<Stamp, InWindow>> {
         let mut all: BTreeMap<Stamp, InWindow> = BTreeMap::new();
         let lumps = Lumps {
@@ -293,7 +294,7 @@ fn place(start: Stamp, origin: Stamp, period: Period) -> i64 {
     i64::try_from(place).unwrap_or(i64::MIN)
 }
 
-/// What one sender sent in one window.
+/// The messages of one sender in one window.
 #[derive(Default)]
 struct InWindow {
     n: u64,

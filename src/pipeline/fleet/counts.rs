@@ -1,4 +1,4 @@
-//! What is counted of the bags of a fleet, and how the counts of parts become those of a whole.
+//! The counts of the bags of a fleet, and the merging of the counts of parts into those of a whole.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -6,10 +6,11 @@ use std::sync::Arc;
 use crate::bag::Tier;
 use crate::base::time::{Period, Span, Stamp};
 
-/// The version of both tables' columns: a change of what one means counts it up.
+/// The version of both tables' columns, raised when the meaning of one changes.
 pub const SCHEMA_VERSION: i64 = 1;
 
-/// What one publisher sent on one topic in one window: a row of the table `counts`. Windows without messages have none.
+/// The messages of one publisher on one topic in one window: a row of the table `counts`. Windows without messages have
+/// none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Count {
@@ -23,7 +24,7 @@ pub struct Count {
     pub period: Period,
     /// The window's place from the plan's origin: periods since 1970 with windows by the clock.
     pub win: i64,
-    /// When the window begins; it ends a period later.
+    /// The time at which the window begins; it ends a period later.
     pub start: Stamp,
     /// The topic as recorded.
     pub topic: Arc<str>,
@@ -31,9 +32,9 @@ pub struct Count {
     pub type_name: Arc<str>,
     /// The node that published, if the bag knows it.
     pub node: Option<Arc<str>>,
-    /// Messages, 1...
+    /// The number of messages, ≥ 1.
     pub n: u64,
-    /// Their payloads' bytes, if the index tells them.
+    /// The number of bytes of their payloads, if the index tells it.
     pub bytes: Option<u64>,
     /// The first message's time; unknown where a chunk was counted as a whole.
     pub first: Option<Stamp>,
@@ -43,8 +44,8 @@ pub struct Count {
     pub max_gap_ns: Option<i64>,
 }
 
-/// What says which counts are of the same messages, apart from the mission and the format, which follow from the bag.
-/// The order of a table's rows.
+/// The key of counts of the same messages, without the mission and the format, which follow from the bag. It is the
+/// order of a table's rows.
 type CountKey = (
     Arc<str>,
     Arc<str>,
@@ -72,7 +73,7 @@ impl Count {
 /// type and node.
 ///
 /// Exact for parts that do not overlap in time, as [`count`](super::count()) makes them. All parts of a bag go in at
-/// once: what lies between two parts is only known when no other lies there.
+/// once: the gap between two parts is only known when no other part lies in it.
 pub fn merge(counts: impl IntoIterator<Item = Count>) -> Vec<Count> {
     let mut all: BTreeMap<CountKey, Vec<Count>> = BTreeMap::new();
     for count in counts {
@@ -118,21 +119,21 @@ pub struct FleetBag {
     pub file_bytes: Option<u64>,
     /// The format's word, if it is a bag.
     pub format: Option<String>,
-    /// How it was read, if it was.
+    /// The tier in which it was read, if it was.
     pub tier: Option<Tier>,
     /// Whether nothing of it was lost.
     pub is_complete: bool,
-    /// All messages; with a part of the time, those in it.
+    /// The number of all messages; with a part of the time, of those in it.
     pub messages: u64,
     /// From the first message to the last plus 1 ns; unknown where every chunk was counted as a whole.
     pub span: Option<Span>,
     /// The length of a window.
     pub period: Period,
-    /// Where windows begin.
+    /// A moment at which a window begins.
     pub origin: Stamp,
-    /// What was lost, if something was.
+    /// The loss in words, if something was lost.
     pub lost: Option<String>,
-    /// Why it could not be read.
+    /// The reason why it could not be read.
     pub error: Option<String>,
 }
 

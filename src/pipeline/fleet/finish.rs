@@ -1,4 +1,4 @@
-//! The last step: the counts of one mission as a mission, with states, rates and what changed from window to window.
+//! The last step: the counts of one mission as a mission, with states, rates and the changes from window to window.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -13,9 +13,9 @@ use crate::graph::{State, per_second};
 use crate::mission::raw::{Raw, RawBag, RawEdge, RawNode, RawState, RawTopic, RawWindow};
 use crate::mission::{Mission, mission_of};
 
-/// Makes the mission that some counts tell of, in any order, those of all its bags together: every window from the
-/// first message to the last, a publication `active` in windows with messages and `silent` in those between. A node
-/// lives as long as it publishes. What only payloads tell (subscribers, `/rosout`) is not there, nor medians.
+/// Makes a mission of the counts of all its bags together, in any order: every window from the first message to the
+/// last, a publication `active` in windows with messages and `silent` in those between. A node lives as long as it
+/// publishes. Facts from payloads (subscribers, `/rosout`) are not there, nor medians.
 ///
 /// # Errors
 /// [`Error::Usage`] for no counts, for those of several missions or periods, and for more than 100,000 windows.
@@ -60,7 +60,7 @@ pub fn finish(counts: impl IntoIterator<Item = Count>) -> Result<Mission> {
     Ok(mission)
 }
 
-/// The period of the counts, and how many windows there are.
+/// The period of the counts, and the number of windows.
 fn check(counts: &[Count]) -> Result<(Period, usize)> {
     let Some(one) = counts.first() else {
         let hint = "a mission without a message has no windows";
@@ -87,7 +87,8 @@ fn check(counts: &[Count]) -> Result<(Period, usize)> {
     Ok((one.period, usize::try_from(many).unwrap_or(usize::MAX)))
 }
 
-/// From the first message to the last plus 1 ns; from the first window to the last where no message's time is known.
+/// The time of the mission: from the first message to the last plus 1 ns; from the first window to the last where no
+/// message's time is known.
 fn span(counts: &[Count], period: Period) -> Span {
     let first = counts.iter().map(|c| c.first.unwrap_or(c.start)).min();
     let last = |c: &Count| {
@@ -113,7 +114,7 @@ fn bags(counts: &[Count]) -> Vec<RawBag> {
 /// A topic, and a node that publishes it.
 type Publication = (Arc<str>, Arc<str>);
 
-/// What was sent in a window.
+/// The messages sent in a window.
 #[derive(Default)]
 struct WindowSums {
     topics: BTreeMap<Arc<str>, CountSum>,
@@ -124,7 +125,7 @@ struct WindowSums {
 struct CountSum {
     n: u64,
     bytes: Option<u64>,
-    /// How many counts it is of.
+    /// The number of counts in the sum.
     parts: usize,
     gap: Option<i64>,
 }

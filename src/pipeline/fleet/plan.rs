@@ -1,4 +1,4 @@
-//! What is fixed before anything is counted: which bags, whose mission each is part of, and where windows begin.
+//! The plan that is fixed before anything is counted: the bags, the mission of each, and the beginnings of windows.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,12 +12,12 @@ use crate::graph::window::Align;
 use crate::pipeline::extract::Bounds;
 use crate::pipeline::survey::recordings;
 
-/// How to make a plan.
+/// The options of a plan.
 #[derive(Clone, Debug)]
 pub struct Planning {
     /// The length of a window.
     pub period: Period,
-    /// Windows on whole periods of UTC, or from the first message of each mission.
+    /// The alignment: windows on whole periods of UTC, or from the first message of each mission.
     pub align: Align,
     /// A regular expression whose first group, or whole match, in a bag's path or URL is its mission.
     pub mission: Option<String>,
@@ -40,7 +40,7 @@ const TEN_SECONDS: Period = match Period::from_nanos(10_000_000_000) {
     None => unreachable!(),
 };
 
-/// How much to know of messages: their times, or only how many there are.
+/// The detail in which messages are counted: with their times, or only by their number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CountDetail {
     /// By chunks where a bag is far away and has more than 64 of them, as each would cost a request; else by the index.
@@ -48,7 +48,7 @@ pub enum CountDetail {
     Auto,
     /// Every message's time, from the index.
     Index,
-    /// By chunks: one that lies in one window is counted as a whole, without times. What has no chunks is read by its
+    /// By chunks: one that lies in one window is counted as a whole, without times. A bag without chunks is read by its
     /// index.
     Chunks,
 }
@@ -88,7 +88,8 @@ pub struct FleetPlan {
 }
 
 impl FleetPlan {
-    /// The missions that are number `index` of `count`, 1.., dealt one by one: equal plans are dealt equally everywhere.
+    /// The missions of shard `index` of `count`, counted from 1: missions are dealt to shards one by one, and equal
+    /// plans are dealt equally everywhere.
     ///
     /// # Errors
     /// [`Error::Usage`] unless `index` is 1 to `count`.
@@ -118,11 +119,12 @@ impl FleetPlan {
 /// Makes a plan of bags, folders with bags below them, and prefixes of stores, which end in a slash.
 ///
 /// A folder that is one recording of ROS 2 is one bag. Parts of a split recording (`x_0.bag`, `x_1.bag`, …, from 0 on
-/// without a hole) are one mission, `x`; the files `x/x_0.mcap`, … of a recording in a store too; every other bag is a
-/// mission of its own, called as its path without the format's ending.
+/// without a hole) are one mission, `x`; so are the files `x/x_0.mcap`, … of a recording of ROS 2 that are given one by
+/// one; every other bag is a mission of its own, named by its path without the format's ending.
 ///
 /// # Errors
-/// Where a folder or a store cannot be listed, or the pattern is none. A bag that cannot be read is found out later.
+/// Where a folder cannot be listed, or the pattern is not a regular expression. A bag that cannot be read is noticed
+/// later.
 pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
     let mut uris = Vec::new();
     for source in sources {
@@ -165,7 +167,7 @@ fn listed(source: &str) -> Result<Vec<String>> {
     }
 }
 
-/// What bags are called at the end, the longest first.
+/// The endings of the names of bags, the longest first.
 fn endings() -> Vec<String> {
     let all = bag::FORMATS.iter().flat_map(|format| format.extensions);
     let mut all: Vec<String> = all.map(|ending| format!(".{ending}")).collect();
@@ -193,7 +195,7 @@ fn missions(uris: &[String], pattern: Option<&str>) -> Result<Vec<String>> {
     };
     let pattern = Regex::new(pattern).map_err(|error| {
         Error::usage(
-            format!("`{pattern}` is no regular expression: {error}"),
+            format!("`{pattern}` is not a regular expression: {error}"),
             "its first group, or all that it matches, names the mission",
         )
     })?;
@@ -268,7 +270,7 @@ fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
     Ok(())
 }
 
-/// When a bag begins, by its tail if that tells it.
+/// The time at which a bag begins, by its tail if that tells it.
 fn begins(input: &Input) -> Result<Option<Stamp>> {
     if input.is_pipe() {
         return Err(Error::usage(

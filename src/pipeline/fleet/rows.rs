@@ -1,4 +1,4 @@
-//! The two tables of a fleet: which columns they have, and what stands in them.
+//! The two tables of a fleet: their columns and cells.
 
 use super::counts::{Count, FleetBag, SCHEMA_VERSION};
 use crate::base::table::{Batch, ColumnKind, TableCell};
@@ -22,7 +22,7 @@ pub(super) const COUNTS: &[(&str, ColumnKind)] = &[
     ("max_gap_ns", ColumnKind::I64),
 ];
 
-/// A time as a number: engines that know no nanoseconds (Spark) would cut a timestamp.
+/// A time as a number: engines without nanoseconds (Spark) would cut a timestamp.
 fn nanos(stamp: Stamp) -> TableCell<'static> {
     TableCell::Int(stamp.0)
 }

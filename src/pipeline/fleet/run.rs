@@ -23,7 +23,7 @@ use crate::export::tables::{TableFormat, writer::Writer};
 use crate::export::target::Target;
 use crate::pipeline::{Stage, Watch};
 
-/// What to do about a bag that cannot be read at all.
+/// The treatment of a bag that cannot be read at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnError {
     /// Give it a row in `bags` that says why.
@@ -39,24 +39,24 @@ pub enum OnError {
 pub struct FleetJob {
     /// Bags; folders with bags below them; URLs; prefixes of stores, which end in a slash.
     pub sources: Vec<String>,
-    /// How to plan.
+    /// The options of the plan.
     pub planning: Planning,
-    /// How much to know of messages.
+    /// The detail in which messages are counted.
     pub detail: CountDetail,
-    /// Which missions to count: number so of so many, 1...
+    /// The shard of missions to count: its number, counted from 1, and the number of shards; `None` for all missions.
     pub shard: Option<(usize, usize)>,
     /// Whether to leave out bags whose tables are there already, made of the same version of them in the same way.
     pub skip_existing: bool,
-    /// What to do about a bag that cannot be read.
+    /// The treatment of a bag that cannot be read.
     pub on_error: OnError,
-    /// How many bags to count at a time; by default one per processor, more where bags are far away.
+    /// The number of bags to count at a time; by default one per processor.
     pub jobs: Option<NonZeroUsize>,
-    /// Where the folders `counts` and `bags` are made.
+    /// The folder in which the folders `counts` and `bags` are made.
     pub folder: PathBuf,
 }
 
 impl FleetJob {
-    /// These bags into that folder, with every option as the command line has it.
+    /// A job that counts these bags into that folder, with every option as the command line has it.
     pub fn new(sources: Vec<String>, folder: PathBuf) -> Self {
         Self {
             sources,
@@ -71,21 +71,21 @@ impl FleetJob {
     }
 }
 
-/// What came of it.
+/// The outcome of `bagreel tables`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Tabled {
-    /// Bags whose tables were written.
+    /// The number of bags whose tables were written.
     pub bags: usize,
-    /// Bags whose tables were there already.
+    /// The number of bags whose tables were there already.
     pub kept: usize,
-    /// Bags written that could not be read.
+    /// The number of bags written that could not be read.
     pub unreadable: usize,
-    /// Bags written of which something was lost.
+    /// The number of bags written of which something was lost.
     pub incomplete: usize,
-    /// Messages counted.
+    /// The number of messages counted.
     pub messages: u64,
-    /// Rows of `counts`.
+    /// The number of rows of `counts`.
     pub rows: usize,
     /// Bags that a store did not give, and why; they have no row, and another run counts them.
     pub refused: Vec<(String, String)>,
@@ -147,7 +147,7 @@ fn jobs(job: &FleetJob, plan: &FleetPlan) -> usize {
     jobs.min(plan.bags.len())
 }
 
-/// What became of one bag.
+/// The outcome of one bag.
 enum BagOutcome {
     Kept,
     Written { counted: Box<CountedBag> },
@@ -311,10 +311,11 @@ fn changed(path: &Path) -> Option<u128> {
     of(path).max(newest)
 }
 
-/// 64 bits: among a million bags the chance that two share a name is one in 30 million.
+/// The number of hexadecimal digits of a digest, 64 bits: among a million bags the chance that two share a name is one
+/// in 30 million.
 const DIGITS: usize = 16;
 
-/// What the files of one bag are called.
+/// The names of the files of one bag.
 struct FileName {
     bag: String,
     made_of: String,
@@ -326,7 +327,7 @@ impl FileName {
     }
 }
 
-/// The two folders, and what was in them before.
+/// The two folders, and the files in them before.
 struct FleetFiles {
     counts: PathBuf,
     bags: PathBuf,
