@@ -5,17 +5,28 @@ use super::boxes::{ItemBox, corners};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::view::ItemKind;
 
-/// Moves all badges of this radius to places where they cover no line and no other box, as far as there are any.
+/// The most boxes and arrows among which room is looked for: each place is held against all of them, and in a drawing
+/// of more a badge is smaller than a point.
+const MOST: usize = 3000;
+
+/// Moves all badges of this radius to places where they cover no line and no other box, as far as there are any; those
+/// of very large drawings stay where they are.
 pub(super) fn place_badges(
     (kinds, cards): (&[ItemKind], &mut [ItemBox]),
     tracks: &mut [ArrowPath],
     radius: f64,
     scale: f64,
 ) {
+    for (card, kind) in cards.iter_mut().zip(kinds) {
+        card.badge = corners(*kind, card.place, scale)[0];
+    }
+    if cards.len() + tracks.len() > MOST {
+        return;
+    }
     let room = Room::new(cards, tracks, radius);
     for (at, (card, kind)) in cards.iter_mut().zip(kinds).enumerate() {
         let free = corners(*kind, card.place, scale);
-        card.badge = room.best(&free, (Some(at), None)).unwrap_or(free[0]);
+        card.badge = room.best(&free, (Some(at), None)).unwrap_or(card.badge);
     }
     for (at, track) in tracks.iter_mut().enumerate() {
         let best = room.best(&track.spots, (None, Some(at)));
