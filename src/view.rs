@@ -52,7 +52,7 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     (view, notices)
 }
 
-/// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
+/// The boxes, arrows and namespaces of [`view`] without the windows, to try whether they fit on a page.
 pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     let viewed = items::Viewed::new(&mission.elements, options);
     staged(viewed, options, frames::Frames::default())
@@ -115,7 +115,7 @@ pub struct Item {
     pub kind: ItemKind,
     /// The full name, unique among items of its word: `/base/driver`, `/go/action_topics`, `/tf`.
     pub name: Arc<str>,
-    /// The name as it is drawn, in full: that of a node without what is new in every run.
+    /// The name as it is drawn, in full: that of a node without the part that is new in every run.
     pub label: Arc<str>,
     /// The nodes and topics it stands for, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
@@ -258,7 +258,7 @@ pub struct Shown {
     pub topics: usize,
     /// The number of equal namespaces it stands for in the window; 0 for all else.
     pub each: usize,
-    /// The number of headlines about what is inside a folded namespace or a bundle; `None` without any.
+    /// The number of headlines of each kind about elements inside a folded namespace or a bundle; `None` without any.
     pub inside: Option<Box<Counts>>,
     /// Messages in the window, if known.
     pub count: Option<u64>,
@@ -360,7 +360,7 @@ pub struct SeenWindow {
     pub arrows: Vec<Shown>,
 }
 
-/// One window of the picture; what is seen in it is in [`View::seen`].
+/// One window of the picture; the items and arrows in it are in [`View::seen`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// The window's index, counted from 0.

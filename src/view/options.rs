@@ -77,7 +77,7 @@ pub struct Hide {
 }
 
 impl Hide {
-    /// Nothing is left out.
+    /// The choice that leaves nothing out.
     pub const NONE: Self = Self {
         quiet: false,
         debug: false,
@@ -138,7 +138,7 @@ pub struct Grouping {
 }
 
 impl Grouping {
-    /// Every node and topic on its own.
+    /// The choice that draws every node and topic on its own.
     pub const NONE: Self = Self {
         actions: false,
         tf: false,

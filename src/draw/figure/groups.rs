@@ -51,7 +51,7 @@ pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<NodeGro
         .collect()
 }
 
-/// A row per group: alive while a member is, busy by what all send.
+/// A row per group: alive while a member is, busy by the messages of all.
 pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<Track> {
     groups(source, tracks)
         .iter()

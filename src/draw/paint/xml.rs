@@ -1,4 +1,4 @@
-//! The writer of every SVG of ours: it closes all tags and escapes all text.
+//! The writer of all our SVG: it closes all tags and escapes all text.
 
 use std::fmt::{self, Display, Write as _};
 
