@@ -260,7 +260,7 @@ pub struct Shown {
     pub each: usize,
     /// The number of headlines of each kind about elements inside a folded namespace or a bundle; `None` without any.
     pub inside: Option<Box<Counts>>,
-    /// Messages in the window, if known.
+    /// The number of messages in the window, if known.
     pub count: Option<u64>,
     /// The lifecycle state of a node, if it has one.
     pub lifecycle: Option<Arc<str>>,
@@ -292,27 +292,27 @@ impl Shown {
 /// drawn as one box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Nodes that started.
+    /// The number of nodes that started.
     pub nodes_added: usize,
-    /// Nodes that stopped.
+    /// The number of nodes that stopped.
     pub nodes_removed: usize,
-    /// Topics of unknown publisher that appeared.
+    /// The number of topics of unknown publisher that appeared.
     pub topics_added: usize,
-    /// Topics of unknown publisher that vanished.
+    /// The number of topics of unknown publisher that vanished.
     pub topics_removed: usize,
-    /// Connections that living nodes made.
+    /// The number of connections that living nodes made.
     pub edges_added: usize,
-    /// Connections that living nodes gave up.
+    /// The number of connections that living nodes gave up.
     pub edges_removed: usize,
-    /// Nodes that ended and came back.
+    /// The number of nodes that ended and came back.
     pub restarted: usize,
-    /// Nodes and topics that paused.
+    /// The number of nodes and topics that paused.
     pub silent: usize,
-    /// Topics with other senders.
+    /// The number of topics that other senders took over.
     pub handed_over: usize,
-    /// Rates that changed.
+    /// The number of rates that changed.
     pub rates: usize,
-    /// Lifecycle states, types and qualities of service that changed.
+    /// The number of lifecycle states, types and qualities of service that changed.
     pub values: usize,
 }
 
@@ -369,7 +369,7 @@ pub struct Frame {
     pub span: Span,
     /// Whether it is shorter than the others.
     pub partial: bool,
-    /// All messages of the bag in the window, hidden topics included.
+    /// The number of all messages of the bag in the window, hidden topics included.
     pub messages: u64,
     /// For each namespace that stands for several, in the order of [`View::namespaces`], the presence of each of them.
     pub rolls: Vec<Vec<Attendance>>,
@@ -396,7 +396,7 @@ impl Frame {
         }
     }
 
-    /// The caption in at most so many phrases, the rest counted: `a started; b stopped; and 3 more`.
+    /// The caption in at most `most` phrases, the rest counted: `a started; b stopped; and 3 more`.
     pub fn words(&self, most: usize) -> String {
         let mut parts: Vec<String> = self
             .caption

@@ -70,7 +70,7 @@ pub struct Hide {
     pub leaf: bool,
     /// `/tf` and `/tf_static`.
     pub tf: bool,
-    /// Topics of parameters.
+    /// Topics that carry parameters.
     pub params: bool,
     /// Nodes without a sign of life in the window.
     pub unreachable: bool,

@@ -15,7 +15,7 @@ pub(crate) struct Xml {
 }
 
 impl Xml {
-    /// Empty XML with room for so many bytes.
+    /// Empty XML with room for `bytes` bytes.
     pub(crate) fn with_capacity(bytes: usize) -> Self {
         Self {
             out: String::with_capacity(bytes),

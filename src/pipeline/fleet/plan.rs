@@ -52,7 +52,7 @@ pub enum CountDetail {
 }
 
 impl CountDetail {
-    /// All of them.
+    /// All details.
     pub const ALL: [Self; 2] = [Self::Index, Self::Chunks];
 
     /// Its word.
