@@ -23,7 +23,7 @@
 //! # Ok::<(), bagreel::Error>(())
 //! ```
 //!
-//! The events of the mission, the same for all windows, are its [`Ledger`]; `examples/story.rs` prints it.
+//! The [`Ledger`] of a mission holds its events, the same for all windows; `examples/story.rs` prints it.
 //!
 //! The stations of the line are the modules below, in this order; each uses only those before it:
 //!
@@ -31,15 +31,15 @@
 //! |---|---|---|
 //! | `base` | | times, names, errors, notices, words: the nouns that all share |
 //! | [`bag`] | files | connections and messages, told apart by the first bytes |
-//! | `evidence` | messages | claims: who talks to whom, how we know, how strongly |
-//! | `graph` | claims and windows | the computation graph of each window, and what changed |
+//! | `evidence` | messages | claims: the publishers and subscribers, with the kind and the strength of the evidence |
+//! | `graph` | claims and windows | the computation graph of each window, and the changes |
 //! | `mission` | graphs | the whole sequence, as a value and as JSON; its log and its summary |
-//! | `view` | a mission | what the picture shows of it: filtered, grouped, collapsed, counted |
+//! | `view` | a mission | the part of it that the picture shows: filtered, grouped, collapsed, counted |
 //! | `layout` | the union of a view | places for everything, once, so that nothing moves |
 //! | `draw` | a view with places | scenes, and the painters that turn a scene into SVG, PDF or pixels |
 //! | `export` | scenes and missions | files |
-//! | `gate` | missions and expectations | what differs, and whether that is allowed |
-//! | `pipeline` | what was asked for | the whole program in the order it happens |
+//! | `gate` | missions and expectations | the differences, and whether they are allowed |
+//! | `pipeline` | a job | the whole program in the order it happens |
 //! | `cli` | the command line | a job for the pipeline |
 //!
 //! To add a thing: a bag format is a file in `bag/` and a row in [`bag::FORMATS`], a kind of evidence one in
@@ -47,12 +47,12 @@
 //! `styles/` and `draw::style::BUILTIN`, a layout engine one in `layout/` and `layout::ENGINES`.
 //!
 //! Glossary. A *bag* is a recording; a *connection* one source of messages in it. A *period* is a length of time, a
-//! *window* one half-open interval `[start, end)`. A *claim* is what one source says about the graph, with the times at
-//! which it said so; a *proof* is what follows from claims; a *degree* is how strongly something is known. The *graph*
-//! of a window holds the *states* of nodes, topics, publications and subscriptions, its *elements*. A *mission* is the
-//! sequence of all windows. A *role* is a node's name without what is new in every run. The *view* holds *items*
-//! (boxes) and *arrows*; a *mark* says what changed about one. A *scene* is a drawing with every place and colour
-//! decided; a *painter* writes it down; an *encoder* makes a file of it.
+//! *window* one half-open interval `[start, end)`. A *claim* is a statement of one source about the graph, with the
+//! times at which it said so; a *proof* is a fact that follows from claims; a *degree* is the strength of the evidence
+//! for something. The *graph* of a window holds the *states* of nodes, topics, publications and subscriptions, its
+//! *elements*. A *mission* is the sequence of all windows. A *role* is a node's name without the part that is new in
+//! every run. The *view* holds *items* (boxes) and *arrows*; a *mark* is the change of one. A *scene* is a drawing with
+//! every place and colour decided; a *painter* writes it down; an *encoder* makes a file of it.
 //!
 //! The library is silent and repeatable: it never prints (but for `cli`), reads no clock, and writes the same bytes
 //! for the same bag.

@@ -1,4 +1,4 @@
-//! The whole program in the order it happens: read, divide, build, compare, draw, write.
+//! The whole program in the order it happens: it reads, divides, builds, compares, draws and writes.
 
 mod collect;
 mod draw;

@@ -52,7 +52,7 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     (view, notices)
 }
 
-/// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
+/// The boxes, arrows and namespaces of [`view`] without the windows, to try whether they fit on a page.
 pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
     let viewed = items::Viewed::new(&mission.elements, options);
     staged(viewed, options, frames::Frames::default())
@@ -115,7 +115,7 @@ pub struct Item {
     pub kind: ItemKind,
     /// The full name, unique among items of its word: `/base/driver`, `/go/action_topics`, `/tf`.
     pub name: Arc<str>,
-    /// The name as it is drawn, in full: that of a node without what is new in every run.
+    /// The name as it is drawn, in full: that of a node without the part that is new in every run.
     pub label: Arc<str>,
     /// The nodes and topics it stands for, sorted; one for a plain node or topic.
     pub members: Vec<Element>,
@@ -258,9 +258,9 @@ pub struct Shown {
     pub topics: usize,
     /// The number of equal namespaces it stands for in the window; 0 for all else.
     pub each: usize,
-    /// The number of headlines about what is inside a folded namespace or a bundle; `None` without any.
+    /// The number of headlines of each kind about elements inside a folded namespace or a bundle; `None` without any.
     pub inside: Option<Box<Counts>>,
-    /// Messages in the window, if known.
+    /// The number of messages in the window, if known.
     pub count: Option<u64>,
     /// The lifecycle state of a node, if it has one.
     pub lifecycle: Option<Arc<str>>,
@@ -292,27 +292,27 @@ impl Shown {
 /// drawn as one box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Nodes that started.
+    /// The number of nodes that started.
     pub nodes_added: usize,
-    /// Nodes that stopped.
+    /// The number of nodes that stopped.
     pub nodes_removed: usize,
-    /// Topics of unknown publisher that appeared.
+    /// The number of topics of unknown publisher that appeared.
     pub topics_added: usize,
-    /// Topics of unknown publisher that vanished.
+    /// The number of topics of unknown publisher that vanished.
     pub topics_removed: usize,
-    /// Connections that living nodes made.
+    /// The number of connections that living nodes made.
     pub edges_added: usize,
-    /// Connections that living nodes gave up.
+    /// The number of connections that living nodes gave up.
     pub edges_removed: usize,
-    /// Nodes that ended and came back.
+    /// The number of nodes that ended and came back.
     pub restarted: usize,
-    /// Nodes and topics that paused.
+    /// The number of nodes and topics that paused.
     pub silent: usize,
-    /// Topics with other senders.
+    /// The number of topics that other senders took over.
     pub handed_over: usize,
-    /// Rates that changed.
+    /// The number of rates that changed.
     pub rates: usize,
-    /// Lifecycle states, types and qualities of service that changed.
+    /// The number of lifecycle states, types and qualities of service that changed.
     pub values: usize,
 }
 
@@ -360,7 +360,7 @@ pub struct SeenWindow {
     pub arrows: Vec<Shown>,
 }
 
-/// One window of the picture; what is seen in it is in [`View::seen`].
+/// One window of the picture; the items and arrows in it are in [`View::seen`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// The window's index, counted from 0.
@@ -369,7 +369,7 @@ pub struct Frame {
     pub span: Span,
     /// Whether it is shorter than the others.
     pub partial: bool,
-    /// All messages of the bag in the window, hidden topics included.
+    /// The number of all messages of the bag in the window, hidden topics included.
     pub messages: u64,
     /// For each namespace that stands for several, in the order of [`View::namespaces`], the presence of each of them.
     pub rolls: Vec<Vec<Attendance>>,
@@ -397,7 +397,7 @@ impl Frame {
         }
     }
 
-    /// The caption in at most so many phrases, the rest counted: `a started; b stopped; and 3 more`.
+    /// The caption in at most `most` phrases, the rest counted: `a started; b stopped; and 3 more`.
     pub fn words(&self, most: usize) -> String {
         let mut parts: Vec<String> = self
             .caption

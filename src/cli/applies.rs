@@ -299,7 +299,7 @@ pub(super) fn check_diff(given: &Given, infer: &[String], has_picture: bool) -> 
     }
 }
 
-/// Refuses the options of `baseline` that add what it never writes.
+/// Refuses the options of `baseline` that add elements that it never writes.
 pub(super) fn check_baseline(given: &Given) -> Result<()> {
     match given.any(&["source", "infer"]) {
         None => Ok(()),

@@ -97,7 +97,7 @@ fn is_hangup_ignored() -> bool {
 
 #[cfg(not(unix))]
 fn listen(stop: &Stop) {
-    /// Ctrl-C has no number here; shells of other systems call it this.
+    /// The number of Ctrl-C on other systems; it has none here.
     const INTERRUPT: u8 = 2;
     let stop = stop.clone();
     // Without a handler Ctrl-C ends us at once, which is what it did before.

@@ -115,7 +115,7 @@ impl Terminal {
         self.stop.code()
     }
 
-    /// Prints something worth knowing unless quiet.
+    /// Prints a note unless quiet.
     pub(crate) fn note(&mut self, text: &str) {
         if !self.quiet {
             self.line("36", "note", text);

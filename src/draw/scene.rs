@@ -97,7 +97,7 @@ pub enum Step {
 pub struct Stroke {
     /// Its colour.
     pub color: Color,
-    /// Its width in pixels.
+    /// Its width.
     pub width: f64,
     /// The lengths of line, gap, line, gap, …; empty for a solid line. Drawn with round ends if its lines are shorter
     /// than its width.

@@ -11,7 +11,8 @@ use toml::{Spanned, Table, Value};
 use crate::base::error::{Error, Result};
 use crate::draw::text::Weight;
 
-/// The built-in styles by name; the first is the default and complete, the others say what differs from their `base`.
+/// The built-in styles by name; the first is the default and complete, the others hold only the keys that differ from
+/// their `base`.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("light", include_str!("../../styles/light.toml")),
     ("dark", include_str!("../../styles/dark.toml")),

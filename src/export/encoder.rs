@@ -79,7 +79,7 @@ impl Written {
         }
     }
 
-    /// Counts one more file of so many bytes.
+    /// Counts one more file of `bytes` bytes.
     pub(crate) fn add(&mut self, bytes: u64) {
         self.files += 1;
         self.bytes += bytes;

@@ -214,7 +214,7 @@ impl HtmlPage<'_> {
         let graph = Classes::new(drawn.view, &drawn.union, self.style, detail);
         let runs = &drawn.runs;
         let window = u32::try_from(still).unwrap_or(0);
-        // A margin, and room around a small graph: three boxes as large as the screen are no pleasure.
+        // A margin, and room around a small graph: three boxes as large as the screen are hard to read.
         let size = drawn.union.size;
         let (w, h) = ((size.w + 24.0).max(860.0), (size.h + 24.0).max(480.0));
         let (x, y) = ((size.w - w) / 2.0, (size.h - h) / 2.0);

@@ -65,7 +65,7 @@ pub(crate) fn pass(
     jobs.into_iter().map(OutputJob::finish).collect()
 }
 
-/// An output in the making.
+/// An output being written.
 struct OutputJob<'a> {
     output: &'a Output,
     encoder: Option<Box<dyn Encoder + 'a>>,

@@ -45,7 +45,7 @@ impl OutputSink {
     pub(crate) fn create(target: &Target, limit: Option<u64>) -> Result<Self> {
         let way = match target {
             Target::Stdout if limit.is_some() => Ok(SinkTarget::Memory(Vec::new())),
-            // An output that the user asked for on standard output is no message of the library's.
+            // An output that the user asked for on standard output is not a message of the library's.
             Target::Stdout => Ok(SinkTarget::Stdout(io::stdout())),
             Target::Path(path) if is_special(path) => File::options()
                 .write(true)
@@ -93,7 +93,7 @@ impl OutputSink {
         handle.transpose().map_err(self.error())
     }
 
-    /// Finishes the file: it appears under its final name, replacing what was there. Returns its size in bytes.
+    /// Finishes the file: it appears under its final name, replacing a file that was there. Returns its size in bytes.
     ///
     /// # Errors
     /// Where the last bytes do not fit or the name cannot be taken; then nothing is left behind.

@@ -88,7 +88,7 @@ impl Drop for Process {
     }
 }
 
-/// ffmpeg at work.
+/// A running ffmpeg.
 struct FfmpegJob {
     child: Process,
     /// The pipe for frames.

@@ -154,7 +154,7 @@ mod tests {
     use super::*;
     use crate::gate::read;
 
-    /// An expectation of so many nodes, and of topics with these names; it must be one that can be read.
+    /// An expectation of `nodes` nodes, and of topics with these names; it must be one that can be read.
     fn of(nodes: usize, topics: &[String]) -> (Written, usize) {
         let mut draft = Draft::default();
         for n in 0..nodes {

@@ -38,7 +38,7 @@ pub struct Reading {
     pub skip_unchanged: bool,
     /// The options of collecting evidence.
     pub collect: collector::CollectOptions,
-    /// The additions to what the bags tell.
+    /// The additions to the facts that the bags tell.
     pub conclude: conclude::ConcludeOptions,
     /// The number of windows of silence after which an element that never speaks again counts as gone.
     pub grace: usize,
@@ -209,7 +209,7 @@ fn mission(
     let recorded = &collected.recorded;
     let history = history(recorded, findings)?;
     let graphs = |spans: &[Span], grace| graphs(recorded, findings, &history, spans, grace);
-    // Cells are no windows, in which grace is counted.
+    // Cells are not windows, in which grace is counted.
     let activity = activity(&history, collected.range, |spans| graphs(spans, 0))?;
     let ledger = told(&history, &activity, collected, reading)?;
     let mut windows = divided(reading, collected.range, &ledger)?;

@@ -16,7 +16,8 @@ const MOST_NAMED: usize = 3;
 /// The largest length of a name in characters; longer ones are cut.
 const LONGEST_NAME: usize = 48;
 
-/// Puts headlines into words, with full names: what is called alike in two namespaces is told apart.
+/// A writer of captions: it puts headlines into words, with full names, so that equal names in two namespaces are told
+/// apart.
 pub(crate) struct Speaker<'a> {
     elements: &'a Elements,
     viewed: &'a Viewed,

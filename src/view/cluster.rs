@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Item, Namespace};
 
-/// Deeper nesting is not drawn; a name of nothing but slashes must not make thousands of boxes in each other.
+/// The largest depth of nested boxes; a name of nothing but slashes must not make thousands of boxes in each other.
 const DEEPEST: usize = 16;
 
 /// The namespaces of these items, sorted by name, parents before children, and each item's innermost one set.

@@ -5,7 +5,7 @@ use crate::graph::Element;
 use crate::mission::ledger::Kind;
 
 impl Counts {
-    /// Counts headlines.
+    /// The number of headlines of each kind.
     pub(crate) fn of<'a>(headlines: impl IntoIterator<Item = &'a Headline>) -> Self {
         let mut counts = Self::default();
         for headline in headlines {

@@ -1,4 +1,4 @@
-//! One notice for everything that the picture leaves out, and how to see it.
+//! The notices about elements that the picture leaves out, one per reason, with the way to see them.
 
 use std::collections::BTreeMap;
 

@@ -54,7 +54,7 @@ pub(crate) struct Viewed {
 }
 
 /// The largest number of pairs of publishers and subscribers drawn from node to node. One topic with thousands of both
-/// has millions, which nobody could read.
+/// has millions, too many to be read.
 const MOST_PAIRS: usize = 200_000;
 
 /// The fleets to draw as one: none where names are wanted exactly, or everything on its own.
@@ -296,7 +296,8 @@ impl Viewed {
         }
     }
 
-    /// Whether the picture shows this or a box that it is part of. What a filter leaves out is not told either.
+    /// Whether the picture shows this or a box that it is part of. Elements that a filter leaves out are not told
+    /// either.
     pub(crate) fn sees(&self, what: Element) -> bool {
         let is = |reasons: &[Option<_>], id: u32| reasons.get(id as usize) == Some(&None);
         let both = |edge: Option<&(NodeId, TopicId)>| {

@@ -70,14 +70,14 @@ pub struct Hide {
     pub leaf: bool,
     /// `/tf` and `/tf_static`.
     pub tf: bool,
-    /// Topics of parameters.
+    /// Topics that carry parameters.
     pub params: bool,
     /// Nodes without a sign of life in the window.
     pub unreachable: bool,
 }
 
 impl Hide {
-    /// Nothing is left out.
+    /// The choice that leaves nothing out.
     pub const NONE: Self = Self {
         quiet: false,
         debug: false,
@@ -138,7 +138,7 @@ pub struct Grouping {
 }
 
 impl Grouping {
-    /// Every node and topic on its own.
+    /// The choice that draws every node and topic on its own.
     pub const NONE: Self = Self {
         actions: false,
         tf: false,

@@ -1,5 +1,4 @@
-//! Nodes by what they are for: the runs of one anonymous node are one box, named without the part that is new in every
-//! run.
+//! Nodes by role: the runs of one anonymous node are one box, named without the part that is new in every run.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

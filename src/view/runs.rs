@@ -280,7 +280,7 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
     }
 }
 
-/// Notes a value unless it is what the list has already.
+/// Notes a value unless the list has it already.
 fn push(list: &mut Vec<Run>, window: u32, value: u32) {
     if list.last().map_or(0, |last| last.value) != value {
         list.push(Run {

@@ -160,7 +160,7 @@ pub(crate) fn finish(
 }
 
 impl Selection {
-    /// Nodes as the filter of namespaces alone sees them: what is hidden for another reason still holds its topics.
+    /// Nodes as the filter of namespaces alone sees them: nodes hidden for another reason still hold their topics.
     fn nodes_by_filter(&self) -> Vec<Option<Reason>> {
         let by_filter = |reason: &Option<Reason>| reason.filter(|r| *r == Reason::NsFilter);
         self.nodes.iter().map(by_filter).collect()

@@ -113,7 +113,7 @@ pub(crate) struct Now<'a> {
     mission: &'a Mission,
     options: &'a ViewOptions,
     viewed: &'a Viewed,
-    /// A window as long as this one.
+    /// The present window, or an earlier one of the same length.
     span: Span,
     /// The elements that live in it, and those that pause.
     lives: (Alive, Alive),

@@ -145,8 +145,8 @@ pub(crate) fn names(
     flow(canvas, width, y, &items)
 }
 
-/// From the right: a label stands a line lower than every later one that it overlaps, so that no leader crosses a
-/// text. `None` where that takes more than three lines.
+/// Draws the titles of the phases, set from the right: one stands a line lower than every later one that it overlaps,
+/// so that no leader crosses a text. Returns the y at which they end; `None` where that takes more than three lines.
 fn staircase(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,

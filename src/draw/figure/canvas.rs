@@ -94,7 +94,7 @@ impl<'a> PaperCanvas<'a> {
         }
     }
 
-    /// Begins a group; what is drawn next is in it.
+    /// Begins a group, which holds everything drawn next.
     pub(crate) fn begin(&mut self, id: &str) {
         self.groups.push(Group::named(id));
     }
@@ -185,20 +185,20 @@ impl<'a> PaperCanvas<'a> {
         }
     }
 
-    /// A filled rectangle.
+    /// Draws a filled rectangle.
     pub(crate) fn fill(&mut self, rect: Rect, color: Color) {
         let form = Form::Rect(self.scaled(rect), 0.0);
         self.shape(Shape::filled(form, color));
     }
 
-    /// A rectangle with round corners, a line around and a filling.
+    /// Draws a rectangle with round corners, a line around and a filling.
     pub(crate) fn frame(&mut self, rect: Rect, radius: f64, fill: Color, stroke: &Stroke) {
         let form = Form::Rect(self.scaled(rect), radius * self.scale);
         let stroke = stroke.scaled(self.scale);
         self.shape(Shape { form, fill, stroke });
     }
 
-    /// A disc with a line around.
+    /// Draws a disc with a line around.
     pub(crate) fn disc(&mut self, at: Point, radius: f64, fill: Color, stroke: &Stroke) {
         let rect = Rect::around(at, Size::new(2.0 * radius, 2.0 * radius));
         let form = Form::Ellipse(self.scaled(rect));
@@ -206,12 +206,12 @@ impl<'a> PaperCanvas<'a> {
         self.shape(Shape { form, fill, stroke });
     }
 
-    /// A straight line.
+    /// Draws a straight line.
     pub(crate) fn line(&mut self, from: Point, to: Point, stroke: &Stroke) {
         self.path(&[Step::Move(from), Step::Line(to)], Color::NONE, stroke);
     }
 
-    /// A closed shape without a line around.
+    /// Draws a closed shape without a line around.
     pub(crate) fn polygon(&mut self, points: &[Point], color: Color) {
         let first = points.iter().take(1).map(|p| Step::Move(*p));
         let rest = points.iter().skip(1).map(|p| Step::Line(*p));
@@ -219,7 +219,7 @@ impl<'a> PaperCanvas<'a> {
         self.path(&steps, color, &Stroke::default());
     }
 
-    /// A path.
+    /// Draws a path.
     pub(crate) fn path(&mut self, steps: &[Step], fill: Color, stroke: &Stroke) {
         let at = |p: &Point| Point::new(p.x * self.scale, p.y * self.scale);
         let step = |step: &Step| match step {
@@ -233,7 +233,7 @@ impl<'a> PaperCanvas<'a> {
         self.shape(Shape { form, fill, stroke });
     }
 
-    /// A filled head of an arrow that ends at `tip`, coming from `from`.
+    /// Draws a filled head of an arrow that ends at `tip`, coming from `from`.
     pub(crate) fn head(&mut self, from: Point, tip: Point, length: f64, color: Color) {
         let (dx, dy) = (tip.x - from.x, tip.y - from.y);
         let far = libm::hypot(dx, dy).max(1e-9);
@@ -260,7 +260,7 @@ impl<'a> PaperCanvas<'a> {
         drawn.filter(|g| !g.pieces.is_empty()).collect()
     }
 
-    /// The page, `size` in millimetres; its width is exact.
+    /// The page as a scene, `size` in millimetres; its width is exact.
     pub(crate) fn into_scene(self, size: Size, title: String) -> Scene {
         let by = self.scale;
         Scene {

@@ -65,7 +65,7 @@ pub(crate) fn groups(source: &FigureSource<'_>, tracks: &[Track], depth: usize) 
         .collect()
 }
 
-/// A row per group: alive while a member is, busy by what all send.
+/// A row per group: alive while a member is, busy by the messages of all.
 pub(crate) fn tracks(source: &FigureSource<'_>, tracks: &[Track], depth: usize) -> Vec<Track> {
     groups(source, tracks, depth)
         .iter()

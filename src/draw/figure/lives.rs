@@ -417,7 +417,8 @@ pub(crate) fn cross(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     canvas.line(Point::new(x - a, y + b), Point::new(x + a, y - b), &stroke);
 }
 
-/// Draws the topics that a node sends, the fastest first, and those that it receives, as far as there is room.
+/// Draws the topics that a node sends, the fastest first, and those that it receives, as far as there is room; of a
+/// topic its types.
 fn talk(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,

@@ -89,7 +89,7 @@ impl<'a> FigureSource<'a> {
         knows_publishers(&self.mission.elements, &self.mission.activity)
     }
 
-    /// Whether the mission has no node but recorders and players, whatever filters say.
+    /// Whether the mission has no nodes but recorders and players, without regard to filters.
     pub(crate) fn knows_no_node(&self) -> bool {
         self.mission.elements.nodes.iter().all(is_hidden_node)
     }

@@ -265,7 +265,7 @@ impl Studio<'_> {
         all
     }
 
-    /// Adds the groups that are linked to what changed; returns, by box, the member that is linked most.
+    /// Adds the groups that are linked to changed nodes; returns, by box, the member that is linked most.
     fn neighbours(
         &self,
         k: usize,

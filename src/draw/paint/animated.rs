@@ -30,7 +30,7 @@ const MARGIN: f64 = 12.0;
 const TOP: f64 = 76.0;
 const BOTTOM: f64 = 62.0;
 
-/// The windows of `view` one after the other, each for so many milliseconds, over the graph of them all.
+/// The windows of `view` one after the other, each for `frame_ms` milliseconds, over the graph of them all.
 pub(crate) fn write(
     view: &View,
     phases: &[Phase],

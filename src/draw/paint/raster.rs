@@ -170,7 +170,7 @@ impl PixelSheet {
         Ok(sheet)
     }
 
-    /// Draws the whole scene over what was there.
+    /// Draws the whole scene over the former pixels.
     fn cover(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>]) {
         let background = opaque(scene.background);
         for pixel in self.pixels.rgba.chunks_exact_mut(4) {

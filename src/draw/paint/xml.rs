@@ -1,4 +1,4 @@
-//! The writer of every SVG of ours: it closes all tags and escapes all text.
+//! The writer of all our SVG: it closes all tags and escapes all text.
 
 use std::fmt::{self, Display, Write as _};
 
@@ -15,7 +15,7 @@ pub(crate) struct Xml {
 }
 
 impl Xml {
-    /// Empty XML with room for so many bytes.
+    /// Empty XML with room for `bytes` bytes.
     pub(crate) fn with_capacity(bytes: usize) -> Self {
         Self {
             out: String::with_capacity(bytes),

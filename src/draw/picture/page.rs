@@ -27,7 +27,7 @@ pub(crate) struct PageFrame {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GraphFit {
     pub(crate) scale: f64,
-    /// The scale of strokes and badges: they shrink less than what they surround, to stay visible.
+    /// The scale of strokes and badges: they shrink less than the elements that they surround, to stay visible.
     pub(crate) pen: f64,
     pub(crate) origin: Point,
 }

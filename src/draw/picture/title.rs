@@ -272,7 +272,7 @@ impl<'a> Title<'a> {
         });
     }
 
-    /// The line below the bar: the mission's phase, and what changed in words.
+    /// The line below the bar: the mission's phase, and the changes in words.
     pub(crate) fn caption(&self, frame: &Frame, phase: &str) -> Group {
         let mut group = Group::named("caption");
         let (style, place) = (&self.style.caption, self.page.caption);

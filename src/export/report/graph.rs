@@ -9,9 +9,9 @@ const MOST_EDGES: usize = 60;
 /// The most boxes that are drawn.
 const MOST_ITEMS: usize = 80;
 
-/// Everything that changed during the mission with what it is connected to, as one window, and the number of edges left
-/// out; `None` where nothing changed. An element is marked added or removed if it is there only at the end or only at
-/// the start, else changed if it ever was.
+/// Every element that changed during the mission with those it is connected to, as one window, and the number of edges
+/// left out; `None` where nothing changed. An element is marked added or removed if it is there only at the end or only
+/// at the start, else changed if it ever was.
 pub(super) fn changed(view: &View) -> Option<(SeenWindow, usize)> {
     let last = view.frames.len().checked_sub(1)?;
     let items = fates(&view.items_shown, last);

@@ -20,7 +20,7 @@ const MOST_BYTES: f64 = 48e6;
 /// The largest number of frames drawn in a row: enough that little is drawn twice where rows meet, few enough that
 /// progress is seen.
 const MOST_IN_A_ROW: usize = 8;
-/// Rows per core that are not written yet: one in the making, one that waits.
+/// Rows per core that are not written yet: one being drawn, one that waits.
 const ROWS_AHEAD: usize = 2;
 /// The largest number of frames that a palette is made from: some of those with a change, some of all.
 const SAMPLES: usize = 12;
@@ -175,7 +175,7 @@ impl<'a> RasterPool<'a> {
     }
 }
 
-/// One core at work.
+/// One core that draws.
 struct Artist<'a> {
     pool: &'a RasterPool<'a>,
     canvas: Canvas<'a>,

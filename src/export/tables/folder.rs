@@ -15,7 +15,7 @@ use crate::base::leftovers::Leftover;
 pub(crate) struct Folder {
     path: PathBuf,
     hidden: TempDir,
-    /// Removed when a signal ends us too.
+    /// The guard that removes the hidden folder when a signal ends the process.
     _left: Leftover,
     names: Vec<String>,
 }

@@ -20,7 +20,7 @@ pub enum TableFormat {
 }
 
 impl TableFormat {
-    /// All of them.
+    /// All formats.
     pub const ALL: &'static [Self] = &[
         Self::Csv,
         #[cfg(feature = "parquet")]

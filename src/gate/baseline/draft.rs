@@ -47,7 +47,7 @@ pub(crate) struct TopicLine {
 }
 
 impl NodeLine {
-    /// What stands behind the name.
+    /// The text behind the name: its facts as a mapping of YAML.
     pub(crate) fn text(&self) -> String {
         let mut pairs = Vec::new();
         if let Some(state) = &self.lifecycle {
@@ -65,7 +65,7 @@ impl NodeLine {
 }
 
 impl TopicLine {
-    /// What stands behind the name.
+    /// The text behind the name: its facts as a mapping of YAML.
     pub(crate) fn text(&self) -> String {
         let mut pairs = Vec::new();
         if let Some(kind) = &self.kind {

@@ -77,8 +77,8 @@ fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usi
     (a.0, b.0)
 }
 
-/// The edges to reverse by the greedy order of Eades, Lin and Smyth (1993): sinks last, sources first, then whatever
-/// has the most outgoing edges to spare.
+/// The edges to reverse by the greedy order of Eades, Lin and Smyth (1993): sinks last, sources first, then the vertex
+/// with the most outgoing edges to spare.
 pub(crate) fn greedy(n: usize, edges: &[(usize, usize)]) -> Vec<bool> {
     let place = greedy_order(n, edges);
     edges

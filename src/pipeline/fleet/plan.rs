@@ -54,7 +54,7 @@ pub enum CountDetail {
 }
 
 impl CountDetail {
-    /// All of them.
+    /// All details.
     pub const ALL: [Self; 3] = [Self::Auto, Self::Index, Self::Chunks];
 
     /// Its word.

@@ -171,7 +171,7 @@ impl Tabled {
     }
 }
 
-/// The job, shared by those who work on it.
+/// The job, shared by the threads that work on it.
 struct FleetWork<'a> {
     job: &'a FleetJob,
     plan: &'a FleetPlan,

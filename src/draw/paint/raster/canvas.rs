@@ -1,4 +1,4 @@
-//! One frame after another: only what changed is drawn again, to the same pixels as all of it would be.
+//! Frames one after another: only changed parts are drawn again, with the same pixels as if all were.
 
 use std::collections::HashMap;
 use std::ops::Range;
