@@ -84,7 +84,7 @@ const ROBOT: [&str; 12] = [
     "/loc/ekf",
 ];
 
-const HOSTILE: [&str; 10] = [
+const HOSTILE: [&str; 31] = [
     "/</script><script>window.hit=1</script>",
     "/<img src=x onerror=window.hit=2>",
     "/a\u{2028}b\u{2029}c",
@@ -95,6 +95,27 @@ const HOSTILE: [&str; 10] = [
     "/@you #12 [x](http://y) |z| www.a.b",
     "/日本語",
     "/{{data}}",
+    "/<svg onload=window.hit=3>",
+    "/<iframe src=javascript:window.hit=4>",
+    "/javascript:window.hit=5",
+    "/]]><script>window.hit=6</script>",
+    "/</style><script>window.hit=7</script>",
+    "/</title><script>window.hit=8</script>",
+    "/${window.hit=9}",
+    "/\\u003cscript>window.hit=10",
+    "/&#x3c;script&#x3e;",
+    "/%3Cscript%3E",
+    "/x'onclick='window.hit=11",
+    "/x\"onmouseover=\"window.hit=12",
+    "/__proto__",
+    "/constructor",
+    "/toString",
+    "/\u{feff}\u{200b}nothing",
+    "/line\nbreak\ttab\u{7f}",
+    "/```fence",
+    "/\"]; click x",
+    "/%%{init: {}}%%",
+    "/| cell | <br>",
 ];
 
 #[test]

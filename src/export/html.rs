@@ -227,14 +227,24 @@ impl HtmlPage<'_> {
         xml.attribute("viewBox", format_args!("{x:.0} {y:.0} {w:.0} {h:.0}"))
             .attribute("role", "img")
             .attribute("aria-label", "Graph; the search finds every element");
-        xml.open("g").attribute("class", "spaces");
+        // Where a host refuses styles, outlines stay.
+        let stroke = self.style.edge.stroke.to_string();
+        let layer = |xml: &mut Xml, class: &str| {
+            xml.open("g")
+                .attribute("class", class)
+                .attribute("fill", "none")
+                .attribute("stroke", &stroke);
+        };
+        layer(xml, "spaces");
         graph.spaces(xml);
-        xml.close().open("g").attribute("class", "arrows");
+        xml.close();
+        layer(xml, "arrows");
         for &arrow in &drawn.order {
             let life = &runs.arrows[arrow];
             graph.arrow(xml, arrow, &Still { runs, life, window });
         }
-        xml.close().open("g").attribute("class", "items");
+        xml.close();
+        layer(xml, "items");
         for (item, life) in runs.items.iter().enumerate() {
             graph.item(xml, item, &Still { runs, life, window });
         }

@@ -102,6 +102,16 @@ def check_console(b):
             assert url.startswith(("file:", "data:", "about:", "chrome")), url
 
 
+def until(b, script, wanted=True):
+    """Waits for a value, for pages answer in their own time; fails if it does not come."""
+    for _ in range(100):
+        found = b.js("return " + script)
+        if found == wanted:
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"{script} is {found}, not {wanted}")
+
+
 def window(b):
     return int(b.js("return document.getElementById('seek').value"))
 
@@ -157,8 +167,7 @@ def drive(b, url, evolution, data):
     b.keys(ENTER)
     assert topic in b.js("return document.getElementById('name').textContent")
     assert b.js("return document.querySelectorAll('#graph .near').length") > 1
-    time.sleep(0.2)
-    assert f"sel=topic:{topic}" in b.js("return location.hash"), b.js("return location.hash")
+    until(b, f"location.hash.includes('sel=topic:{topic}')")
     assert b.js("return document.getElementById('life').children.length") > 1
     b.keys(ESC, ESC)
     assert b.js("return document.getElementById('card').hidden && document.getElementById('hits').children.length == 0")
@@ -172,8 +181,7 @@ def drive(b, url, evolution, data):
 
     start = b.js("return document.getElementById('graph').getAttribute('viewBox')")
     b.keys("+")
-    time.sleep(0.4)
-    assert b.js("return document.getElementById('graph').getAttribute('viewBox')") != start
+    until(b, f"document.getElementById('graph').getAttribute('viewBox') != '{start}'")
     b.keys("f")
 
     seconds = (windows[30]["start_ns"] - windows[0]["start_ns"]) / 1e9
@@ -184,8 +192,8 @@ def drive(b, url, evolution, data):
     b.open(f"{url}#t=0&sel=topic:{topic}")
     assert b.js("return document.getElementById('state').textContent").startswith("topic")
     b.js("location.hash = '#t=0&q=scan'")
-    time.sleep(0.2)
-    assert window(b) == 0 and b.js("return document.getElementById('q').value") == "scan"
+    until(b, "document.getElementById('q').value", "scan")
+    assert window(b) == 0
     print("  links lead where they say")
 
     compare_drawing(b, windows)
@@ -267,7 +275,8 @@ def compare_windows(b, evolution, data):
     for before, after in ((3, 30), (30, 3), (10, 11)):
         b.js("document.activeElement.blur()")
         b.js(f"location.hash = '#t={data['starts'][after]}&b={data['starts'][before]}'")
-        time.sleep(0.2)
+        until(b, "document.getElementById('newstitle').textContent", f"What differs from window {before + 1}")
+        until(b, "+document.getElementById('seek').value", after)
         old, new = present(before), present(after)
         moved = {k for k in old.keys() & new.keys() if abs(new[k] - old[k]) > 0.25 * (old[k] or new[k])}
         differs = (old.keys() ^ new.keys()) | moved
@@ -276,8 +285,6 @@ def compare_windows(b, evolution, data):
         assert shown == [len(differs), len(differs)], (before, after, shown, len(differs))
         drawn = b.js("return document.querySelectorAll('#graph .items > :is(.added, .removed, .changed), #graph .arrows > :is(.added, .removed, .changed)').length")
         assert drawn == len(differs), (drawn, len(differs))
-    b.js("location.hash = '#t=0'")
-    time.sleep(0.2)
     print("  two windows differ in what the evolution says")
 
 
@@ -312,12 +319,35 @@ def elsewhere(url, page):
         b.click("#told a")
         assert window(b) >= 0 and b.js("return location.href") == "about:srcdoc", "a link left the frame"
         check_console(b)
+        under_policies(b, outer, page)
         b.cdp("Emulation.setScriptExecutionDisabled", value=True)
         b.open(url)
         b.cdp("Emulation.setScriptExecutionDisabled", value=False)
         assert b.js("return document.querySelectorAll('tbody a').length") > 3
         assert b.js("return document.querySelectorAll('.items > .node:not(.off)').length") > 3
-    print("  it works in a sandboxed frame, and says what changed without scripts")
+    print("  it works in a sandboxed frame, and under three policies says what changed, without scripts too")
+
+
+STYLED = "default-src 'none';style-src 'unsafe-inline';font-src data:;img-src data:"
+POLICIES = (
+    (f"{STYLED};script-src 'unsafe-inline'", "allow-scripts", True),
+    (STYLED, "allow-scripts", False),
+    ("default-src *", "", False),
+)
+
+
+def under_policies(b, outer, page):
+    """In frames of pages that allow scripts, refuse them by policy, and refuse them by sandbox."""
+    for policy, sandbox, plays in POLICIES:
+        outer.write_text(f'<!doctype html><meta http-equiv="Content-Security-Policy" content="{policy}">'
+                         f'<iframe sandbox="{sandbox}" width="1000" height="700" srcdoc="{html.escape(page)}"></iframe>')
+        b.open(outer.as_uri())
+        b.frame(0)
+        time.sleep(0.3)
+        assert (window(b) > 0) == plays, (policy, window(b))
+        seen = b.js("return [document.querySelectorAll('#told a').length, document.querySelectorAll('.items > .node:not(.off)').length, getComputedStyle(document.querySelector('.node ellipse')).fill]")
+        assert seen[0] > 3 and seen[1] > 3 and seen[2] != "rgb(0, 0, 0)", (policy, seen)
+        b.log("browser")
 
 
 def animation(svg):

@@ -20,7 +20,7 @@ pub(crate) fn base(style: &Style) -> String {
     let cluster = &style.cluster;
     let _ = write!(
         out,
-        ".namespace rect{{{}}}.namespace text{{text-anchor:start;font:600 {}px {FONT};fill:{}}}",
+        ".namespace rect{{{}}}.namespace text{{text-anchor:start;font:600 {}px {FONT};fill:{};stroke:none}}",
         paint(cluster.fill, cluster.stroke, cluster.width, &cluster.dash),
         cluster.size,
         cluster.text
