@@ -4,9 +4,9 @@
 //! plan ──> count (each bag, or each part of its time, anywhere) ──> merge ──> finish (each mission)
 //! ```
 //!
-//! A [`FleetPlan`] names the bags and fixes where windows begin, before anything is counted. [`count`] is a pure
+//! A [`FleetPlan`] names the bags and fixes where windows begin, before anything is counted. [`count()`] is a pure
 //! function of one bag and reads its index only. [`merge`] makes one list of the counts of the parts of a bag.
-//! [`finish`] makes the [`Mission`](crate::Mission) of one mission's counts: states, changes and all that needs the
+//! [`finish()`] makes the [`Mission`](crate::Mission) of one mission's counts: states, changes and all that needs the
 //! whole.
 
 #[cfg(feature = "parquet")]
