@@ -38,7 +38,8 @@ fn an_expectation_of_another_robot_is_not_brought_up_to_date() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
-    let gone: String = (0..1500).map(|n| format!("  /gone_{n}: {{}}\n")).collect();
+    let gone = (0..1500).map(|n| format!("  /gone_{n}: {{}}\n"));
+    let gone = gone.collect::<Vec<_>>().concat();
     let text = format!("schema: bagreel.expect/1\nnodes:\n{gone}");
     fs::write(here.join("g.yaml"), &text).unwrap();
     let (code, said) = run(here, &["baseline", "run.bag", "--update", "g.yaml"]);
