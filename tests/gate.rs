@@ -38,10 +38,8 @@ fn an_expectation_of_another_robot_is_not_brought_up_to_date() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     bag(here, "run.bag", &recording(HEALTHY, 0));
-    let mut gone = String::new();
-    for n in 0..1500 {
-        let _ = writeln!(gone, "  /gone_{n}: {{}}");
-    }
+    let gone = (0..1500).map(|n| format!("  /gone_{n}: {{}}\n"));
+    let gone = gone.collect::<Vec<_>>().concat();
     let text = format!("schema: bagreel.expect/1\nnodes:\n{gone}");
     fs::write(here.join("g.yaml"), &text).unwrap();
     let (code, said) = run(here, &["baseline", "run.bag", "--update", "g.yaml"]);
