@@ -10,6 +10,9 @@ mod deferred;
 mod input;
 mod mcap;
 mod model;
+mod object;
+#[cfg(feature = "remote")]
+mod remote;
 mod rosbag1;
 mod rosbag2;
 pub(crate) mod source;
@@ -26,10 +29,12 @@ pub(crate) use deferred::open_each;
 pub(crate) use input::BagPlace;
 pub use input::{FormatRow, Input, file_name, size_on_disk};
 use input::{head, place};
+pub(crate) use model::ETAG;
 pub use model::{
     Connection, ConnectionId, Encoding, Lumps, Message, OpenOptions, Reader, Report, Sink, Tier,
     Want,
 };
+pub(crate) use object::{list, version};
 use unknown::explain;
 
 /// Every format that can be read.
@@ -42,22 +47,24 @@ pub const FORMATS: &[FormatRow] = &[
     zstd::FORMAT,
 ];
 
-/// What an input is, from its first bytes.
+/// The kind of an input, told by its first bytes.
 #[derive(Clone, Copy)]
 pub enum InputKind {
-    /// A bag of this format. Standard input is not looked into and counts as a ROS 1 bag here.
+    /// A bag of this format. Standard input and URLs are not read for this and count as ROS 1 bags here.
     Bag(&'static FormatRow),
-    /// JSON text, such as an evolution of ours: no bag.
+    /// JSON text, such as an evolution of ours, which is not a bag.
     Json,
 }
 
-/// Tells what `input` is from its first bytes. Standard input is left untouched.
+/// Tells the kind of `input` by its first bytes. Standard input is left untouched.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag) with a hint if it is none of ours.
+/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag) with a hint if
+/// it is of no known format.
 pub fn sniff(input: &Input) -> Result<InputKind> {
     let path = match input {
         Input::Path(path) if !input.is_pipe() => path,
+        // What is far away is looked into once, when it is opened.
         _ => return Ok(InputKind::Bag(&FORMATS[0])),
     };
     let mut place = place(input)?;
@@ -70,12 +77,15 @@ pub fn sniff(input: &Input) -> Result<InputKind> {
     }
 }
 
-/// Opens a bag of any format, told by its first bytes.
+/// Opens a bag of any format, told by its first bytes. Objects need the feature `remote`.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag), [`Error::Unsupported`](crate::Error::Unsupported) or [`Error::Malformed`](crate::Error::Malformed) with a
+/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::Remote`](crate::Error::Remote) if a store does not give it, [`Error::UnknownBag`](crate::Error::UnknownBag), [`Error::Unsupported`](crate::Error::Unsupported) or [`Error::Malformed`](crate::Error::Malformed) with a
 /// hint if nothing in it can be.
 pub fn open(input: &Input, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+    if let Input::Url(url) = input {
+        return object::open(url, options);
+    }
     let mut place = place(input)?;
     let head = head(&mut place)?;
     if let Some(row) = FORMATS.iter().find(|f| (f.sniff)(&place, &head)) {

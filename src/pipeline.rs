@@ -37,6 +37,8 @@ pub enum Stage {
     Read,
     /// Bags are read a second time and compared; progress counts bytes.
     Verify,
+    /// Bags of a fleet are counted; progress counts bags.
+    Count,
     /// Graphs are built; progress counts windows.
     Graphs,
     /// Everything gets its place.
@@ -51,6 +53,7 @@ impl Stage {
         match self {
             Self::Read => "reading",
             Self::Verify => "verifying",
+            Self::Count => "counting",
             Self::Graphs => "graphs",
             Self::Layout => "layout",
             Self::Draw => "drawing",

@@ -25,6 +25,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("bag", &[
         &["decompress", "model", "source", "unknown"],
         &["adapters", "input"],
+        &["remote"],
+        &["object"],
         &["deferred"],
         &["chunked"],
         &["mcap", "rosbag1", "rosbag2", "sqlite3", "zstd"],

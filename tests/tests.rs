@@ -31,6 +31,8 @@ mod phases;
 mod pictures;
 mod properties;
 mod reading;
+#[cfg(feature = "remote")]
+mod remote;
 mod ros2_example;
 mod source;
 mod story;

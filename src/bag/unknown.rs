@@ -1,10 +1,10 @@
-//! What a file that is no bag of ours is instead, and what to do about it.
+//! Explanations for files that are not bags, and advice.
 
 use std::path::Path;
 
 use crate::base::error::Error;
 
-/// The error for `path`, which begins with `head` and is no bag.
+/// The error for `path`, which begins with `head` and is not a bag.
 pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     let (looks_like, hint) = if folder {
         (
@@ -21,12 +21,17 @@ pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     }
 }
 
-/// The error for an object that is not on this machine.
+/// The error for an object where a file is needed, or where objects cannot be read at all.
 pub(crate) fn elsewhere(url: &str) -> Error {
+    let hint = if cfg!(feature = "remote") {
+        "this takes files: download the bag"
+    } else {
+        "download the bag, or build with the feature `remote`: `cargo install bagreel --features remote`"
+    };
     Error::Unsupported {
         path: url.into(),
         what: "it is not on this machine".to_owned(),
-        hint: "download the bag, or mount its store".to_owned(),
+        hint: hint.to_owned(),
     }
 }
 

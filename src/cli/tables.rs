@@ -3,7 +3,7 @@
 use std::io::Read as _;
 use std::path::Path;
 
-use super::{DONE, SKIPPED};
+use super::{DONE, FAILED, SKIPPED};
 use crate::base::error::{Error, Result};
 use crate::base::{budget, file, words};
 use crate::cli::args::tables::TablesArgs;
@@ -28,12 +28,21 @@ pub(super) fn tables(args: &TablesArgs, terminal: &mut Terminal) -> Result<u8> {
     job.on_error = args.on_error;
     job.jobs = args.jobs;
     let done = fleet::tables(&job, terminal)?;
+    for (_, why) in done.refused.iter().take(MOST_TOLD) {
+        terminal.failed(why);
+    }
     let seconds = terminal.seconds();
     let to = args.output.display();
     terminal.say(&format!("wrote {to}: {}, in {seconds:.1} s", told(&done)));
-    let is_whole = done.unreadable + done.incomplete == 0;
-    Ok(if is_whole { DONE } else { SKIPPED })
+    Ok(match &done {
+        done if !done.refused.is_empty() => FAILED,
+        done if done.unreadable + done.incomplete > 0 => SKIPPED,
+        _ => DONE,
+    })
 }
+
+/// So many refusals are told one by one: a store that is down refuses every bag of a fleet.
+const MOST_TOLD: usize = 8;
 
 /// `12 bags (1 unreadable, 3 there already), 4711 messages`.
 fn told(done: &Tabled) -> String {
@@ -41,6 +50,7 @@ fn told(done: &Tabled) -> String {
         (done.unreadable, "unreadable"),
         (done.incomplete, "damaged"),
         (done.kept, "there already"),
+        (done.refused.len(), "not to be had"),
     ];
     let of: Vec<String> = of
         .iter()

@@ -53,6 +53,12 @@ impl Terminal {
         }
     }
 
+    /// Prints one of several errors that did not end the run.
+    pub(crate) fn failed(&mut self, why: &str) {
+        self.end_stage();
+        self.line("31", "error", why);
+    }
+
     /// Prints notices, one line each.
     pub(crate) fn notices(&mut self, notices: &Notices) {
         if self.quiet {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::counts::{Count, FleetBag};
 use super::plan::{CountDetail, PlannedBag};
 use crate::bag::{
-    self, Connection, ConnectionId, Input, Lumps, Message, OpenOptions, Report, Sink, Want,
+    self, Connection, ConnectionId, ETAG, Input, Lumps, Message, OpenOptions, Report, Sink, Want,
 };
 use crate::base::error::{Error, Result};
 use crate::base::name::NodeName;
@@ -48,28 +48,24 @@ pub struct CountedBag {
     pub bag: FleetBag,
 }
 
+/// In a bag that is far away, more chunks than this are counted as a whole: each would be a request.
+const FAR_CHUNKS: usize = 64;
+
 /// Counts the messages of a bag. A bag that cannot be read, or not all of it, is no error but has a row that says so.
 ///
 /// # Errors
-/// If the temporary file of times cannot be used.
+/// [`Error::Remote`], where trying again may help; and if the temporary file of times cannot be used.
 pub fn count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBag> {
-    count_or(planned, tally, |error| {
-        Ok(unreadable(planned, tally, &error))
-    })
+    match try_count(planned, tally) {
+        Err(error) => unreadable(planned, tally, error),
+        counted => counted,
+    }
 }
 
-/// As [`count()`], with `otherwise` for a bag that cannot be read.
-pub(super) fn count_or(
-    planned: &PlannedBag,
-    tally: &Tally,
-    otherwise: impl FnOnce(Error) -> Result<CountedBag>,
-) -> Result<CountedBag> {
+/// As [`count()`], with an error for a bag that cannot be read.
+pub(super) fn try_count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBag> {
     let mut taken = BagTally::new(planned.origin, tally.period);
-    let input = Input::parse(&planned.uri);
-    let report = match read(&input, planned, tally, &mut taken) {
-        Ok(report) => report,
-        Err(error) => return otherwise(error),
-    };
+    let report = read(&Input::parse(&planned.uri), planned, tally, &mut taken)?;
     let counts = taken.counts(planned, &report).map_err(spool_error)?;
     let mut bag = row(planned, tally);
     bag.take(&report, &taken);
@@ -77,15 +73,34 @@ pub(super) fn count_or(
 }
 
 /// What is counted of a bag that cannot be read for this reason.
-fn unreadable(planned: &PlannedBag, tally: &Tally, error: &Error) -> CountedBag {
+///
+/// # Errors
+/// [`Error::Remote`], which says nothing of the bag.
+pub(super) fn unreadable(planned: &PlannedBag, tally: &Tally, error: Error) -> Result<CountedBag> {
+    if matches!(error, Error::Remote { .. }) {
+        return Err(error);
+    }
+    let (file_bytes, etag) = version(&Input::parse(&planned.uri)).unwrap_or_default();
     let bag = FleetBag {
-        file_bytes: bag::size_on_disk(&Input::parse(&planned.uri)),
+        file_bytes,
+        etag,
         error: Some(error.to_string()),
         ..row(planned, tally)
     };
-    CountedBag {
+    Ok(CountedBag {
         counts: Vec::new(),
         bag,
+    })
+}
+
+/// The size of a bag, and what a store says of its version.
+///
+/// # Errors
+/// Where a store cannot be asked, or has no such object.
+pub(super) fn version(input: &Input) -> Result<(Option<u64>, Option<String>)> {
+    match input {
+        Input::Url(url) => bag::version(url).map(|(bytes, etag)| (Some(bytes), etag)),
+        _ => Ok((bag::size_on_disk(input), None)),
     }
 }
 
@@ -97,6 +112,7 @@ fn row(planned: &PlannedBag, tally: &Tally) -> FleetBag {
     FleetBag {
         uri: planned.uri.clone(),
         mission: planned.mission.clone(),
+        etag: None,
         file_bytes: None,
         format: None,
         tier: None,
@@ -119,6 +135,8 @@ impl FleetBag {
             .filter(|n| n.kind.is_loss())
             .map(told)
             .collect();
+        let etag = report.facts.iter().find(|(name, _)| name == ETAG);
+        self.etag = etag.map(|(_, value)| value.clone());
         self.file_bytes = Some(report.file_bytes);
         self.format = Some(report.format.clone());
         self.tier = Some(report.tier);
@@ -142,10 +160,15 @@ fn read(
     tally: &Tally,
     taken: &mut BagTally,
 ) -> Result<Report> {
-    let lumps = (tally.detail == CountDetail::Chunks).then_some(Lumps {
+    let above = match (tally.detail, input) {
+        (CountDetail::Chunks, _) => Some(0),
+        (CountDetail::Auto, Input::Url(_)) => Some(FAR_CHUNKS),
+        (CountDetail::Auto | CountDetail::Index, _) => None,
+    };
+    let lumps = above.map(|above| Lumps {
         origin: planned.origin,
         period: tally.period,
-        above: 0,
+        above,
     });
     let options = OpenOptions {
         lumps,

@@ -15,7 +15,7 @@ pub const SCHEMA_VERSION: i64 = 1;
 pub struct Count {
     /// The mission that the bag belongs to.
     pub mission: Arc<str>,
-    /// The bag, as its path was given.
+    /// The bag, as its path or URL was given.
     pub bag: Arc<str>,
     /// The format's word: `rosbag1`, `mcap`, `sqlite3`.
     pub format: Arc<str>,
@@ -108,10 +108,12 @@ fn sum(a: Option<u64>, b: Option<u64>) -> Option<u64> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct FleetBag {
-    /// Its path, as it was given or found.
+    /// Its path or URL, as it was given.
     pub uri: String,
     /// The mission that it belongs to.
     pub mission: String,
+    /// What the store says of its version; none for files.
+    pub etag: Option<String>,
     /// Its size in bytes, if that is known.
     pub file_bytes: Option<u64>,
     /// The format's word, if it is a bag.

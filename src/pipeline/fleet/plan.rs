@@ -19,7 +19,7 @@ pub struct Planning {
     pub period: Period,
     /// Windows on whole periods of UTC, or from the first message of each mission.
     pub align: Align,
-    /// A regular expression whose first group, or whole match, in a bag's path is its mission.
+    /// A regular expression whose first group, or whole match, in a bag's path or URL is its mission.
     pub mission: Option<String>,
 }
 
@@ -43,8 +43,10 @@ const TEN_SECONDS: Period = match Period::from_nanos(10_000_000_000) {
 /// How much to know of messages: their times, or only how many there are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CountDetail {
-    /// Every message's time, from the index.
+    /// By chunks where a bag is far away and has more than 64 of them, as each would cost a request; else by the index.
     #[default]
+    Auto,
+    /// Every message's time, from the index.
     Index,
     /// By chunks: one that lies in one window is counted as a whole, without times. What has no chunks is read by its
     /// index.
@@ -53,11 +55,12 @@ pub enum CountDetail {
 
 impl CountDetail {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Index, Self::Chunks];
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Index, Self::Chunks];
 
     /// Its word.
     pub fn word(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Index => "index",
             Self::Chunks => "chunks",
         }
@@ -67,7 +70,7 @@ impl CountDetail {
 /// One bag of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlannedBag {
-    /// Its path, as it was given or found.
+    /// Its path or URL, as it was given or found.
     pub uri: String,
     /// The mission that it belongs to.
     pub mission: String,
@@ -112,14 +115,14 @@ impl FleetPlan {
     }
 }
 
-/// Makes a plan of bags, and of folders with bags below them.
+/// Makes a plan of bags, folders with bags below them, and prefixes of stores, which end in a slash.
 ///
 /// A folder that is one recording of ROS 2 is one bag. Parts of a split recording (`x_0.bag`, `x_1.bag`, …, from 0 on
-/// without a hole) are one mission, `x`; so are the files `x/x_0.mcap`, … of a recording of ROS 2 that are given one by one; every other bag is a
+/// without a hole) are one mission, `x`; the files `x/x_0.mcap`, … of a recording in a store too; every other bag is a
 /// mission of its own, called as its path without the format's ending.
 ///
 /// # Errors
-/// Where a folder cannot be listed, or the pattern is none. A bag that cannot be read is found out later.
+/// Where a folder or a store cannot be listed, or the pattern is none. A bag that cannot be read is found out later.
 pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
     let mut uris = Vec::new();
     for source in sources {
@@ -139,7 +142,7 @@ pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
         .collect();
     bags.sort_by(|a, b| (&a.mission, &a.uri).cmp(&(&b.mission, &b.uri)));
     if planning.align == Align::Bag {
-        begin_with_missions(&mut bags);
+        begin_with_missions(&mut bags)?;
     }
     Ok(FleetPlan {
         period: planning.period,
@@ -147,9 +150,13 @@ pub fn plan(sources: &[String], planning: &Planning) -> Result<FleetPlan> {
     })
 }
 
-/// The bags that a path stands for.
+/// The bags that a path or URL stands for.
 fn listed(source: &str) -> Result<Vec<String>> {
     match Input::parse(source) {
+        Input::Url(url) if url.ends_with('/') => {
+            let found = bag::list(&url)?.into_iter();
+            Ok(found.filter(|url| is_named(url)).collect())
+        }
         Input::Path(path) if path.is_dir() => {
             let text = |path: PathBuf| path.to_string_lossy().into_owned();
             Ok(recordings(&path)?.into_iter().map(text).collect())
@@ -164,6 +171,11 @@ fn endings() -> Vec<String> {
     let mut all: Vec<String> = all.map(|ending| format!(".{ending}")).collect();
     all.sort_by_key(|ending| std::cmp::Reverse(ending.len()));
     all
+}
+
+/// Whether an object calls itself a bag: to look into each would be a request each.
+fn is_named(url: &str) -> bool {
+    endings().iter().any(|ending| url.ends_with(ending))
 }
 
 /// The mission of each bag.
@@ -239,17 +251,21 @@ fn in_own_folder(name: &str) -> bool {
 }
 
 /// Lets the windows of each mission begin with its first message. A bag that cannot be read has no say.
-fn begin_with_missions(bags: &mut [PlannedBag]) {
+fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
     for mission in bags.chunk_by_mut(|a, b| a.mission == b.mission) {
         let mut first: Option<Stamp> = None;
         for bag in mission.iter() {
-            let own = begins(&Input::parse(&bag.uri)).ok().flatten();
+            let own = match begins(&Input::parse(&bag.uri)) {
+                Err(error @ Error::Remote { .. }) => return Err(error),
+                own => own.ok().flatten(),
+            };
             first = first.into_iter().chain(own).min();
         }
         for bag in mission {
             bag.origin = first.unwrap_or_default();
         }
     }
+    Ok(())
 }
 
 /// When a bag begins, by its tail if that tells it.

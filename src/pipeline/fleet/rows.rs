@@ -55,6 +55,7 @@ pub(crate) fn counts_table(counts: &[Count]) -> Batch {
 const BAGS: &[(&str, ColumnKind)] = &[
     ("uri", ColumnKind::Text),
     ("mission", ColumnKind::Text),
+    ("etag", ColumnKind::Text),
     ("file_bytes", ColumnKind::I64),
     ("format", ColumnKind::Text),
     ("tier", ColumnKind::Text),
@@ -77,6 +78,7 @@ pub(crate) fn bags_table(bags: &[FleetBag]) -> Batch {
         table.push(&[
             TableCell::text(&*bag.uri),
             TableCell::text(&*bag.mission),
+            TableCell::known(bag.etag.as_deref(), TableCell::text),
             TableCell::known(bag.file_bytes, TableCell::count),
             TableCell::known(bag.format.as_deref(), TableCell::text),
             TableCell::known(bag.tier, |tier| TableCell::text(tier.word())),

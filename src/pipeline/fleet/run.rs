@@ -10,11 +10,11 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread;
 use std::time::UNIX_EPOCH;
 
-use super::count::{CountedBag, Tally, count, count_or};
+use super::count::{CountedBag, Tally, try_count, unreadable, version};
 use super::counts::SCHEMA_VERSION;
 use super::plan::{CountDetail, FleetPlan, PlannedBag, Planning, plan};
 use super::rows::{bags_table, counts_table};
-use crate::bag::{Input, size_on_disk};
+use crate::bag::Input;
 use crate::base::digest::hex;
 use crate::base::error::{Error, Result};
 use crate::base::table::Batch;
@@ -37,7 +37,7 @@ pub enum OnError {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct FleetJob {
-    /// Bags, and folders with bags below them.
+    /// Bags; folders with bags below them; URLs; prefixes of stores, which end in a slash.
     pub sources: Vec<String>,
     /// How to plan.
     pub planning: Planning,
@@ -49,7 +49,7 @@ pub struct FleetJob {
     pub skip_existing: bool,
     /// What to do about a bag that cannot be read.
     pub on_error: OnError,
-    /// How many bags to count at a time; by default one per processor.
+    /// How many bags to count at a time; by default one per processor, more where bags are far away.
     pub jobs: Option<NonZeroUsize>,
     /// Where the folders `counts` and `bags` are made.
     pub folder: PathBuf,
@@ -87,14 +87,19 @@ pub struct Tabled {
     pub messages: u64,
     /// Rows of `counts`.
     pub rows: usize,
+    /// Bags that a store did not give, and why; they have no row, and another run counts them.
+    pub refused: Vec<(String, String)>,
 }
+
+/// Where answers are waited for, a processor counts so many bags at a time.
+const FAR_JOBS: usize = 8;
 
 /// Counts every bag of the job and writes its rows.
 ///
 /// # Errors
 /// Where nothing can be listed or written, and for the first bag that cannot be read with [`OnError::Fail`].
 pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
-    watch.stage(Stage::Read);
+    watch.stage(Stage::Count);
     let mut plan = plan(&job.sources, &job.planning)?;
     if let Some((index, count)) = job.shard {
         plan = plan.shard(index, count)?;
@@ -125,13 +130,20 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
                 work.is_stopped.store(true, Ordering::Relaxed);
             }
         }
+        done.refused.sort();
         outcome.map(|()| done)
     })
 }
 
 fn jobs(job: &FleetJob, plan: &FleetPlan) -> usize {
     let cores = thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let jobs = job.jobs.map_or(cores, NonZeroUsize::get);
+    let is_far = |bag: &PlannedBag| matches!(Input::parse(&bag.uri), Input::Url(_));
+    let times = if plan.bags.iter().any(is_far) {
+        FAR_JOBS
+    } else {
+        1
+    };
+    let jobs = job.jobs.map_or(cores * times, NonZeroUsize::get);
     jobs.min(plan.bags.len())
 }
 
@@ -139,12 +151,14 @@ fn jobs(job: &FleetJob, plan: &FleetPlan) -> usize {
 enum BagOutcome {
     Kept,
     Written { counted: Box<CountedBag> },
+    Refused { uri: String, why: String },
 }
 
 impl Tabled {
     fn take(&mut self, one: BagOutcome) {
         match one {
             BagOutcome::Kept => self.kept += 1,
+            BagOutcome::Refused { uri, why } => self.refused.push((uri, why)),
             BagOutcome::Written { counted } => {
                 self.bags += 1;
                 self.unreadable += usize::from(counted.bag.error.is_some());
@@ -174,16 +188,29 @@ impl FleetWork<'_> {
             let Some(bag) = self.plan.bags.get(at) else {
                 return;
             };
+            let one = match self.one(bag) {
+                Err(error @ Error::Remote { .. }) if self.job.on_error == OnError::Row => {
+                    Ok(BagOutcome::Refused {
+                        uri: bag.uri.clone(),
+                        why: error.to_string(),
+                    })
+                }
+                one => one,
+            };
             // Nobody listens any more once something has failed.
-            if to.send(self.one(bag)).is_err() {
+            if to.send(one).is_err() {
                 return;
             }
         }
     }
 
     fn one(&self, bag: &PlannedBag) -> Result<BagOutcome> {
-        let name = self.name(bag);
-        if self.job.skip_existing && self.files.hold(&name) {
+        let input = Input::parse(&bag.uri);
+        let before = self.version(&input)?;
+        if let Some(version) = &before
+            && self.job.skip_existing
+            && self.files.hold(&self.name(bag, version))
+        {
             return Ok(BagOutcome::Kept);
         }
         let tally = Tally {
@@ -191,23 +218,37 @@ impl FleetWork<'_> {
             detail: self.job.detail,
             part: None,
         };
-        let counted = match self.job.on_error {
-            OnError::Row => count(bag, &tally)?,
-            OnError::Fail => count_or(bag, &tally, Err)?,
+        let counted = match (try_count(bag, &tally), self.job.on_error) {
+            (Err(error), OnError::Row) => unreadable(bag, &tally, error)?,
+            (counted, _) => counted?,
         };
-        self.files.write(&name, &counted)?;
+        let version = match (before, input) {
+            (Some(version), Input::Path(_)) => version,
+            _ => BagVersion::counted(&counted),
+        };
+        self.files.write(&self.name(bag, &version), &counted)?;
         Ok(BagOutcome::Written {
             counted: Box::new(counted),
         })
     }
 
+    /// The version of a bag before it is read; `None` where a store would have to be asked for nothing.
+    fn version(&self, input: &Input) -> Result<Option<BagVersion>> {
+        if matches!(input, Input::Url(_)) && !self.job.skip_existing {
+            return Ok(None);
+        }
+        BagVersion::of(input).map(Some)
+    }
+
     /// What the files of a bag are called: after where it is, then after all that its rows follow from.
-    fn name(&self, bag: &PlannedBag) -> FileName {
-        let path = Path::new(&bag.uri);
-        let bytes = size_on_disk(&Input::parse(&bag.uri));
+    fn name(&self, bag: &PlannedBag, version: &BagVersion) -> FileName {
+        let BagVersion {
+            bytes,
+            changed,
+            etag,
+        } = version;
         let made_of = format!(
-            "{bytes:?} {:?} {} {} {} {} {SCHEMA_VERSION}",
-            changed(path),
+            "{bytes:?} {changed:?} {etag:?} {} {} {} {} {SCHEMA_VERSION}",
             bag.mission,
             bag.origin.0,
             self.plan.period.nanos(),
@@ -216,6 +257,45 @@ impl FleetWork<'_> {
         FileName {
             bag: hex(&bag.uri, DIGITS),
             made_of: hex(&made_of, DIGITS),
+        }
+    }
+}
+
+/// What tells one version of a bag from another.
+#[derive(Default)]
+struct BagVersion {
+    bytes: Option<u64>,
+    changed: Option<u128>,
+    etag: Option<String>,
+}
+
+impl BagVersion {
+    /// That of a bag now; what is not there has none.
+    ///
+    /// # Errors
+    /// [`Error::Remote`] if a store cannot be asked.
+    fn of(input: &Input) -> Result<Self> {
+        let (bytes, etag) = match version(input) {
+            Err(error @ Error::Remote { .. }) => return Err(error),
+            version => version.unwrap_or_default(),
+        };
+        let changed = match input {
+            Input::Path(path) => changed(path),
+            _ => None,
+        };
+        Ok(Self {
+            bytes,
+            changed,
+            etag,
+        })
+    }
+
+    /// The one that was read of a store.
+    fn counted(counted: &CountedBag) -> Self {
+        Self {
+            bytes: counted.bag.file_bytes,
+            changed: None,
+            etag: counted.bag.etag.clone(),
         }
     }
 }

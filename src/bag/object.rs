@@ -1,0 +1,26 @@
+//! Bags that are objects in a store: what reads and lists them, or the refusal where the feature `remote` is left out.
+
+#[cfg(feature = "remote")]
+pub(crate) use super::remote::{list, open, version};
+#[cfg(not(feature = "remote"))]
+pub(crate) use without::{list, open, version};
+
+#[cfg(not(feature = "remote"))]
+mod without {
+    use crate::bag::input::told_url;
+    use crate::bag::model::{OpenOptions, Reader};
+    use crate::bag::unknown::elsewhere;
+    use crate::base::error::Result;
+
+    pub(crate) fn list(url: &str) -> Result<Vec<String>> {
+        Err(elsewhere(&told_url(url)))
+    }
+
+    pub(crate) fn open(url: &str, _: &OpenOptions) -> Result<Box<dyn Reader>> {
+        Err(elsewhere(&told_url(url)))
+    }
+
+    pub(crate) fn version(url: &str) -> Result<(u64, Option<String>)> {
+        Err(elsewhere(&told_url(url)))
+    }
+}
