@@ -287,7 +287,7 @@ fn watch(args: &RenderArgs, mut job: Render, terminal: &mut Terminal) -> Result<
 
 /// Tells what was written, how many windows and changes, in what time.
 fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
-    let (timings, is_cut) = (args.timings, args.time.cut.is_some());
+    let timings = args.timings;
     let mission = &done.mission;
     for remark in done.written.iter().flat_map(|w| &w.remarks) {
         terminal.note(remark);
@@ -306,23 +306,24 @@ fn report(done: &Rendered, args: &RenderArgs, terminal: &mut Terminal) {
     terminal.say(&format!(
         "wrote {}: {}, {}, in {seconds:.1} s",
         names.join(", "),
-        if is_cut {
-            words::count(mission.windows.len(), "window")
-        } else {
-            division(mission)
-        },
+        division(mission),
         words::count(changes, "change")
     ));
 }
 
-/// How the mission is divided: `33 windows of 10 s`, `1 window of 5 min 26 s`.
+/// How the mission is divided: `33 windows of 10 s`, `1 window of 5 min 26 s`, `9 windows` that differ in length.
 fn division(mission: &Mission) -> String {
     let windows = words::count(mission.windows.len(), "window");
-    let length = match &mission.windows[..] {
-        [only] => words::duration(only.span.nanos()),
-        _ => mission.period.to_string(),
-    };
-    format!("{windows} of {length}")
+    if let [only] = &mission.windows[..] {
+        return format!("{windows} of {}", words::duration(only.span.nanos()));
+    }
+    let length = mission.period.nanos();
+    let mut whole = mission.windows.iter().filter(|w| !w.partial);
+    if whole.all(|w| w.span.nanos() == length) {
+        format!("{windows} of {}", mission.period)
+    } else {
+        windows
+    }
 }
 
 /// The work that `render` was asked to do.
@@ -347,22 +348,22 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
         .as_deref()
         .map(Purpose::parse)
         .transpose()?;
-    let page = look::options(&args.look, args.change.rate_change);
+    let drawing = Drawing {
+        body: look::body(args)?,
+        view: look::view(&args.view)?,
+        style: look::style(&args.look.style)?,
+        fonts: look::fonts(args.look.font.as_deref())?,
+        page: look::options(&args.look, args.change.rate_change),
+        is_sized: args.look.size.is_some(),
+        purpose: None,
+        is_fitted: args.look.fit == "auto",
+        engine: crate::layout::engine(&args.look.layout)?,
+        kept: look::kept(args.look.layout_from.as_deref())?,
+    };
     Ok(Render {
-        drawing: Drawing {
-            body: look::body(args)?,
-            view: look::view(&args.view)?,
-            style: look::style(&args.look.style)?,
-            fonts: look::fonts(args.look.font.as_deref())?,
-            page: match purpose {
-                Some(purpose) => purpose.page(page),
-                None => page,
-            },
-            is_sized: args.look.size.is_some() || purpose.is_some(),
-            purpose,
-            is_fitted: args.look.fit == "auto",
-            engine: crate::layout::engine(&args.look.layout)?,
-            kept: look::kept(args.look.layout_from.as_deref())?,
+        drawing: match purpose {
+            Some(purpose) => drawing.seen(purpose),
+            None => drawing,
         },
         sequence: crate::export::sequence::SequenceOptions {
             append_to: summary(),

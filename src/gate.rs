@@ -13,7 +13,7 @@ mod pattern;
 mod range;
 mod report;
 
-pub(crate) use baseline::{Update, update, write};
+pub(crate) use baseline::{Written, update, write};
 pub(crate) use difference::{
     DIFF_FORMATS, DiffFormat, DiffSubject, Difference, Side, differences, union,
 };

@@ -57,15 +57,6 @@
 //! The library is silent and repeatable: it never prints (but for `cli`), reads no clock, and writes the same bytes
 //! for the same bag.
 
-#![cfg_attr(
-    not(feature = "cli"),
-    allow(
-        dead_code,
-        unused_imports,
-        reason = "some of it serves the command only"
-    )
-)]
-
 // In the order of the line, which is why they stand apart: sorted they would tell nothing.
 mod base;
 
@@ -85,6 +76,7 @@ mod draw;
 
 mod export;
 
+#[cfg(feature = "cli")]
 mod gate;
 
 mod pipeline;
@@ -115,7 +107,7 @@ pub mod values {
         State, Topic, TopicId, TopicState,
     };
     pub use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Phase};
-    pub use crate::pipeline::{Drawing, Phases, Stage, Unwatched, Watch};
+    pub use crate::pipeline::{Body, Drawing, Phases, Purpose, Stage, Unwatched, Watch};
     pub use crate::view::{Grouping, Hide, Mode, ViewOptions};
 }
 

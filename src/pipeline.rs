@@ -6,6 +6,7 @@ mod export;
 mod extract;
 mod figure;
 pub mod fleet;
+#[cfg(feature = "cli")]
 pub(crate) mod gate;
 mod phases;
 mod purpose;
@@ -14,17 +15,19 @@ mod survey;
 mod unfolded;
 mod verify;
 
-pub(crate) use draw::Body;
-pub use draw::Drawing;
+pub use draw::{Body, Drawing};
 pub(crate) use export::render;
 pub use export::{Render, Rendered};
-pub(crate) use export::{check, show};
 pub use extract::{Extract, Extracted, extract};
 pub use phases::Phases;
-pub(crate) use purpose::Purpose;
-pub(crate) use read::mission_file;
+pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
 pub use survey::{Survey, is_survey, survey, survey_file};
+#[cfg(feature = "cli")]
+pub(crate) use {
+    export::{check, show},
+    read::mission_file,
+};
 
 /// A part of the work, as progress and timings tell it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -45,7 +45,11 @@ pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let viewed = items::Viewed::new(&mission.elements, options);
     let notices = hidden::notes(&mission.elements, &viewed, options);
     let frames = frames::frames(mission, options, &viewed);
-    (staged(viewed, options, frames), notices)
+    let view = View {
+        compares: mission.ledger.compares,
+        ..staged(viewed, options, frames)
+    };
+    (view, notices)
 }
 
 /// The boxes, arrows and namespaces of [`view`] without the windows, for trying what fits on a page.
@@ -77,6 +81,7 @@ fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) 
         frames: list,
         items_shown: shown.0,
         arrows_shown: shown.1,
+        compares: false,
     }
 }
 
@@ -424,6 +429,9 @@ pub struct View {
     pub items_shown: Vec<Showing>,
     /// What is shown of each arrow.
     pub arrows_shown: Vec<Showing>,
+    /// Whether two missions are compared, A and B, so that no time, no window and no timeline means anything; of two
+    /// windows the first is A alone.
+    pub compares: bool,
 }
 
 impl View {
@@ -436,6 +444,13 @@ impl View {
         let whole = last.span.end.since(first.span.start).max(1) as f64;
         let at = self.frames.get(k).map_or(last.span.end, |f| f.span.start);
         at.since(first.span.start) as f64 / whole
+    }
+
+    /// The length of all windows but a partial one; `None` where there is one window, or where they differ.
+    pub(crate) fn window_nanos(&self) -> Option<i64> {
+        let first = self.frames.first()?.span.nanos();
+        let is_equal = |f: &Frame| f.partial || f.span.nanos() == first;
+        (self.frames.len() > 1 && self.frames.iter().all(is_equal)).then_some(first)
     }
 
     /// Whether window `k` shows a change.

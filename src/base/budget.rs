@@ -84,6 +84,10 @@ pub(crate) const FILES: usize = 10_000;
 /// The longest document in YAML that is understood, in bytes: `metadata.yaml` of a thousand topics has 1 MB.
 pub(crate) const YAML: usize = 8 << 20;
 
+/// The most values of such a document, keys and mappings among them: 20,000 topics with all that is said of them. Each
+/// takes about a hundred bytes while it is read.
+pub(crate) const YAML_VALUES: usize = 250_000;
+
 /// The most notices of different texts; more of them only add to the count of a last one. Nobody reads more.
 pub(crate) const NOTICES: usize = 200;
 

@@ -1,12 +1,15 @@
 //! YAML text as plain data, bounded against documents that unfold to more than they are.
 
-use std::fmt;
+#[cfg(feature = "cli")]
+mod placed;
 
-use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
-use serde_saphyr::{Location, Spanned};
+use serde::de::Deserialize;
+use serde_saphyr::Location;
 
-use super::budget::YAML;
+use super::budget::{YAML, YAML_VALUES};
 
+#[cfg(feature = "cli")]
+pub(crate) use placed::{YamlData, YamlPart, parse_placed};
 pub(crate) use serde_json::Value;
 
 /// What is wrong with a YAML document.
@@ -23,18 +26,10 @@ pub(crate) struct BadYaml {
 /// The document as JSON data: mappings as objects with keys in order, scalars typed as YAML 1.2 has it.
 ///
 /// # Errors
-/// [`BadYaml`] with its line: broken syntax, several documents, nesting past 64, more than 8 MiB, or aliases that
-/// unfold past 100,000 values.
+/// [`BadYaml`] with its line: broken syntax, several documents, nesting past 64, more than 8 MiB or 250,000 values, or
+/// aliases that unfold past 100,000 of them.
 pub(crate) fn parse(text: &str) -> Result<Value, BadYaml> {
     read(text)
-}
-
-/// The document as data of which every part knows where it stands, with the same limits.
-///
-/// # Errors
-/// As [`parse`], and for keys that are not text or stand twice in one mapping.
-pub(crate) fn parse_placed(text: &str) -> Result<YamlPart, BadYaml> {
-    read::<Spanned<Plain>>(text).map(YamlPart::from)
 }
 
 fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
@@ -46,6 +41,7 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
         });
     }
     let options = serde_saphyr::options! {
+        budget: serde_saphyr::budget! { max_nodes: YAML_VALUES },
         alias_limits: serde_saphyr::alias_limits! {
             max_total_replayed_events: 100_000,
             max_replay_stack_depth: 16,
@@ -77,106 +73,6 @@ impl From<Location> for YamlPlace {
             line: usize::try_from(at.line()).unwrap_or(0),
             column: usize::try_from(at.column()).unwrap_or(0),
         }
-    }
-}
-
-/// A part of a document, with its place.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct YamlPart {
-    pub(crate) at: YamlPlace,
-    pub(crate) data: YamlData,
-}
-
-/// What stands there.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum YamlData {
-    /// A scalar as text: `true`, `2.5`, `/scan`; empty for null.
-    Scalar(String),
-    List(Vec<YamlPart>),
-    /// In the document's order: the key, its place, the value.
-    Map(Vec<(String, YamlPlace, YamlPart)>),
-}
-
-impl From<Spanned<Plain>> for YamlPart {
-    fn from(part: Spanned<Plain>) -> Self {
-        Self {
-            at: part.referenced.into(),
-            data: part.value.0,
-        }
-    }
-}
-
-/// [`YamlData`] as the parser gives it.
-struct Plain(YamlData);
-
-impl<'de> Deserialize<'de> for Plain {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(PlainVisitor)
-    }
-}
-
-struct PlainVisitor;
-
-impl PlainVisitor {
-    fn scalar(text: impl fmt::Display) -> Plain {
-        Plain(YamlData::Scalar(text.to_string()))
-    }
-}
-
-impl<'de> Visitor<'de> for PlainVisitor {
-    type Value = Plain;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a value, a list or a mapping")
-    }
-
-    fn visit_bool<E>(self, value: bool) -> Result<Plain, E> {
-        Ok(Self::scalar(value))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<Plain, E> {
-        Ok(Self::scalar(value))
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<Plain, E> {
-        Ok(Self::scalar(value))
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<Plain, E> {
-        Ok(Self::scalar(value))
-    }
-
-    fn visit_str<E>(self, value: &str) -> Result<Plain, E> {
-        Ok(Self::scalar(value))
-    }
-
-    fn visit_unit<E>(self) -> Result<Plain, E> {
-        Ok(Self::scalar(""))
-    }
-
-    fn visit_none<E>(self) -> Result<Plain, E> {
-        Ok(Self::scalar(""))
-    }
-
-    fn visit_some<D: Deserializer<'de>>(self, inner: D) -> Result<Plain, D::Error> {
-        Plain::deserialize(inner)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut parts: A) -> Result<Plain, A::Error> {
-        let mut list = Vec::new();
-        while let Some(part) = parts.next_element::<Spanned<Plain>>()? {
-            list.push(part.into());
-        }
-        Ok(Plain(YamlData::List(list)))
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut parts: A) -> Result<Plain, A::Error> {
-        let mut map = Vec::new();
-        while let Some(key) = parts.next_key::<Spanned<String>>()? {
-            let value = parts.next_value::<Spanned<Plain>>()?;
-            map.push((key.value, key.referenced.into(), value.into()));
-        }
-        Ok(Plain(YamlData::Map(map)))
     }
 }
 
@@ -216,28 +112,6 @@ mod tests {
     }
 
     #[test]
-    fn every_part_knows_its_place() {
-        let parts = parse_placed("a:\n  - {b: 1.5, c: ''}\n").unwrap();
-        let YamlData::Map(map) = parts.data else {
-            panic!()
-        };
-        let (key, _, value) = &map[0];
-        let YamlData::List(list) = &value.data else {
-            panic!()
-        };
-        let YamlData::Map(inner) = &list[0].data else {
-            panic!()
-        };
-        let place = |line, column| YamlPlace { line, column };
-        assert_eq!((key.as_str(), list[0].at), ("a", place(2, 5)));
-        assert_eq!((inner[0].1, inner[0].2.at), (place(2, 6), place(2, 9)));
-        assert_eq!(inner[0].2.data, YamlData::Scalar("1.5".to_owned()));
-        assert_eq!(inner[1].2.data, YamlData::Scalar(String::new()));
-        let twice = parse_placed("a: 1\na: 2\n").unwrap_err();
-        assert_eq!(twice.line, 2, "{twice:?}");
-    }
-
-    #[test]
     fn an_alias_bomb_is_refused() {
         let mut text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_owned();
         for i in 1..12 {
@@ -245,7 +119,6 @@ mod tests {
             text = format!("{text}a{i}: &a{i} [{one}]\n");
         }
         assert!(parse(&text).is_err());
-        assert!(parse_placed(&text).is_err());
         assert!(parse(&"[".repeat(100_000)).is_err());
     }
 

@@ -15,7 +15,7 @@ use crate::export::Output;
 use crate::export::target::Target;
 use crate::gate::{DIFF_FORMATS, DiffFormat, DiffSubject, Format, Severity, explain};
 use crate::pipeline::gate::{self, Baseline, Check, DiffJob, ReportJob};
-use crate::pipeline::{Drawing, Reading};
+use crate::pipeline::{Body, Drawing, Reading};
 
 /// Tells what differs between two missions, or between one and an expectation.
 pub(super) fn diff(args: &DiffArgs, given: &Given, terminal: &mut Terminal) -> Result<u8> {
@@ -50,19 +50,13 @@ fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
         };
         judged(&inputs, &args.time(), &args.graph)
     };
-    let name = |path: &PathBuf| {
-        let last = path
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        last.unwrap_or_else(|| path.display().to_string())
-    };
     let (mut reports, mut pictures) = (Vec::new(), Vec::new());
     for output in &args.outputs {
         let ending = output.to_string_lossy().to_ascii_lowercase();
         let is_end = |f: &&DiffFormat| f.endings.iter().any(|end| ending.ends_with(end));
         match DIFF_FORMATS.iter().find(is_end) {
             Some(format) => reports.push((Target::parse(output), format)),
-            None => pictures.push(Output::named(output, None)?),
+            None => pictures.push(picture(output)?),
         }
     }
     let mut drawing = Drawing::new()?;
@@ -71,12 +65,10 @@ fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
         drawing.page.size = Size::new(f64::from(width), f64::from(height));
         drawing.is_sized = true;
     }
-    let subject = DiffSubject {
-        first: name(&args.first),
-        second: name(&args.second),
-    };
-    drawing.page.compares = true;
-    drawing.page.title = Some(format!("{} → {}", subject.first, subject.second));
+    let subject = subject(&args.first, &args.second);
+    drawing.body = Body::Graph;
+    drawing.page.rate_change = args.rate_change;
+    drawing.page.title = Some(format!("A: {} → B: {}", subject.first, subject.second));
     Ok(DiffJob {
         readings: [one(&args.first)?, one(&args.second)?],
         rate_change: args.rate_change,
@@ -85,6 +77,34 @@ fn diff_job(args: &DiffArgs) -> Result<DiffJob> {
         pictures,
         drawing,
     })
+}
+
+/// The names of two missions without their folders, unless these are all that tells one from the other.
+fn subject(first: &Path, second: &Path) -> DiffSubject {
+    let whole = |path: &Path| path.display().to_string();
+    let last = |path: &Path| {
+        let last = path.file_name();
+        last.map_or_else(|| whole(path), |name| name.to_string_lossy().into_owned())
+    };
+    let is_alike = last(first) == last(second);
+    let name = |path| if is_alike { whole(path) } else { last(path) };
+    DiffSubject {
+        first: name(first),
+        second: name(second),
+    }
+}
+
+/// A picture of both missions: tables and the like hold times, which are not the same in both.
+fn picture(output: &OsStr) -> Result<Output> {
+    let picture = Output::named(output, None)?;
+    if picture.format.is_viewed {
+        return Ok(picture);
+    }
+    let name = output.to_string_lossy();
+    Err(Error::usage(
+        format!("`{name}` would hold one mission, and two are compared"),
+        "what differs can be written as `d.txt`, `d.json`, `d.md`, or drawn: `d.svg`, `d.html`, `d.gif`",
+    ))
 }
 
 /// Whether a path names an expectation.
@@ -138,6 +158,12 @@ pub(super) fn baseline(args: &BaselineArgs, given: &Given, terminal: &mut Termin
     let done = gate::baseline(&job, terminal)?;
     for mission in &done.missions {
         terminal.notices(&mission.notices);
+    }
+    if done.left_out > 0 {
+        let names = words::count(done.left_out, "name");
+        terminal.note(&format!(
+            "{names} found no room in the expectation: there are too many, or they are too long"
+        ));
     }
     if let Some(path) = &args.update {
         let left = match done.left {

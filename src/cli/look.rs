@@ -80,7 +80,6 @@ pub(super) fn options(args: &LookArgs, rate_change: f64) -> PageOptions {
         size,
         width_mm: args.width,
         bare: args.bare,
-        compares: false,
         title: args.title.clone(),
         orientation: match args.orientation.as_str() {
             "LR" => Some(Orientation::LeftRight),

@@ -95,7 +95,7 @@ impl<'a> Board<'a> {
             most = most_rows(&lives, style, &options, fonts);
         }
         let left_out = lives.shorten(most, &|track| messages(source, track));
-        let page = PageFrame::new(style, &options, 0);
+        let page = PageFrame::new(style, &options, 0, true);
         let (place, scale) = placed(&lives, &page, &options, fonts);
         if !is_sized {
             // A short board leaves no empty page below; an even number of rows is what videos want.
@@ -419,7 +419,7 @@ fn most_rows(
     options: &PageOptions,
     fonts: &Fonts,
 ) -> usize {
-    let page = PageFrame::new(style, options, 0);
+    let page = PageFrame::new(style, options, 0, true);
     let canvas = PaperCanvas::new(fonts, Sizes::of_names(7.0), SCALE.0);
     let rows = lives.rows.len() as f64 * canvas.sizes.pitch();
     let others = lives.height(&canvas) - rows + BELOW;

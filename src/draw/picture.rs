@@ -11,6 +11,7 @@ pub(crate) use legend::{LegendSign, signs};
 mod measured;
 mod options;
 pub(crate) mod page;
+mod room;
 mod timeline;
 pub(crate) mod title;
 mod tween;
@@ -26,7 +27,7 @@ use self::page::{GraphFit, PageFrame};
 use self::timeline::Timeline;
 use self::title::Title;
 pub use self::union::{Union, UnionElement, rate_label, sign};
-use crate::base::geometry::Size;
+use crate::base::geometry::{Point, Size};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::words;
 pub use crate::draw::figure::course::Course;
@@ -34,7 +35,7 @@ use crate::draw::scene::{Group, Scene};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
-use crate::view::{Arrow, ArrowKind, Frame, Item, SeenWindow, View};
+use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, SeenWindow, View};
 
 /// What the user wishes of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,8 +46,6 @@ pub struct PageOptions {
     pub width_mm: Option<f64>,
     /// The graph alone, without title, caption, legend and timeline.
     pub bare: bool,
-    /// Whether two missions are compared, so that no time, no window and no timeline means anything.
-    pub compares: bool,
     /// The title, if not the names of the bags.
     pub title: Option<String>,
     /// Which way the edges run; `None` takes what fits better.
@@ -69,7 +68,6 @@ impl Default for PageOptions {
             size: Size::new(1280.0, 720.0),
             width_mm: None,
             bare: false,
-            compares: false,
             title: None,
             orientation: None,
             phases: Vec::new(),
@@ -110,7 +108,7 @@ impl<'a> Measured<'a> {
         } else {
             Vec::new()
         };
-        let page = PageFrame::new(style, &options, legend.len());
+        let page = PageFrame::new(style, &options, legend.len(), !view.compares);
         Self {
             view,
             style,
@@ -186,7 +184,7 @@ impl<'a> Picture<'a> {
             ..
         } = &measured;
         let fit = page.fit(layout.size);
-        let tracks = tracks(&measured, &layout, fit);
+        let (cards, tracks) = places(&measured, &layout, fit);
         let mut order: Vec<usize> = (0..tracks.len()).collect();
         let is_publish = |at: usize| view.arrows[at].kind == ArrowKind::Publish;
         order.sort_by(|&a, &b| {
@@ -197,7 +195,7 @@ impl<'a> Picture<'a> {
                 .then(a.cmp(&b))
         });
         let mut picture = Self {
-            cards: cards(&measured, &layout, fit),
+            cards,
             tracks,
             order,
             title: Title::new(style, fonts, page, view, &measured.options),
@@ -249,7 +247,7 @@ impl<'a> Picture<'a> {
             self.furniture(k, frame, &mut scene.groups);
         }
         measured.options.title().clone_into(&mut scene.title);
-        if !measured.options.compares {
+        if !measured.view.compares {
             let (window, all) = (frame.index + 1, self.len());
             scene.title = format!("{}, window {window} of {all}", scene.title);
         }
@@ -278,7 +276,7 @@ impl<'a> Picture<'a> {
                 let (legend, style) = (&measured.legend, measured.style);
                 groups.push(legend::legend(legend, style, &measured.page));
             }
-            if !measured.options.compares {
+            if !measured.view.compares {
                 groups.extend(self.timeline.ground(measured.view));
             }
         }
@@ -292,9 +290,8 @@ impl<'a> Picture<'a> {
             .phases
             .get(k)
             .map_or("", String::as_str);
-        if self.measured.options.compares {
-            groups.push(self.title.compared());
-            groups.push(self.title.chips(frame));
+        if self.measured.view.compares {
+            groups.extend(self.title.compared(frame, self.len()));
             groups.push(self.title.caption(frame, phase));
             return;
         }
@@ -382,6 +379,21 @@ impl<'a> Picture<'a> {
     }
 }
 
+/// What never changes of items and arrows, with badges where there is room for them.
+fn places(
+    measured: &Measured<'_>,
+    layout: &Layout,
+    fit: GraphFit,
+) -> (Vec<ItemBox>, Vec<ArrowPath>) {
+    let mut cards = cards(measured, layout, fit);
+    let mut tracks = tracks(measured, layout, fit);
+    let kinds: Vec<ItemKind> = measured.view.items.iter().map(|item| item.kind).collect();
+    // A hair beyond the badge's edge.
+    let radius = measured.style.badge.radius * fit.pen + 1.0;
+    room::place_badges((&kinds, &mut cards), &mut tracks, radius, fit.scale);
+    (cards, tracks)
+}
+
 fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox> {
     let tells = measured::tells(measured.view);
     let items = measured.view.items.iter().zip(&layout.boxes);
@@ -393,6 +405,7 @@ fn cards(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ItemBox
             label: label.clone(),
             tells,
             place: fit.rect(*place),
+            badge: Point::default(),
         })
         .collect()
 }

@@ -19,6 +19,7 @@ use crate::draw::board::Overview;
 use crate::draw::paint::classes::{self, ClassDetail, Classes, ElementLook};
 use crate::draw::paint::svg;
 use crate::draw::paint::xml::Xml;
+use crate::draw::picture::title::SIDES;
 use crate::draw::picture::{Union, rate_label};
 use crate::draw::style::Style;
 use crate::draw::text;
@@ -105,12 +106,14 @@ impl HtmlPage<'_> {
             "normal"
         };
         let view = self.whole.view;
+        let kind = if view.compares { "compares" } else { "" };
         let mut title = Xml::default();
         title.text(&visible(self.title));
         let title = title.finish();
         fill(PAGE, |key| match key {
             "policy" => policy.clone(),
             "schemes" => schemes.to_owned(),
+            "kind" => kind.to_owned(),
             "title" => title.clone(),
             "fonts" => fonts.clone(),
             "css" => look.clone(),
@@ -243,6 +246,9 @@ impl HtmlPage<'_> {
         let (Some(first), Some(at)) = (frames.first(), frames.get(still)) else {
             return String::new();
         };
+        if self.whole.view.compares {
+            return SIDES[still.min(1)].to_owned();
+        }
         let at = words::offset(at.span.start.since(first.span.start));
         format!("window {} of {} · {at}", still + 1, frames.len())
     }

@@ -4,52 +4,108 @@ mod draft;
 mod edit;
 mod update;
 
-use std::fmt::Write as _;
-
 use super::expectation::SCHEMA;
+use crate::base::budget;
 use crate::base::time::Period;
-use crate::base::words::visible_json;
+use crate::base::words::{self, visible_json};
 use crate::mission::Mission;
 
 pub(super) use draft::{Draft, NodeLine, TopicLine};
-pub(crate) use update::{Update, update};
+pub(crate) use update::update;
 
-/// Names longer than this are not written: YAML takes no longer keys, and ROS allows 255 bytes.
-const LONGEST: usize = 900;
+/// Names longer than this in the file, in bytes, are left out: YAML takes no longer keys, and ROS allows 255.
+const LONGEST: usize = 1000;
+/// What the lines before the first name take of a document's limits.
+const HEAD: usize = 1 << 16;
 
-/// The expectation that holds in all of these runs, which were read with windows of this length. `from` names them, for
-/// the reader only.
-pub(crate) fn write(runs: &[Mission], from: &str, period: Period) -> String {
-    let draft = Draft::of(runs);
-    let mut out = format!("schema: {SCHEMA}\n");
-    // Writing into a string does not fail.
-    let _ = writeln!(out, "from: {}", scalar(from));
-    let _ = writeln!(out, "period: {}", length(period.nanos()));
-    out.push_str(
-        "policy: {unexpected_nodes: warn, unexpected_topics: allow, unexpected_publishers: error}\n",
-    );
-    let nodes = draft.nodes.iter();
-    section(
-        &mut out,
-        "nodes",
-        nodes.map(|(name, line)| (name.as_str(), line.text())),
-    );
-    let topics = draft.topics.iter();
-    section(
-        &mut out,
-        "topics",
-        topics.map(|(name, line)| (name.as_str(), line.text())),
-    );
-    out
+/// An expectation that was written.
+#[derive(Debug, Default)]
+pub(crate) struct Written {
+    pub(crate) text: String,
+    /// How many nodes and topics found no room in it.
+    pub(crate) left_out: usize,
 }
 
-fn section<'a>(out: &mut String, key: &str, lines: impl Iterator<Item = (&'a str, String)>) {
-    let mut lines = lines.filter(|(name, _)| name.len() <= LONGEST).peekable();
-    if lines.peek().is_some() {
-        let _ = writeln!(out, "{key}:");
+/// The expectation that holds in all of these runs, which were read with windows of one length. `from` names them, for
+/// the reader only.
+pub(crate) fn write(runs: &[Mission], from: &str) -> Written {
+    let written = |first: &Mission| written(&Draft::of(runs), from, first.period);
+    runs.first().map(written).unwrap_or_default()
+}
+
+fn written(draft: &Draft, from: &str, period: Period) -> Written {
+    let mut room = Room {
+        bytes: budget::YAML - HEAD,
+        values: budget::YAML_VALUES - HEAD / 16,
+        left_out: 0,
+    };
+    let nodes = draft.nodes.iter().map(|(name, line)| (name, line.text()));
+    let nodes = room.section("nodes", nodes);
+    // Who found no room is not unexpected.
+    let others = if room.left_out == 0 { "warn" } else { "allow" };
+    let topics = draft.topics.iter().map(|(name, line)| (name, line.text()));
+    let topics = room.section("topics", topics);
+    let note = match room.left_out {
+        0 => String::new(),
+        n => format!("# {} found no room.\n", words::count(n, "more name")),
+    };
+    let (from, period) = (scalar(from), length(period.nanos()));
+    let text = format!(
+        "schema: {SCHEMA}\nfrom: {from}\nperiod: {period}\n\
+         policy: {{unexpected_nodes: {others}, unexpected_topics: allow, unexpected_publishers: error}}\n\
+         {note}{nodes}{topics}"
+    );
+    Written {
+        text,
+        left_out: room.left_out,
     }
-    for (name, line) in lines {
-        let _ = writeln!(out, "  {}: {line}", scalar(name));
+}
+
+/// What is left of the limits of a document that can be read again.
+struct Room {
+    bytes: usize,
+    values: usize,
+    left_out: usize,
+}
+
+impl Room {
+    /// A section with a line per name, without those that find no room; nothing if none does.
+    fn section<'a>(
+        &mut self,
+        key: &str,
+        lines: impl Iterator<Item = (&'a String, String)>,
+    ) -> String {
+        let mut out = String::new();
+        for (name, line) in lines {
+            let name = scalar(name);
+            let line = format!("  {name}: {line}\n");
+            if name.len() > LONGEST || !self.takes(&line) {
+                self.left_out += 1;
+                continue;
+            }
+            if out.is_empty() {
+                out = format!("{key}:\n");
+            }
+            out.push_str(&line);
+        }
+        out
+    }
+
+    /// Whether a line finds room, which it then takes.
+    fn takes(&mut self, line: &str) -> bool {
+        // A pair is two values, and so is what opens a mapping or a list with its first member; a comma begins another.
+        let signs = line
+            .bytes()
+            .filter(|b| matches!(b, b':' | b',' | b'[' | b'{'));
+        let values = 2 * signs.count();
+        let (Some(bytes), Some(values)) = (
+            self.bytes.checked_sub(line.len()),
+            self.values.checked_sub(values),
+        ) else {
+            return false;
+        };
+        (self.bytes, self.values) = (bytes, values);
+        true
     }
 }
 
@@ -92,7 +148,52 @@ fn list<'a>(names: impl Iterator<Item = &'a String>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+    use crate::gate::read;
+
+    /// An expectation of so many nodes, and of topics with these names; it must be one that can be read.
+    fn of(nodes: usize, topics: &[String]) -> (Written, usize) {
+        let mut draft = Draft::default();
+        for n in 0..nodes {
+            draft.nodes.insert(format!("/n{n}"), NodeLine::default());
+        }
+        for name in topics {
+            draft.topics.insert(name.clone(), TopicLine::default());
+        }
+        let written = written(
+            &draft,
+            "run.bag",
+            Period::from_nanos(1_000_000_000).unwrap(),
+        );
+        let read = read(&written.text, Path::new("graph.yaml")).unwrap();
+        let kept = read.nodes.len() + read.topics.len();
+        (written, kept)
+    }
+
+    #[test]
+    fn what_is_written_can_be_read_however_many_names_there_are() {
+        let (small, kept) = of(2, &["/a".to_owned()]);
+        assert_eq!((small.left_out, kept), (0, 3));
+        assert!(small.text.contains("unexpected_nodes: warn") && !small.text.contains("no room"));
+        let (large, kept) = of(1 << 17, &[]);
+        assert!(kept > 20_000 && large.left_out + kept == 1 << 17, "{kept}");
+        assert!(large.text.contains("unexpected_nodes: allow"));
+        assert!(large.text.contains(" more names found no room.\n"));
+    }
+
+    #[test]
+    fn names_that_are_no_keys_are_left_out() {
+        // As long as they are when they are written.
+        let names = [
+            "/a".repeat(495),
+            "/a".repeat(505),
+            format!("/{}", "\u{202e}".repeat(300)),
+        ];
+        let (written, kept) = of(0, &names);
+        assert_eq!((written.left_out, kept), (2, 1));
+    }
 
     #[test]
     fn text_is_quoted_where_yaml_would_read_something_else() {

@@ -290,6 +290,21 @@ impl<'a> Facts<'a> {
         rows.filter_map(|(at, _)| Some(self.mission.windows.get(at)?.span))
     }
 
+    /// From when to when somebody published a topic, as far as the bag tells, and how many messages.
+    pub(crate) fn sent(&self, node: NodeId, edge: u32) -> Option<(Span, u64)> {
+        let mission = self.mission;
+        let runs = match mission.elements.runs(Element::Publish(edge)) {
+            [] => self.lives(&[node]),
+            runs => runs.to_vec(),
+        };
+        let span = Span {
+            start: runs.first()?.start,
+            end: runs.last()?.end,
+        };
+        let rows = mission.graphs.rows(Element::Publish(edge));
+        Some((span, rows.filter_map(|(_, row)| row.count).sum()))
+    }
+
     /// Entries of the ledger about any of these nodes, but not about their edges.
     pub(crate) fn entries(&self, nodes: &[NodeId], kind: Kind) -> Vec<&'a Entry> {
         let own = |e: &&Entry| matches!(e.what, Element::Node(id) if nodes.contains(&id));

@@ -231,6 +231,14 @@ pub(crate) struct Cause {
     pub(crate) text: String,
 }
 
+impl Cause {
+    /// Whether it says what the findings about this name say themselves.
+    pub(crate) fn is_about(&self, name: &str) -> bool {
+        let rest = self.text.strip_prefix(name);
+        rest.is_some_and(|rest| rest.starts_with(' '))
+    }
+}
+
 /// One thing found. All its texts are visible: control characters are spelled out.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Finding {

@@ -51,6 +51,9 @@ pub struct Ledger {
     pub entries: Vec<Entry>,
     /// Stretches that one graph describes, in order and without holes; empty where they were not looked for.
     pub phases: Vec<Phase>,
+    /// Whether it tells how a mission, B, differs from another, A: what started or appeared is only in B, what stopped or
+    /// vanished only in A, and times mean nothing.
+    pub(crate) compares: bool,
 }
 
 /// What kind of thing happened. Ordered as entries of one time are told.
@@ -205,6 +208,15 @@ impl Ledger {
     /// What the changes from window to window say, where nothing finer is known.
     pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Self {
         from_changes::from_changes(elements, windows)
+    }
+
+    /// What is said of whatever an entry of this kind is about.
+    pub(crate) fn word(&self, kind: Kind) -> &'static str {
+        match kind {
+            Kind::Started | Kind::Appeared if self.compares => "only in B",
+            Kind::Stopped | Kind::Vanished if self.compares => "only in A",
+            kind => kind.word(),
+        }
     }
 
     /// Entries whose time lies in `span`, with their places, in order.

@@ -17,7 +17,7 @@ use crate::view::{Mode, View, ViewOptions, outline, view};
 
 /// What the picture of a mission is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Body {
+pub enum Body {
     /// A graph; a board where of most messages nobody knows the publisher.
     #[default]
     Auto,
@@ -43,7 +43,7 @@ impl Body {
 #[non_exhaustive]
 pub struct Drawing {
     /// Graph or board.
-    pub(crate) body: Body,
+    pub body: Body,
     /// What is shown.
     pub view: ViewOptions,
     /// Colours, strokes and fonts.
@@ -54,7 +54,7 @@ pub struct Drawing {
     pub page: PageOptions,
     /// Whether the user chose the size of the page, so that it may not grow.
     pub is_sized: bool,
-    /// Where it will be seen, if that decides the page.
+    /// Where it will be seen, if that decides the page: see [`Drawing::seen`].
     pub(crate) purpose: Option<Purpose>,
     /// Whether to grow the page and collapse namespaces until the text can be read.
     pub is_fitted: bool,
@@ -86,6 +86,17 @@ impl Drawing {
 }
 
 impl Drawing {
+    /// The same for somebody who sees it there: page, size of text and furniture follow from that, whatever they were.
+    #[must_use]
+    pub fn seen(self, purpose: Purpose) -> Self {
+        Self {
+            page: purpose.page(self.page),
+            is_sized: true,
+            purpose: Some(purpose),
+            ..self
+        }
+    }
+
     /// The smallest text that can be read, in pixels.
     fn readable(&self) -> f64 {
         self.purpose.map_or(READABLE, Purpose::readable)
@@ -126,7 +137,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
                 ..page.clone()
             };
             let attempt = Attempt::new(mission, drawing, &options, &higher);
-            if attempt.text > best.text {
+            if attempt.text > best.text || attempt.layout.is_none() {
                 (page, best) = (higher, attempt);
             }
         }
@@ -134,7 +145,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     if drawing.is_fitted && !best.is_readable(drawing) {
         if !drawing.is_sized && page.width_mm.is_none() {
             page.size = LARGEST;
-            best = Attempt::new(mission, drawing, &options, &page);
+            best = best.grown(mission, drawing, &options, &page);
         }
         collapse(mission, drawing, &page, &mut options, &mut best);
         if best.is_readable(drawing) {
@@ -143,12 +154,16 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
             bundle(mission, drawing, &page, &mut options, &mut best);
         }
     }
+    if best.layout.is_none() {
+        best = Attempt::drawn(mission, drawing, &options, &page);
+    }
     let Attempt {
         view,
         mut notices,
         layout,
         text,
     } = best;
+    let layout = layout.unwrap_or_else(Layout::empty);
     if drawing.is_fitted || drawing.purpose.is_some() {
         let collapsed = &options.collapse[asked..];
         notices.extend(told(drawing, collapsed, &page, text).iter());
@@ -197,15 +212,41 @@ pub(super) fn unseen(drawing: &Drawing) -> Composed {
 
 /// A layout of what some options show.
 struct Attempt {
+    /// Without its windows where there is no layout.
     view: View,
     notices: Notices,
-    layout: Layout,
+    /// `None` where so many boxes cannot be read, however they stand.
+    layout: Option<Layout>,
     /// The size of its smallest text in pixels.
     text: f64,
 }
 
 impl Attempt {
+    /// A layout, if there is hope that it can be read or `--fit none` does not ask.
     fn new(
+        mission: &Mission,
+        drawing: &Drawing,
+        options: &ViewOptions,
+        page: &PageOptions,
+    ) -> Self {
+        let elements = &mission.elements;
+        let boxes = elements.nodes.len() + elements.topics.len();
+        if drawing.is_fitted && is_crowded(boxes, drawing, page) {
+            let view = outline(mission, options);
+            if is_crowded(view.items.len(), drawing, page) {
+                return Self {
+                    view,
+                    notices: Notices::new(),
+                    layout: None,
+                    text: 0.0,
+                };
+            }
+        }
+        Self::drawn(mission, drawing, options, page)
+    }
+
+    /// A layout in any case.
+    fn drawn(
         mission: &Mission,
         drawing: &Drawing,
         options: &ViewOptions,
@@ -223,14 +264,38 @@ impl Attempt {
         Self {
             view,
             notices,
-            layout,
+            layout: Some(layout),
             text,
         }
+    }
+
+    /// The same on a larger page.
+    fn grown(
+        self,
+        mission: &Mission,
+        drawing: &Drawing,
+        options: &ViewOptions,
+        page: &PageOptions,
+    ) -> Self {
+        if self.layout.is_none() && is_crowded(self.view.items.len(), drawing, page) {
+            return self;
+        }
+        Self::new(mission, drawing, options, page)
     }
 
     fn is_readable(&self, drawing: &Drawing) -> bool {
         self.text >= drawing.readable()
     }
+}
+
+/// The least area of a box in squares of its text's height: no box is lower than its text, nor narrower than four
+/// times that.
+const LEAST_BOX: f64 = 4.0;
+
+/// Whether these are more boxes than a page holds with text that can be read.
+fn is_crowded(boxes: usize, drawing: &Drawing, page: &PageOptions) -> bool {
+    let text = drawing.readable();
+    boxes as f64 > page.size.w * page.size.h / (LEAST_BOX * text * text)
 }
 
 /// Collapses namespaces until the text can be read.
@@ -242,7 +307,7 @@ fn collapse(
     best: &mut Attempt,
 ) {
     while !best.is_readable(drawing) {
-        let candidates = outline(mission, options).collapsible(mission, options);
+        let candidates = best.view.collapsible(mission, options);
         let fresh = candidates
             .into_iter()
             .map(|c| c.name)

@@ -10,7 +10,9 @@ use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::draw::board::Board;
-use crate::draw::figure::{self, Figure};
+use crate::draw::figure::Figure;
+use crate::draw::figure::course::{self, Course, LifeLines};
+use crate::draw::figure::source::FigureSource;
 use crate::draw::paint::raster::Painter;
 use crate::draw::picture::{Measured, Picture};
 use crate::draw::strip::{Strip, StripSource, strip};
@@ -126,9 +128,14 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     };
     let is_drawn = job.outputs.iter().any(is_graph);
     let is_board = is_drawn && drawing.body.is_board(&mission);
-    if is_drawn && !is_board {
-        drawing.page.course = Some(course(&mission, &drawing));
-    }
+    let source = FigureSource::new(
+        &mission,
+        &drawing.view.ns_filter,
+        &drawing.view.topic_filter,
+        false,
+    );
+    let lives = (is_drawn && !is_board).then(|| course::of_all(&source));
+    drawing.page.course = lives.as_ref().map(|lives| Course::new(lives, MOST_LIVES));
     let Composed {
         view,
         options,
@@ -157,7 +164,7 @@ pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Res
     let opened_picture = opened
         .as_ref()
         .and_then(|view| unfolded::drawn(view, &drawing, &job.outputs));
-    let lives = opened.as_ref().map(|_| unfolded::lives(&mission, &drawing));
+    let lives = lives.filter(|_| opened.is_some()).map(LifeLines::new);
     let strip = match figure {
         Some(_) => None,
         None => side_by_side(job, &mission, &view, &picture)?,
@@ -264,13 +271,6 @@ fn long_job(job: &Render, sequence: &Sequence<'_>) -> Option<String> {
 /// So many life lines fit below a frame.
 const MOST_LIVES: usize = 14;
 
-/// Who lived when, for the strip below frames.
-fn course(mission: &Mission, drawing: &Drawing) -> figure::Course {
-    let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
-    let source = figure::source::FigureSource::new(mission, nodes, topics, false);
-    figure::Course::new(&source, MOST_LIVES)
-}
-
 /// Writes a mission whose picture is the topic board.
 fn show_board(
     job: &Render,
@@ -285,7 +285,7 @@ fn show_board(
         all.add(Notice::new(NoticeKind::Chosen, text));
     }
     let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
-    let source = figure::source::FigureSource::new(&mission, nodes, topics, false);
+    let source = FigureSource::new(&mission, nodes, topics, false);
     let page = drawing.page.clone();
     let is_sized = drawing.is_sized || !drawing.is_fitted;
     let board = Board::new(
@@ -300,7 +300,7 @@ fn show_board(
     all.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text)));
     let overview = board.overview();
     let viewed = job.is_filtered.then(|| filtered(&mission, options));
-    let lives = unfolded::lives(&mission, drawing);
+    let lives = LifeLines::new(course::of_all(&source));
     let sequence = Sequence {
         mission: &mission,
         data: viewed.as_ref().unwrap_or(&mission),

@@ -15,6 +15,8 @@ mod counts;
 mod finish;
 mod plan;
 #[cfg(feature = "parquet")]
+mod rows;
+#[cfg(feature = "parquet")]
 mod run;
 
 pub use count::{CountedBag, Tally, count};

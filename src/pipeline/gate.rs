@@ -12,7 +12,7 @@ use crate::export::check as places;
 use crate::export::sink::OutputSink;
 use crate::export::target::Target;
 use crate::gate::{
-    DiffFormat, DiffSubject, Difference, Format, Side, Subject, Update, Verdict, differences,
+    DiffFormat, DiffSubject, Difference, Format, Side, Subject, Verdict, Written, differences,
     judge, union, update, write,
 };
 use crate::graph::window::Length;
@@ -178,6 +178,8 @@ pub(crate) struct BaselineWritten {
     pub(crate) changed: usize,
     /// Findings that are left.
     pub(crate) left: usize,
+    /// Nodes and topics that found no room.
+    pub(crate) left_out: usize,
 }
 
 /// Writes down what runs have in common, or brings an expectation up to date.
@@ -209,33 +211,30 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
         period = period.or(Some(mission.period));
         missions.push(mission);
     }
-    let Update {
-        text,
-        changed,
-        left,
-    } = if let Some((path, text, _)) = old {
-        update(&text, path, &missions, &job.only)?
+    let mut done = BaselineWritten {
+        missions,
+        changed: 0,
+        left: 0,
+        left_out: 0,
+    };
+    let text = if let Some((path, text, _)) = old {
+        let new = update(&text, path, &done.missions, &job.only)?;
+        (done.changed, done.left) = (new.changed, new.left);
+        new.text
     } else {
-        Update {
-            text: written(&missions),
-            changed: 0,
-            left: 0,
-        }
+        let new = written(&done.missions);
+        done.left_out = new.left_out;
+        new.text
     };
     put(&target, &text)?;
-    Ok(BaselineWritten {
-        missions,
-        changed,
-        left,
-    })
+    Ok(done)
 }
 
 /// The expectation that holds in all of these runs.
-fn written(missions: &[Mission]) -> String {
+fn written(missions: &[Mission]) -> Written {
     let names: Vec<String> = missions.iter().map(name).collect();
     let from = words::some_of(&names, 3);
-    let period = missions.first().map(|m| m.period);
-    period.map_or_else(String::new, |period| write(missions, &from, period))
+    write(missions, &from)
 }
 
 fn name(mission: &Mission) -> String {

@@ -6,7 +6,7 @@ use crate::draw::picture::PageOptions;
 
 /// Where the picture will be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Purpose {
+pub enum Purpose {
     /// On a repository's front page, which is at most 830 pixels wide.
     Readme,
     /// On a screen or a wall, 1280 × 720.
@@ -26,7 +26,7 @@ const FURNITURE: f64 = 10.5;
 
 impl Purpose {
     /// The purposes by the words of the command line.
-    pub(crate) const ALL: [(&'static str, Self); 4] = [
+    pub const ALL: [(&'static str, Self); 4] = [
         ("readme", Self::Readme),
         ("slide", Self::Slide),
         ("column", Self::Column),
@@ -37,7 +37,7 @@ impl Purpose {
     ///
     /// # Errors
     /// [`Error::Usage`] for another word.
-    pub(crate) fn parse(word: &str) -> Result<Self> {
+    pub fn parse(word: &str) -> Result<Self> {
         let found = Self::ALL.iter().find(|(name, _)| *name == word);
         found.map(|(_, purpose)| *purpose).ok_or_else(|| {
             Error::usage(

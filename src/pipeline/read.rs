@@ -303,6 +303,7 @@ fn told(
     Ok(Ledger {
         entries,
         phases: wanted(reading, basis)?,
+        ..Ledger::default()
     })
 }
 

@@ -2,8 +2,6 @@
 
 use super::Drawing;
 use crate::base::geometry::Size;
-use crate::draw::figure::course::LifeLines;
-use crate::draw::figure::source::FigureSource;
 use crate::draw::picture::{Measured, PageOptions, Picture};
 use crate::export::Output;
 use crate::mission::Mission;
@@ -37,10 +35,4 @@ pub(super) fn drawn<'a>(
     };
     let measured = Measured::new(view, &drawing.style, &drawing.fonts, page);
     Some(measured.laid_out(drawing.engine))
-}
-
-/// Who lived when.
-pub(super) fn lives(mission: &Mission, drawing: &Drawing) -> LifeLines {
-    let (nodes, topics) = (&drawing.view.ns_filter, &drawing.view.topic_filter);
-    LifeLines::new(&FigureSource::new(mission, nodes, topics, false))
 }

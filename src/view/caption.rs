@@ -82,8 +82,9 @@ impl<'a> Speaker<'a> {
             .collect();
         Phrase {
             text: format!(
-                "{} {what}{} ({}, …)",
+                "{} {what}{}{} ({}, …)",
                 all.len(),
+                self.verb(kind),
                 with(topics),
                 names.join(", ")
             ),
@@ -95,17 +96,12 @@ impl<'a> Speaker<'a> {
         let name = self.name(headline.what);
         let topics = self.topics.get(&headline.entry).copied().unwrap_or(0);
         let text = match headline.kind {
-            Kind::Started => format!("{name} started{}", with(topics)),
-            Kind::Stopped => format!("{name} stopped{}", with(topics)),
-            Kind::Restarted => format!("{name} restarted"),
-            Kind::Silent => format!("{name} fell silent"),
-            Kind::Appeared => self
-                .edge(headline.what, "now")
-                .unwrap_or_else(|| name + " appeared"),
-            Kind::Vanished => {
-                let edge = self.edge(headline.what, "no longer");
-                edge.unwrap_or_else(|| name + " vanished")
+            Kind::Started | Kind::Stopped | Kind::Restarted | Kind::Silent => {
+                format!("{name} {}{}", self.verb(headline.kind), with(topics))
             }
+            Kind::Appeared | Kind::Vanished => self
+                .edge(headline)
+                .unwrap_or_else(|| format!("{name} {}", self.verb(headline.kind))),
             Kind::HandedOver | Kind::Rate | Kind::Lifecycle | Kind::Type | Kind::Qos => {
                 self.changed(headline, &name)
             }
@@ -124,7 +120,9 @@ impl<'a> Speaker<'a> {
                 let (from, to) = (prefixed(" from ", &from), prefixed(" to ", &to));
                 format!("{name} handed over{from}{to}")
             }
-            Some(Detail::Values { from, to }) if headline.kind == Kind::Lifecycle => {
+            Some(Detail::Values { from, to })
+                if headline.kind == Kind::Lifecycle || self.ledger.compares =>
+            {
                 match &**from {
                     "" => format!("{name} {}", clip(to)),
                     from => format!("{name} {} → {}", clip(from), clip(to)),
@@ -136,15 +134,32 @@ impl<'a> Speaker<'a> {
         }
     }
 
+    /// What a kind of headline says, behind whom it is about.
+    fn verb(&self, kind: Kind) -> &'static str {
+        match kind {
+            Kind::Silent => "fell silent",
+            Kind::Lifecycle => "changed",
+            kind => self.ledger.word(kind),
+        }
+    }
+
     /// `b now subscribes /t`; `None` for a node or topic.
-    fn edge(&self, what: Element, now: &str) -> Option<String> {
-        let (edge, verb) = match what {
+    fn edge(&self, headline: &Headline) -> Option<String> {
+        let (edge, verb) = match headline.what {
             Element::Publish(id) => (self.elements.publishes.get(id as usize)?, "publishes"),
             Element::Subscribe(id) => (self.elements.subscribes.get(id as usize)?, "subscribes"),
             Element::Node(_) | Element::Topic(_) => return None,
         };
         let node = self.name(Element::Node(edge.node));
         let topic = self.name(Element::Topic(edge.topic));
+        if self.ledger.compares {
+            let side = self.verb(headline.kind);
+            return Some(format!("{node} {verb} {topic} {side}"));
+        }
+        let now = match headline.kind {
+            Kind::Appeared => "now",
+            _ => "no longer",
+        };
         Some(format!("{node} {now} {verb} {topic}"))
     }
 
@@ -200,13 +215,10 @@ impl<'a> Speaker<'a> {
 /// What several of a kind are called; `None` for those of which each is worth its name.
 fn together(kind: Kind) -> Option<&'static str> {
     Some(match kind {
-        Kind::Started => "nodes started",
-        Kind::Stopped => "nodes stopped",
-        Kind::Restarted => "nodes restarted",
-        Kind::Silent => "fell silent",
-        Kind::Appeared => "connections and topics appeared",
-        Kind::Vanished => "connections and topics vanished",
-        Kind::Lifecycle => "states changed",
+        Kind::Started | Kind::Stopped | Kind::Restarted => "nodes ",
+        Kind::Silent => "",
+        Kind::Appeared | Kind::Vanished => "connections and topics ",
+        Kind::Lifecycle => "states ",
         Kind::HandedOver | Kind::Rate | Kind::Type | Kind::Qos => return None,
     })
 }

@@ -91,6 +91,7 @@ impl Keep {
         Ledger {
             entries,
             phases: all.phases.clone(),
+            compares: all.compares,
         }
     }
 

@@ -1,6 +1,9 @@
 //! Namespaces that are the same but for their index, such as the robots of a fleet: they are drawn once for all.
 
+use std::cmp::Reverse;
+use std::collections::hash_map::DefaultHasher;
 use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{Hash, Hasher as _};
 use std::sync::Arc;
 
 use super::ViewOptions;
@@ -40,8 +43,8 @@ pub(crate) struct Fleets {
     place: BTreeMap<Arc<str>, usize>,
 }
 
-/// What a namespace holds and is linked to, its own name taken out.
-type Inside = BTreeSet<String>;
+/// What a namespace holds and is linked to, its own name taken out: a hash for each.
+type Inside = BTreeSet<u64>;
 
 impl Fleets {
     /// The fleets among these elements, but for namespaces that are kept open.
@@ -60,8 +63,8 @@ impl Fleets {
             for (space, inside) in spaces {
                 alike.entry(inside).or_default().push(space);
             }
-            // The first of the largest; those that differ stay beside it.
-            let largest = alike.into_values().rev().max_by_key(Vec::len);
+            // The largest, of several the one whose first name comes first; those that differ stay beside it.
+            let largest = alike.into_values().max_by_key(|m| (m.len(), Reverse(m[0])));
             if let Some(members) = largest.filter(|m| m.len() >= FEWEST) {
                 fleets.add(stem, &members, elements);
             }
@@ -159,34 +162,42 @@ fn stem(space: &str) -> &str {
     space.trim_end_matches(|c: char| c.is_ascii_digit())
 }
 
-/// Every namespace with a number, and a line for each thing in it and each edge of such a thing.
-fn described(elements: &Elements) -> Vec<(&str, String)> {
-    let own = |name: &str, space: &str| match name.strip_prefix(space) {
-        Some(rest) if within(name, space) => format!("~{rest}"),
-        _ => name.to_owned(),
-    };
-    let mut lines = Vec::new();
+/// Every namespace with a number, and a hash for each thing in it and each edge of such a thing.
+fn described(elements: &Elements) -> Vec<(&str, u64)> {
+    let mut all = Vec::new();
     for (name, element) in names(elements) {
         let kind = matches!(element, Element::Node(_));
         if let Some(space) = space_of(name) {
-            lines.push((space, format!("{kind} {}", own(name, space))));
+            all.push((space, hash(&(kind, own(name, space)))));
         }
     }
-    let publishes = elements.publishes.iter().map(|e| (e, ">"));
-    let subscribes = elements.subscribes.iter().map(|e| (e, "<"));
+    let publishes = elements.publishes.iter().map(|e| (e, '>'));
+    let subscribes = elements.subscribes.iter().map(|e| (e, '<'));
     for (edge, sign) in publishes.chain(subscribes) {
         let Some((node, topic)) = ends(elements, edge) else {
             continue;
         };
-        let spaces: BTreeSet<&str> = [node, topic].into_iter().filter_map(space_of).collect();
-        for space in spaces {
-            lines.push((
-                space,
-                format!("{}{sign}{}", own(node, space), own(topic, space)),
-            ));
+        let spaces = [space_of(node), space_of(topic)];
+        let second = spaces[1].filter(|space| spaces[0] != Some(space));
+        for space in [spaces[0], second].into_iter().flatten() {
+            all.push((space, hash(&(own(node, space), sign, own(topic, space)))));
         }
     }
-    lines
+    all
+}
+
+/// A name without that of the namespace around it, and whether there is one.
+fn own<'a>(name: &'a str, space: &str) -> (bool, &'a str) {
+    match name.strip_prefix(space) {
+        Some(rest) if within(name, space) => (true, rest),
+        _ => (false, name),
+    }
+}
+
+fn hash(what: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    what.hash(&mut hasher);
+    hasher.finish()
 }
 
 fn ends<'a>(elements: &'a Elements, edge: &Edge) -> Option<(&'a str, &'a str)> {

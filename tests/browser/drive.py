@@ -1,7 +1,7 @@
-"""Drives a page in headless Chromium: clicks, types, slides, and reads what it says and what the console says.
+"""Drives a page in headless Chromium and Firefox: clicks, types, slides, and reads what it says and what the console says.
 
-usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg
-The page and the animation are of the evolution, whose every window is compared with them.
+usage: drive.py PAGE.html EVOLUTION.json HOSTILE.html ANIMATION.svg FOLDED.html BOARD.html REPORT.md
+All but the hostile page are of the evolution, whose every window is compared with the page.
 """
 
 import base64
@@ -14,6 +14,10 @@ import tempfile
 import time
 import zlib
 
+import axe
+import firefox
+import folded
+import touch
 import webdriver
 from webdriver import Browser
 
@@ -101,94 +105,93 @@ def window(b):
     return int(b.js("return document.getElementById('seek').value"))
 
 
-def drive(url, evolution, data):
+def drive(b, url, evolution, data):
     windows = evolution["windows"]
     told = [len(own) for own in headlines(evolution)]
     last = len(windows) - 1
-    with Browser() as b:
-        b.open(url)
-        assert window(b) == data["still"] == told.index(max(told)), (window(b), data["still"], told)
-        b.keys(HOME, RIGHT)
-        assert window(b) == 1
-        b.keys((SHIFT, RIGHT))
-        assert window(b) == 11
-        b.keys(",", END)
-        assert window(b) == last
-        b.keys(HOME, "5")
-        assert window(b) == int(last / 2 + 0.5), window(b)
-        b.keys((CTRL, RIGHT))
-        assert window(b) == int(last / 2 + 0.5)
-        b.keys(HOME, "]")
-        first_change = next(w for w in range(1, len(windows)) if told[w])
-        assert window(b) == first_change, (window(b), first_change)
-        value = b.js("return document.getElementById('seek').ariaValueText")
-        assert f"window {first_change + 1} of {len(windows)}" in value, value
-        assert b.js("return document.getElementById('live').textContent")
-        b.keys(HOME)
-        seen = [0] if told[0] else []
-        while len(seen) < 2 or seen[-1] != seen[-2]:
-            b.keys("n")
-            seen.append(window(b))
-        assert seen[:-1] == [w for w, n in enumerate(told) if n], (seen, told)
-        b.keys("p")
-        assert window(b) == seen[-3], (window(b), seen)
-        print("  keys move through the mission, n and p from change to change")
+    b.open(url)
+    assert window(b) == data["still"] == told.index(max(told)), (window(b), data["still"], told)
+    b.keys(HOME, RIGHT)
+    assert window(b) == 1
+    b.keys((SHIFT, RIGHT))
+    assert window(b) == 11
+    b.keys(",", END)
+    assert window(b) == last
+    b.keys(HOME, "5")
+    assert window(b) == int(last / 2 + 0.5), window(b)
+    b.keys((CTRL, RIGHT))
+    assert window(b) == int(last / 2 + 0.5)
+    b.keys(HOME, "]")
+    first_change = next(w for w in range(1, len(windows)) if told[w])
+    assert window(b) == first_change, (window(b), first_change)
+    value = b.js("return document.getElementById('seek').ariaValueText")
+    assert f"window {first_change + 1} of {len(windows)}" in value, value
+    assert b.js("return document.getElementById('live').textContent")
+    b.keys(HOME)
+    seen = [0] if told[0] else []
+    while len(seen) < 2 or seen[-1] != seen[-2]:
+        b.keys("n")
+        seen.append(window(b))
+    assert seen[:-1] == [w for w, n in enumerate(told) if n], (seen, told)
+    b.keys("p")
+    assert window(b) == seen[-3], (window(b), seen)
+    print("  keys move through the mission, n and p from change to change")
 
-        b.js("const s = document.getElementById('seek'); s.value = 7; s.dispatchEvent(new Event('input'))")
-        assert window(b) == 7
-        live = b.js("return document.getElementById('live').textContent")
-        b.click("#play")
-        time.sleep(1.8)
-        assert window(b) > 7
-        assert b.js("return document.getElementById('live').textContent") == live, "it talks while playing"
-        b.click("#play")
-        assert b.js("return location.hash").startswith("#t=")
-        print("  the slider slides, play plays and keeps silent")
+    b.js("const s = document.getElementById('seek'); s.value = 7; s.dispatchEvent(new Event('input'))")
+    assert window(b) == 7
+    live = b.js("return document.getElementById('live').textContent")
+    b.click("#play")
+    time.sleep(1.8)
+    assert window(b) > 7
+    assert b.js("return document.getElementById('live').textContent") == live, "it talks while playing"
+    b.click("#play")
+    assert b.js("return location.hash").startswith("#t=")
+    print("  the slider slides, play plays and keeps silent")
 
-        topic = windows[0]["topics"][0]["name"]
-        b.keys("/")
-        b.type("#q", topic.upper())
-        assert window(b) and b.js("return document.activeElement.id") == "q"
-        assert b.js("return document.querySelectorAll('#hits button').length") > 0
-        b.keys(ENTER)
-        assert topic in b.js("return document.getElementById('name').textContent")
-        assert b.js("return document.querySelectorAll('#graph .near').length") > 1
-        time.sleep(0.2)
-        assert f"sel=topic:{topic}" in b.js("return location.hash"), b.js("return location.hash")
-        assert b.js("return document.getElementById('life').children.length") > 1
-        b.keys(ESC, ESC)
-        assert b.js("return document.getElementById('card').hidden && document.getElementById('hits').children.length == 0")
-        node = windows[0]["nodes"][0]["name"]
-        b.js("document.querySelector('.node[data-name=\"%s\"] text').dispatchEvent(new MouseEvent('click', {bubbles: true}))" % node)
-        assert b.js("return document.getElementById('name').textContent") == node
-        b.keys("?")
-        assert b.js("return document.getElementById('help').open")
-        b.keys(ESC)
-        print("  search, selection and help")
+    topic = windows[0]["topics"][0]["name"]
+    b.keys("/")
+    b.type("#q", topic.upper())
+    assert window(b) and b.js("return document.activeElement.id") == "q"
+    assert b.js("return document.querySelectorAll('#hits button').length") > 0
+    b.keys(ENTER)
+    assert topic in b.js("return document.getElementById('name').textContent")
+    assert b.js("return document.querySelectorAll('#graph .near').length") > 1
+    time.sleep(0.2)
+    assert f"sel=topic:{topic}" in b.js("return location.hash"), b.js("return location.hash")
+    assert b.js("return document.getElementById('life').children.length") > 1
+    b.keys(ESC, ESC)
+    assert b.js("return document.getElementById('card').hidden && document.getElementById('hits').children.length == 0")
+    node = windows[0]["nodes"][0]["name"]
+    b.js("document.querySelector('.node[data-name=\"%s\"] text').dispatchEvent(new MouseEvent('click', {bubbles: true}))" % node)
+    assert b.js("return document.getElementById('name').textContent") == node
+    b.keys("?")
+    assert b.js("return document.getElementById('help').open")
+    b.keys(ESC)
+    print("  search, selection and help")
 
-        start = b.js("return document.getElementById('graph').getAttribute('viewBox')")
-        b.keys("+")
-        time.sleep(0.4)
-        assert b.js("return document.getElementById('graph').getAttribute('viewBox')") != start
-        b.keys("f")
+    start = b.js("return document.getElementById('graph').getAttribute('viewBox')")
+    b.keys("+")
+    time.sleep(0.4)
+    assert b.js("return document.getElementById('graph').getAttribute('viewBox')") != start
+    b.keys("f")
 
-        seconds = (windows[30]["start_ns"] - windows[0]["start_ns"]) / 1e9
-        b.open("about:blank")
-        b.open(f"{url}#t={seconds:g}&sel={node}")
-        assert window(b) == 30 and b.js("return document.getElementById('name').textContent") == node
-        b.open("about:blank")
-        b.open(f"{url}#t=0&sel=topic:{topic}")
-        assert b.js("return document.getElementById('state').textContent").startswith("topic")
-        b.js("location.hash = '#t=0&q=scan'")
-        time.sleep(0.2)
-        assert window(b) == 0 and b.js("return document.getElementById('q').value") == "scan"
-        print("  links lead where they say")
+    seconds = (windows[30]["start_ns"] - windows[0]["start_ns"]) / 1e9
+    b.open("about:blank")
+    b.open(f"{url}#t={seconds:g}&sel={node}")
+    assert window(b) == 30 and b.js("return document.getElementById('name').textContent") == node
+    b.open("about:blank")
+    b.open(f"{url}#t=0&sel=topic:{topic}")
+    assert b.js("return document.getElementById('state').textContent").startswith("topic")
+    b.js("location.hash = '#t=0&q=scan'")
+    time.sleep(0.2)
+    assert window(b) == 0 and b.js("return document.getElementById('q').value") == "scan"
+    print("  links lead where they say")
 
-        compare_drawing(b, windows)
-        compare_telling(b, evolution)
-        compare_table(b, evolution, data)
-        compare_windows(b, evolution, data)
-        check_console(b)
+    compare_drawing(b, windows)
+    compare_telling(b, evolution)
+    compare_table(b, evolution, data)
+    compare_windows(b, evolution, data)
+    check_console(b)
 
 
 def compare_drawing(b, windows):
@@ -333,19 +336,35 @@ def animation(svg):
     print("  the animation runs in an <img>, and stands still where asked to")
 
 
-def main(page, evolution, hostile_page, svg):
-    reason = webdriver.missing()
+def is_there(tool):
+    """Whether a tool is installed; says so if not."""
+    reason = tool.missing()
     if reason:
         print(f"skipped: {reason}")
+    return not reason
+
+
+def main(page, evolution, hostile_page, svg, folded_page, board, report):
+    if not is_there(webdriver):
         return
     path = pathlib.Path(page).resolve()
     text = path.read_text()
     evolution = json.loads(pathlib.Path(evolution).read_text())
     data = compare_data(text, evolution)
-    drive(path.as_uri(), evolution, data)
-    hostile(pathlib.Path(hostile_page).resolve().as_uri())
-    elsewhere(path.as_uri(), text)
+    url = lambda name: pathlib.Path(name).resolve().as_uri()
+    with Browser() as b:
+        drive(b, url(page), evolution, data)
+    hostile(url(hostile_page))
+    elsewhere(url(page), text)
     animation(svg)
+    folded.check(url(folded_page), data_of(pathlib.Path(folded_page).read_text()))
+    touch.check(url(page))
+    if is_there(axe):
+        axe.check(url(page), url(board), report)
+    if is_there(firefox):
+        with firefox.Firefox() as b:
+            drive(b, url(page), evolution, data)
+        print("  all of the first in Firefox")
     print("all well")
 
 

@@ -28,20 +28,20 @@ pub(crate) struct CourseRow {
 
 impl Course {
     /// The course in at most `most` rows: of nodes, else of groups, of which those that change least are left out; of
-    /// topics where publishers are unknown.
-    pub(crate) fn new(source: &FigureSource<'_>, most: usize) -> Self {
-        let by_topics = !source.knows_publishers();
-        let mut lives = LivesFigure::new(source, by_topics);
+    /// topics where publishers are unknown. From the lives of [`of_all`].
+    pub(crate) fn new(lives: &LivesFigure<'_>, most: usize) -> Self {
+        let source = lives.source;
         // By nodes, for a group has another name.
         let node = |at: usize| lives.tracks.get(at)?.nodes.first().copied();
         let handed = lives.handovers.iter();
         let handed: Vec<(Stamp, NodeId, NodeId)> = handed
             .filter_map(|h| Some((h.at, node(h.from)?, node(h.to)?)))
             .collect();
-        if rows(&lives).len() > most && !by_topics {
-            lives = LivesFigure::of(source, groups::tracks(source, &lives.tracks));
-        }
-        let mut chosen = rows(&lives);
+        let is_grouped = rows(lives).len() > most && source.knows_publishers();
+        let grouped =
+            is_grouped.then(|| LivesFigure::of(source, groups::tracks(source, &lives.tracks)));
+        let lives = grouped.as_ref().unwrap_or(lives);
+        let mut chosen = rows(lives);
         if chosen.len() > most {
             let changes = |row: &CourseRow| row.lives.iter().filter(|l| l.begins || l.ends).count();
             let mut order: Vec<usize> = (0..chosen.len()).collect();
@@ -63,6 +63,11 @@ impl Course {
             rows: chosen.into_iter().map(|(_, row)| row).collect(),
         }
     }
+}
+
+/// The lives that both the course and the life lines tell: of nodes; of topics where publishers are unknown.
+pub(crate) fn of_all<'a>(source: &'a FigureSource<'a>) -> LivesFigure<'a> {
+    LivesFigure::new(source, !source.knows_publishers())
 }
 
 /// The rows of some lives, with the tracks they stand for.
@@ -105,9 +110,8 @@ pub(crate) struct LifeLine {
 }
 
 impl LifeLines {
-    /// The rows of nodes; of topics where publishers are unknown.
-    pub(crate) fn new(source: &FigureSource<'_>) -> Self {
-        let lives = LivesFigure::new(source, !source.knows_publishers());
+    /// The rows of nodes; of topics where publishers are unknown. From the lives of [`of_all`].
+    pub(crate) fn new(lives: LivesFigure<'_>) -> Self {
         let handed = lives.handovers.clone();
         let lives = lives.opened();
         let place = |track| lives.rows.iter().position(|row| row.holds(track));

@@ -28,25 +28,23 @@ pub(crate) fn levels(values: &[f64], price: f64, least: usize) -> Vec<f64> {
 /// The level of every cell on the cheapest course: distance to the level, and `price` for each step (Viterbi).
 fn cheapest(octaves: &[f64], all: &[f64], price: f64) -> Vec<usize> {
     let mut costs = vec![0.0_f64; all.len()];
-    let mut back: Vec<Vec<usize>> = Vec::with_capacity(octaves.len());
+    // From where each level of each cell was reached, cell by cell.
+    let mut back: Vec<usize> = Vec::with_capacity(octaves.len() * all.len());
     for octave in octaves {
         let best = (0..all.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]));
         let best = best.unwrap_or(0);
         let jump = costs[best] + if back.is_empty() { 0.0 } else { price };
-        let from: Vec<usize> = (0..all.len())
-            .map(|k| if costs[k] <= jump { k } else { best })
-            .collect();
-        costs = (0..all.len())
-            .map(|k| costs[k].min(jump) + (octave - all[k]).abs())
-            .collect();
-        back.push(from);
+        for (k, cost) in costs.iter_mut().enumerate() {
+            back.push(if *cost <= jump { k } else { best });
+            *cost = cost.min(jump) + (octave - all[k]).abs();
+        }
     }
     let last = (0..all.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]));
     let mut level = last.unwrap_or(0);
     let mut course = vec![0; octaves.len()];
     for at in (0..octaves.len()).rev() {
         course[at] = level;
-        level = back[at].get(level).copied().unwrap_or(level);
+        level = back[at * all.len() + level];
     }
     course
 }

@@ -21,6 +21,8 @@ pub(crate) struct FigureSource<'a> {
     topics: Vec<bool>,
     /// Per node, what it publishes on shown topics.
     published: Vec<Vec<EdgeId>>,
+    /// Per publication, whether it is ever latched.
+    latched: Vec<bool>,
     /// The phases; none if there is only one.
     pub(crate) phases: &'a [Phase],
     /// Whether their names are the user's.
@@ -52,12 +54,20 @@ impl<'a> FigureSource<'a> {
                 published[edge.node as usize].push(id);
             }
         }
+        let mut latched = vec![false; mission.elements.publishes.len()];
+        let cells = mission.activity.cells.iter();
+        for edge in cells.flat_map(|cell| &cell.graph.publishes) {
+            if let Some(latched) = latched.get_mut(edge.id as usize) {
+                *latched |= edge.state == State::Latched;
+            }
+        }
         let phases = &mission.ledger.phases[..];
         Self {
             mission,
             roles,
             topics,
             published,
+            latched,
             phases: if phases.len() > 1 { phases } else { &[] },
             is_named,
         }
@@ -118,18 +128,17 @@ impl<'a> FigureSource<'a> {
     /// busy: it has no such time.
     pub(crate) fn sending(&self, edge: EdgeId) -> Vec<Span> {
         let activity = &self.mission.activity;
-        let states = activity.cells.iter().map(|cell| {
-            let found = cell.graph.publishes.binary_search_by_key(&edge, |e| e.id);
-            found.ok().map(|at| cell.graph.publishes[at].state)
-        });
-        let states: Vec<Option<State>> = states.collect();
-        if states.contains(&Some(State::Latched)) {
+        if self.latched.get(edge as usize) == Some(&true) {
             return Vec::new();
         }
-        match activity.sending.publishes.get(edge as usize) {
-            Some(exact) if !activity.sending.publishes.is_empty() => exact.clone(),
-            _ => self.runs(states.iter().map(|s| *s == Some(State::Active))),
+        if let Some(exact) = activity.sending.publishes.get(edge as usize) {
+            return exact.clone();
         }
+        let is_active = activity.cells.iter().map(|cell| {
+            let found = cell.graph.publishes.binary_search_by_key(&edge, |e| e.id);
+            found.is_ok_and(|at| cell.graph.publishes[at].state == State::Active)
+        });
+        self.runs(is_active)
     }
 
     /// When a topic carried messages.

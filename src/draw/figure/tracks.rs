@@ -6,7 +6,7 @@ use super::levels::levels;
 use super::source::{FigureSource, merged};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
-use crate::graph::{EdgeId, NodeId, TopicId};
+use crate::graph::{NodeId, TopicId};
 
 /// A silence below this, in nanoseconds or one in so many parts of the mission, does not interrupt a bar.
 const SILENCE: (i64, i64) = (4_000_000_000, 83);
@@ -80,18 +80,22 @@ pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Track> {
 fn node(source: &FigureSource<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
     let edges = source.publications(nodes);
     let whole = source.span();
-    let each: Vec<(EdgeId, Vec<Span>)> = edges.iter().map(|e| (*e, source.sending(*e))).collect();
-    let spans = each.iter().flat_map(|(_, s)| s.iter().copied()).collect();
-    let sends = merged(spans, silence(whole));
+    let mut spans = Vec::new();
     let mut sent = vec![0.0; source.mission.activity.cells.len()];
-    for (edge, _) in each.iter().filter(|(_, spans)| !spans.is_empty()) {
-        for (sum, count) in sent.iter_mut().zip(source.sent(*edge)) {
+    let mut rates = Vec::new();
+    for edge in edges {
+        let sending = source.sending(edge);
+        if sending.is_empty() {
+            continue;
+        }
+        let own = source.sent(edge);
+        for (sum, count) in sent.iter_mut().zip(&own) {
             *sum += count;
         }
+        rates.extend(rate(&own, &sending));
+        spans.extend(sending);
     }
-    let hz = each
-        .iter()
-        .filter_map(|(edge, spans)| rate(&source.sent(*edge), spans));
+    let sends = merged(spans, silence(whole));
     let lives = lives(source, nodes, &sends);
     let mut bars = bars(source, &sends, &sent);
     if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
@@ -107,7 +111,7 @@ fn node(source: &FigureSource<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
         topic: None,
         lives,
         bars,
-        hz: hz.reduce(|a, b| a + b),
+        hz: rates.into_iter().reduce(|a, b| a + b),
     }
 }
 

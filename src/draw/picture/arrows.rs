@@ -34,6 +34,8 @@ pub(crate) struct ArrowPath {
     label: Option<Point>,
     /// The middle of its badge.
     pub(crate) badge: Point,
+    /// Where its badge may stand without covering its label; the first is the best.
+    pub(super) spots: Vec<Point>,
     /// Its length in pixels, about.
     pub(crate) length: f64,
 }
@@ -55,27 +57,31 @@ impl ArrowPath {
         let start = fit.point(route.start);
         let points = polyline(start, &curves, PIECES);
         let length = points.windows(2).map(|w| distance(w[0], w[1])).sum();
-        let middle = at_part(&points, length, 0.5);
         let label = room.and(route.label.map(|p| fit.point(p)));
-        let badge = match (label, room) {
-            (Some(label), Some(room)) => {
-                let area = Rect::around(label, Size::new(room.w * fit.scale, room.h * fit.scale));
-                let free = [0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78]
-                    .map(|part| at_part(&points, length, part));
-                let clear = |p: &&Point| !area.overlaps(&Rect::around(**p, Size::new(12.0, 12.0)));
-                *free.iter().find(clear).unwrap_or(&middle)
-            }
-            _ => middle,
-        };
+        let area = label.zip(room).map(|(label, room)| {
+            Rect::around(label, Size::new(room.w * fit.scale, room.h * fit.scale))
+        });
+        let badge = Size::new(12.0, 12.0);
+        let covers = |p: &Point| area.is_some_and(|area| area.overlaps(&Rect::around(*p, badge)));
+        let mut spots = [0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78]
+            .map(|part| at_part(&points, length, part))
+            .to_vec();
+        spots.retain(|p| !covers(p));
         Self {
             id,
             ends,
             start,
             curves,
             label,
-            badge,
+            badge: *spots.first().unwrap_or(&at_part(&points, length, 0.5)),
+            spots,
             length,
         }
+    }
+
+    /// Points along it, close enough to be joined by straight lines.
+    pub(super) fn points(&self) -> Vec<Point> {
+        polyline(self.start, &self.curves, PIECES)
     }
 }
 

@@ -29,6 +29,8 @@ pub(crate) struct ItemBox {
     pub(crate) tells: Tells,
     /// Its box on the page.
     pub(crate) place: Rect,
+    /// The middle of its badge.
+    pub(crate) badge: Point,
 }
 
 impl Boxes<'_> {
@@ -185,13 +187,7 @@ impl Boxes<'_> {
             badge::pill(&mut group, self.fonts, paint, &text, below, size);
         }
         if let Some(mark) = shown.mark {
-            badge::badge(
-                &mut group,
-                style,
-                mark,
-                corner(item.kind, place, self.fit.scale),
-                self.fit.pen,
-            );
+            badge::badge(&mut group, style, mark, card.badge, self.fit.pen);
         }
         group
     }
@@ -329,15 +325,14 @@ impl Boxes<'_> {
     }
 }
 
-/// Where the badge of a box stands: at its top right, on its outline.
-pub(crate) fn corner(kind: ItemKind, place: Rect, scale: f64) -> Point {
-    match kind {
-        ItemKind::Node => {
-            let middle = place.centre();
-            Point::new(middle.x + place.w * 0.36, middle.y - place.h * 0.36)
-        }
-        _ => Point::new(place.right() - 2.0 * scale, place.y + scale),
-    }
+/// Where the badge of a box may stand, on its outline: at its top right if it can.
+pub(super) fn corners(kind: ItemKind, place: Rect, scale: f64) -> [Point; 4] {
+    let middle = place.centre();
+    let (x, y) = match kind {
+        ItemKind::Node => (place.w * 0.36, place.h * 0.36),
+        _ => (place.w / 2.0 - 2.0 * scale, place.h / 2.0 - scale),
+    };
+    [(x, -y), (-x, -y), (x, y), (-x, y)].map(|(x, y)| Point::new(middle.x + x, middle.y + y))
 }
 
 /// The attributes of an element, and the places in the ledger of what is told of it in this window.

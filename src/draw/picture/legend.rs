@@ -49,12 +49,16 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         (
             mark(&[Mark::Added]),
             LegendSign::Change(Mark::Added),
-            "added",
+            if view.compares { "only in B" } else { "added" },
         ),
         (
             mark(&[Mark::Removed]),
             LegendSign::Change(Mark::Removed),
-            "removed",
+            if view.compares {
+                "only in A"
+            } else {
+                "removed"
+            },
         ),
         (
             mark(&[Mark::Faster, Mark::Slower]),

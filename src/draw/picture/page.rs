@@ -34,7 +34,12 @@ pub(crate) struct GraphFit {
 
 impl PageFrame {
     /// The page that is wished for, with `rows` rows of legend.
-    pub(crate) fn new(style: &Style, options: &PageOptions, rows: usize) -> Self {
+    pub(crate) fn new(
+        style: &Style,
+        options: &PageOptions,
+        rows: usize,
+        has_timeline: bool,
+    ) -> Self {
         let size = options.size;
         let unit = unit(options);
         let strip = |y: f64, height: f64| Rect::new(0.0, y, size.w, height);
@@ -45,7 +50,7 @@ impl PageFrame {
             if options.has_legend {
                 legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
             }
-            if !options.compares {
+            if has_timeline {
                 timeline = (style.timeline.height + style.timeline.size * 1.3 + 40.0) * unit;
             }
         }

@@ -21,6 +21,8 @@ pub(crate) struct Title<'a> {
     end: f64,
     /// How wide the widest phase is.
     phase: f64,
+    /// What is said where nothing happened.
+    none: &'static str,
 }
 
 impl<'a> Title<'a> {
@@ -55,8 +57,13 @@ impl<'a> Title<'a> {
             chips[kind] = (right, widest);
             right -= if widest > 0.0 { 8.0 * unit } else { 0.0 };
         }
-        let none = fonts.width(NONE, style.chip.size * unit, Weight::SemiBold) + 22.0 * unit;
-        let end = right.min(chips[2].0 + chips[2].1 - none) - 10.0 * unit;
+        let none = if view.compares {
+            "no difference"
+        } else {
+            "no reconfiguration"
+        };
+        let wide = fonts.width(none, style.chip.size * unit, Weight::SemiBold) + 22.0 * unit;
+        let end = right.min(chips[2].0 + chips[2].1 - wide) - 10.0 * unit;
         let widest = options
             .phases
             .iter()
@@ -70,6 +77,7 @@ impl<'a> Title<'a> {
             chips,
             end,
             phase,
+            none,
         }
     }
 
@@ -114,11 +122,8 @@ impl<'a> Title<'a> {
         if frame.messages == 0 {
             parts.insert(0, "no message".to_owned());
         }
-        if let Some(first) = view.frames.first().filter(|_| view.frames.len() > 1) {
-            parts.push(format!(
-                "{} per window",
-                words::period(whole(first.span.nanos()))
-            ));
+        if let Some(length) = view.window_nanos() {
+            parts.push(format!("{} per window", words::period(whole(length))));
         }
         if frame.partial {
             parts.push("partial".to_owned());
@@ -140,17 +145,21 @@ impl<'a> Title<'a> {
         group
     }
 
-    /// What the marks mean where two missions are compared, in the place of the window's time.
-    pub(crate) fn compared(&self) -> Group {
+    /// What is seen where two missions are compared, in the place of the window's time; how much differs, but for the
+    /// first of several windows, which is A alone.
+    pub(crate) fn compared(&self, frame: &Frame, windows: usize) -> Vec<Group> {
+        let is_alone = windows > 1 && frame.index == 0;
         let mut group = Group::named("window");
+        let side = SIDES[usize::from(!is_alone)];
         group.text(self.words(
-            "removed: only in the first · added: only in the second".to_owned(),
+            side.to_owned(),
             0.8,
             self.style.title.quiet_size * self.page.unit,
             Weight::Regular,
             self.style.title.quiet,
         ));
-        group
+        let chips = (!is_alone).then(|| self.chips(frame));
+        std::iter::once(group).chain(chips).collect()
     }
 
     fn left(&self) -> f64 {
@@ -216,7 +225,12 @@ impl<'a> Title<'a> {
         }
         if frame.counts.total() == 0 {
             let (x, width) = self.chips[2];
-            self.chip(&mut group, NONE, x + width, (chip.none, chip.none_text));
+            self.chip(
+                &mut group,
+                self.none,
+                x + width,
+                (chip.none, chip.none_text),
+            );
         }
         group
     }
@@ -313,7 +327,8 @@ impl<'a> Title<'a> {
     }
 }
 
-const NONE: &str = "no reconfiguration";
+/// What the windows of a comparison show.
+pub(crate) const SIDES: [&str; 2] = ["A alone", "B against A"];
 
 /// Without fractions of a second where the time is a second or more, as on a clock.
 pub(crate) fn whole(nanos: i64) -> i64 {

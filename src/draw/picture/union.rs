@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::arrows::{Arrows, is_badged};
-use super::boxes::{Boxes, corner};
+use super::arrows::{ArrowPath, Arrows, is_badged};
+use super::boxes::{Boxes, ItemBox};
 use super::measured::Tells;
 use super::page::GraphFit;
-use super::{Picture, badge, cards, chips, encoded, tracks};
+use super::{Picture, badge, chips, encoded, places};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Form, Group};
 use crate::draw::style::Style;
@@ -93,18 +93,19 @@ impl Picture<'_> {
             fit,
         };
         let spaces = measured.graph.spaces.iter().zip(&layout.clusters);
+        let (cards, tracks) = places(measured, layout, fit);
         Union {
             size: layout.size,
             spaces: spaces
                 .map(|(space, place)| boxes.space(space, *place, &encoded(&space.name), false))
                 .collect(),
             order: self.order.clone(),
-            arrows: self.union_arrows(fit),
-            items: self.union_items(&boxes, fit),
+            arrows: self.union_arrows(tracks, fit),
+            items: self.union_items(cards, &boxes),
         }
     }
 
-    fn union_items(&self, boxes: &Boxes<'_>, fit: GraphFit) -> Vec<UnionElement> {
+    fn union_items(&self, cards: Vec<ItemBox>, boxes: &Boxes<'_>) -> Vec<UnionElement> {
         let view = self.measured.view;
         let mut marks = vec![BTreeSet::new(); view.items.len()];
         let mut latched = BTreeSet::new();
@@ -116,7 +117,6 @@ impl Picture<'_> {
                 marks.insert(mark);
             }
         }
-        let cards = cards(&self.measured, &self.layout, fit);
         let items = view.items.iter().zip(cards).zip(marks).enumerate();
         items
             .map(|(at, ((item, card), marks))| {
@@ -139,14 +139,14 @@ impl Picture<'_> {
                     rect: card.place,
                     name: label.unshown.clone(),
                     latch: is_latched.then(|| boxes.latch_of(item.kind, card.place)),
-                    badge: corner(item.kind, card.place, 1.0),
+                    badge: card.badge,
                     marks,
                 }
             })
             .collect()
     }
 
-    fn union_arrows(&self, fit: GraphFit) -> Vec<UnionElement> {
+    fn union_arrows(&self, tracks: Vec<ArrowPath>, fit: GraphFit) -> Vec<UnionElement> {
         let (view, plan) = (self.measured.view, &self.measured.graph.plan);
         let arrows = Arrows {
             style: self.measured.style,
@@ -166,7 +166,6 @@ impl Picture<'_> {
                 }
             }
         }
-        let tracks = tracks(&self.measured, &self.layout, fit);
         let parts = view.arrows.iter().zip(tracks).zip(&plan.links).zip(marks);
         parts
             .map(|(((arrow, track), link), marks)| {

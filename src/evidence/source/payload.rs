@@ -30,8 +30,11 @@ const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 /// Bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
 pub(crate) const HEAD: usize = 16 << 10;
 
-/// Keeps the hash of a payload of `size` bytes that begins so.
+/// Keeps the hash of a payload of `size` bytes that begins so. An empty one says nothing.
 pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
+    if beginning.is_empty() {
+        return;
+    }
     let mut hasher = DefaultHasher::new();
     hasher.write_u32(size);
     hasher.write(beginning);
@@ -99,10 +102,17 @@ fn publisher(known: &Conclusions<'_>, (topic, publisher): PayloadFlow) -> Option
 
 /// Goes through all messages in order of time.
 fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
+    let mut topics: BTreeMap<String, BTreeSet<Name>> = BTreeMap::new();
+    for at in known.facts.payloads.keys() {
+        let topic = known.streams[*at].topic;
+        topics.entry(known.kind(topic)).or_default().insert(topic);
+    }
     let kept = known.facts.payloads.clone();
     let kept = kept.into_iter().filter(|(at, _)| {
-        let topic = &known.streams[*at].connection.topic;
-        !LOGS.contains(&topic.as_str())
+        let stream = &known.streams[*at];
+        // What is the only topic of its type is no copy of another.
+        let alike = topics.get(&known.kind(stream.topic));
+        !LOGS.contains(&stream.connection.topic.as_str()) && alike.is_some_and(|all| all.len() > 1)
     });
     let (places, series): (Vec<usize>, Vec<_>) = kept.unzip();
     let flow_of = |at: &usize| (known.streams[*at].topic, known.streams[*at].publisher);

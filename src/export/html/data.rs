@@ -15,6 +15,7 @@ use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::figure::course::{LifeLine, LifeLines};
 use crate::draw::picture::chips;
+use crate::draw::picture::title::SIDES;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
 use crate::mission::Mission;
@@ -53,6 +54,9 @@ struct PageData<'a> {
     hands: Vec<(f64, usize, usize)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
+    /// What each window shows, where two missions are compared; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sides: Option<[&'static str; 2]>,
     /// The window to begin with.
     still: usize,
     /// From which relative change of a rate on it is told.
@@ -133,6 +137,7 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
             style.node.size,
             style.cluster.size,
         ],
+        sides: whole.view.compares.then_some(SIDES),
         still,
         change: page.sequence.unfolded.map_or(0.25, |u| u.rate_change),
     };

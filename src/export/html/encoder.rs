@@ -22,27 +22,27 @@ pub(crate) fn start<'a>(
 
 /// The page of everything one by one, and of the picture where that folds something.
 fn page(sequence: &Sequence<'_>, style: &Style) -> String {
-    let picture = sequence.picture.graph();
     let overview = sequence.picture.overview();
-    let opened = sequence.unfolded;
-    let whole = opened.and_then(|o| o.picture?.graph());
-    let is_folded = whole.is_some() && sequence.view.is_folded();
-    let (view, whole) = match (opened, whole) {
-        (Some(opened), Some(whole)) => (opened.view, Some(whole)),
-        _ => (sequence.view, picture.clone()),
+    let opened = sequence
+        .unfolded
+        .and_then(|opened| Some((opened.view, opened.picture?.graph()?)));
+    let is_folded = opened.is_some() && sequence.view.is_folded();
+    let picture = (is_folded || opened.is_none()).then(|| sequence.picture.graph());
+    let picture = picture.flatten().map(|drawings| (sequence.view, drawings));
+    let (whole, folded) = match opened {
+        Some(_) => (opened, picture),
+        None => (picture, None),
     };
     // Whoever chose a style gets it always; the default one has a dark side.
-    let chosen = whole.as_ref().map_or(style, |w| w.style);
+    let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
     let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
-    let union = |whole: Option<UnionDrawings<'_>>| whole.map_or_else(Union::default, |w| w.union);
-    let title = match (&picture, &overview) {
-        (Some(picture), _) => picture.title,
-        (None, overview) => overview.as_ref().map_or("", |o| &o.title),
-    };
+    let board = overview.as_ref().map_or("", |o| &o.title);
+    let title = whole.as_ref().map_or(board, |(_, drawn)| drawn.title);
+    let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
     let page = HtmlPage {
         sequence,
-        whole: PageGraph::new(view, union(whole.clone())),
-        folded: is_folded.then(|| PageGraph::new(sequence.view, union(picture.clone()))),
+        whole: whole.map_or_else(|| PageGraph::new(sequence.view, Union::default()), graph),
+        folded: folded.map(graph),
         style: chosen,
         dark: dark.as_ref(),
         title,

@@ -3,6 +3,7 @@
 use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::paint::xml::Xml;
+use crate::draw::picture::title::SIDES;
 use crate::view::{Frame, View};
 
 /// More windows with changes than this are counted.
@@ -18,6 +19,9 @@ fn is_told(frame: &Frame) -> bool {
 /// How many windows there are, and how many of them have changes.
 pub(super) fn summary(view: &View) -> String {
     let all = view.frames.len();
+    if view.compares {
+        return "What is not the same:".to_owned();
+    }
     match view.frames.iter().filter(|f| is_told(f)).count() {
         0 => format!("None in {all} windows."),
         n if n > MOST_ROWS => format!("In {n} of {all} windows; the first {MOST_ROWS}:"),
@@ -36,7 +40,12 @@ pub(super) fn rows(view: &View) -> String {
         let secs = millis as f64 / 1e3;
         xml.open("tr").open("th").open("a");
         xml.attribute("href", format_args!("#t={secs}"));
-        xml.text(&words::offset(millis * 1_000_000)).close().close();
+        if view.compares {
+            xml.text(SIDES[frame.index.min(1)]);
+        } else {
+            xml.text(&words::offset(millis * 1_000_000));
+        }
+        xml.close().close();
         let what = frame.words(MOST_PHRASES);
         xml.open("td")
             .text(&visible(&what))

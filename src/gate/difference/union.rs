@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
+use crate::base::words;
 use crate::evidence::{Degree, Evidence};
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
@@ -158,6 +159,7 @@ pub(crate) fn union(
         ledger: Ledger {
             entries: sorted(entries.all(), &elements).0,
             phases: Vec::new(),
+            compares: true,
         },
         elements,
         windows,
@@ -395,9 +397,15 @@ impl UnionLedger<'_> {
         }
         let node = self.nodes.get(difference.name.as_str()).copied();
         let topic = self.topics.get(difference.name.as_str()).copied();
-        let values = || Detail::Values {
-            from: difference.first.as_str().into(),
-            to: difference.second.as_str().into(),
+        let values = || {
+            let of = |value: &str| match (difference.kind, value.parse()) {
+                ("restarts", Ok(n)) => words::count(n, "restart").into(),
+                _ => value.into(),
+            };
+            Detail::Values {
+                from: of(&difference.first),
+                to: of(&difference.second),
+            }
         };
         match (difference.kind, node, topic) {
             ("rate", _, Some(topic)) => {

@@ -61,7 +61,14 @@ impl Judge<'_> {
                 continue;
             }
             // To come in time is to come.
-            if facts.within.is_some() && self.facts.nodes(&name.value).is_empty() {
+            if let Some(within) = &facts.within
+                && self.facts.nodes(&name.value).is_empty()
+            {
+                let span = self.facts.mission.span;
+                if span.start.plus(within.value) > span.end {
+                    self.note(title, name.at, vec![self.too_short(name, within.value)]);
+                    continue;
+                }
                 let is_there = NodeFacts {
                     may_end: true,
                     ..NodeFacts::default()
@@ -72,6 +79,16 @@ impl Judge<'_> {
             }
             self.node_facts(&title, &name.value, facts);
         }
+    }
+
+    /// That the mission ended before a node had to be there.
+    fn too_short(&self, name: &At<Pattern>, within: i64) -> Finding {
+        let (name, at) = (name.value.as_str(), name.at);
+        let long = words::duration(self.facts.mission.span.nanos());
+        let within = words::duration(within);
+        let says =
+            format!("cannot tell whether {name} appears within {within}: the mission lasts {long}");
+        Finding::unknown(FindingKind::NodeLate, name, at, says)
     }
 
     fn topic_rule(&mut self, rule: &Rule, name: &At<Pattern>, facts: &TopicFacts) {
@@ -156,13 +173,14 @@ impl Judge<'_> {
             let may = |e: &&&Entry| {
                 expect.kind != EventKind::HandedOver && e.earliest <= to && from <= e.latest
             };
-            found.push(self.no_answer(
-                rule.at,
-                (when, cause),
-                expect,
-                within,
-                answers.iter().any(|e| may(&e)),
-            ));
+            let doubt = if answers.iter().any(|e| may(&e)) {
+                Some("the times overlap")
+            } else if to > self.facts.mission.span.end {
+                Some("the mission ended before")
+            } else {
+                None
+            };
+            found.push(self.no_answer(rule.at, (when, cause), expect, within, doubt));
         }
         found
     }
@@ -173,15 +191,15 @@ impl Judge<'_> {
         (when, cause): (&Event, &Entry),
         expect: &Event,
         within: i64,
-        is_unsure: bool,
+        doubt: Option<&str>,
     ) -> Finding {
         let name = expect.name.as_str();
         let expected = format!("{} within {}", told(expect), words::duration(within));
         let what = format!("{} {}", when.name, past(when));
         let clock = self.facts.clock(cause.time);
-        if is_unsure {
+        if let Some(doubt) = doubt {
             let says = format!(
-                "cannot tell whether {name} {} in time after {what} at {clock}: the times overlap",
+                "cannot tell whether {name} {} in time after {what} at {clock}: {doubt}",
                 past(expect)
             );
             return Finding::unknown(FindingKind::ReactionMissing, name, at, says);

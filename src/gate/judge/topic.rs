@@ -1,7 +1,6 @@
 //! What is expected of topics: to be there, of which type, from whom, to whom, and of which quality.
 
 use super::{Judge, absence};
-use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::Degree;
 use crate::gate::expectation::{At, Named, TopicFacts, YamlPlace};
@@ -152,7 +151,7 @@ impl Judge<'_> {
         let Some(severity) = self.expectation.policy.publishers.severity() else {
             return found;
         };
-        for (node, _, degree) in known
+        for (node, edge, degree) in known
             .iter()
             .filter(|(.., degree)| *degree <= Degree::Stated)
         {
@@ -165,17 +164,14 @@ impl Judge<'_> {
             let mut finding = Finding::new(FindingKind::PublisherUnexpected, name, by.at, says)
                 .saw(role, &expected);
             finding.severity = severity;
-            let lives = self.facts.lives(&[*node]);
-            if let (Some(first), Some(last)) = (lives.first(), lives.last()) {
-                let span = Span {
-                    start: first.start,
-                    end: last.end,
+            if let Some((span, count)) = self.facts.sent(*node, *edge) {
+                let many = match usize::try_from(count).unwrap_or(usize::MAX) {
+                    0 => String::new(),
+                    n => format!(", {}", words::count(n, "message")),
                 };
-                finding = finding.at(span).detail(format!(
-                    "{}; {}",
-                    self.facts.stretch(span),
-                    degree.word()
-                ));
+                let stretch = self.facts.stretch(span);
+                let detail = format!("{stretch}{many}; {}", degree.word());
+                finding = finding.at(span).detail(detail);
             }
             found.push(finding);
         }

@@ -1,5 +1,6 @@
 //! A summary in Markdown for a pull request or a job: its first line is enough, its table says what and when.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::{Subject, grouped, mermaid};
@@ -27,8 +28,9 @@ pub(super) fn write(subject: &Subject<'_>, verdict: &Verdict) -> String {
     };
     let broken = told(&[Severity::Error, Severity::Warning]);
     let mut out = headline(subject, verdict) + "\n\n";
-    causes(&broken, &mut out);
-    table(&facts, &broken, &mut out);
+    let groups = grouped(&broken);
+    causes(&groups, &mut out);
+    table(&facts, &groups, &mut out);
     links(subject, &mut out);
     if let Some(chart) = mermaid::chart(&facts, &broken) {
         let open = "<details><summary>Graph around the changes</summary>";
@@ -65,47 +67,61 @@ fn headline(subject: &Subject<'_>, verdict: &Verdict) -> String {
     } else {
         "✅"
     };
-    let said = if any(Severity::Error) || any(Severity::Warning) {
-        verdict.broken()
-    } else {
-        let kept = words::count(verdict.facts(Judgement::Kept), "rule");
-        match verdict.count(Severity::Unknown) {
-            0 => format!("{kept} kept"),
-            unknown => format!("{kept} kept, {unknown} unknown"),
-        }
+    let kept = words::count(verdict.facts(Judgement::Kept), "rule");
+    let unknown = match verdict.count(Severity::Unknown) {
+        0 => String::new(),
+        unknown => format!("{unknown} unknown"),
     };
+    let mut said = vec![verdict.broken(), unknown, format!("{kept} kept")];
+    said.retain(|words| !words.is_empty());
     format!(
-        "### {sign} Graph check: {said} · {} · {} in windows of {}",
+        "### {sign} Graph check: {} · {} against {} · {} in windows of {}",
+        said.join(", "),
         code(&subject.name()),
+        code(&subject.file),
         words::duration(mission.span.nanos()),
         words::period(mission.period.nanos())
     )
 }
 
-/// What several findings follow from.
-fn causes(findings: &[&Finding], out: &mut String) {
-    let groups = grouped(findings).into_iter();
-    let several = groups.filter_map(|(cause, group)| Some((cause?, group.len())));
-    let mut is_any = false;
-    for (cause, many) in several.filter(|(_, many)| *many > 1).take(CAUSES) {
-        let many = words::count(many, "finding");
+/// What several findings follow from, the most of them first.
+fn causes(groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
+    let several = groups.iter().filter(|(_, group)| group.len() > 1);
+    let several = several.filter_map(|(cause, group)| Some(((*cause)?, group.len())));
+    let mut several: Vec<(&str, usize)> = several.collect();
+    several.sort_by_key(|(_, many)| std::cmp::Reverse(*many));
+    for (cause, many) in several.iter().take(CAUSES) {
+        let many = words::count(*many, "finding");
         let _ = writeln!(out, "- **{}**: {many}", plain(cause));
-        is_any = true;
     }
-    if is_any {
-        out.push('\n');
+    match several.len() {
+        0 => {}
+        n if n > CAUSES => {
+            let _ = writeln!(
+                out,
+                "- and {} more with several\n",
+                words::count(n - CAUSES, "cause")
+            );
+        }
+        _ => out.push('\n'),
     }
 }
 
-fn table(facts: &Facts<'_>, findings: &[&Finding], out: &mut String) {
-    let mut rows = findings.iter().map(|f| row(facts, f)).collect::<Vec<_>>();
+/// The findings of one cause one after the other.
+fn table(facts: &Facts<'_>, groups: &[(Option<&str>, Vec<&Finding>)], out: &mut String) {
+    let rows = groups.iter().flat_map(|(_, group)| {
+        let is_alone = group.len() == 1;
+        group.iter().map(move |f| row(facts, f, is_alone))
+    });
+    let mut rows: Vec<String> = rows.collect();
+    let all = rows.len();
     let mut room = MOST_ROWS;
     let fitting = rows.iter().take_while(|row| {
         room = room.saturating_sub(row.len());
         room > 0
     });
     rows.truncate(fitting.count());
-    let left_out = findings.len() - rows.len();
+    let left_out = all - rows.len();
     let (shown, rest) = rows.split_at(rows.len().min(SHOWN));
     let head = "| | what | when | seen | expected |\n|---|---|---|---|---|\n";
     if !shown.is_empty() {
@@ -120,7 +136,7 @@ fn table(facts: &Facts<'_>, findings: &[&Finding], out: &mut String) {
     }
 }
 
-fn row(facts: &Facts<'_>, finding: &Finding) -> String {
+fn row(facts: &Facts<'_>, finding: &Finding, is_alone: bool) -> String {
     let sign = if finding.severity == Severity::Error {
         "❌"
     } else {
@@ -130,6 +146,12 @@ fn row(facts: &Facts<'_>, finding: &Finding) -> String {
         Some(span) => facts.stretch(span),
         None if finding.kind == FindingKind::NodeLifecycle => "at the end".to_owned(),
         None => "–".to_owned(),
+    };
+    let since = match &finding.cause {
+        Some(cause) if is_alone && !cause.is_about(&finding.name) => {
+            format!(", since {}", plain(&cause.text))
+        }
+        _ => String::new(),
     };
     let cell = |text: &str| {
         if text.is_empty() {
@@ -143,7 +165,7 @@ fn row(facts: &Facts<'_>, finding: &Finding) -> String {
     let short = word.strip_prefix("node-").or(word.strip_prefix("topic-"));
     let what = short.unwrap_or(word).replace('-', " ");
     format!(
-        "| {sign} | {} {what} | {when} | {} | {} |\n",
+        "| {sign} | {} {what} | {when}{since} | {} | {} |\n",
         code(&finding.name),
         cell(&finding.seen),
         cell(&finding.expected)
@@ -162,7 +184,10 @@ fn value(text: &str) -> String {
 fn links(subject: &Subject<'_>, out: &mut String) {
     let links = subject.links.iter();
     let links: Vec<String> = links
-        .map(|(name, url)| format!("[▶ {}](<{}>)", plain(name), address(url)))
+        .map(|(name, url)| {
+            let sign = if name == "player" { "▶ " } else { "" };
+            format!("[{sign}{}](<{}>)", plain(name), address(url))
+        })
         .collect();
     if !links.is_empty() {
         let _ = writeln!(out, "{}\n", links.join(" · "));
@@ -179,12 +204,18 @@ fn list(findings: &[&Finding], title: &str, out: &mut String) {
         findings.len()
     );
     let start = out.len();
+    let mut hinted = BTreeSet::new();
     for (at, finding) in findings.iter().enumerate() {
         let why = finding
             .why
             .as_ref()
             .map_or_else(String::new, |why| format!(": {}", plain(why)));
-        let line = format!("- {}{why}\n", plain(&finding.says));
+        // What helps with one helps with all of its kind.
+        let mut help = String::new();
+        for fresh in finding.help.iter().filter(|help| hinted.insert(*help)) {
+            let _ = write!(help, ": {}", plain(fresh));
+        }
+        let line = format!("- {}{why}{help}\n", plain(&finding.says));
         if out.len() - start + line.len() > MOST_LISTED {
             let _ = writeln!(out, "- {} more left out", findings.len() - at);
             break;

@@ -30,7 +30,7 @@ enum BoxFate {
 
 /// The chart; `None` where nothing that was found has a place in the graph. Ends in a new line.
 pub(super) fn chart(facts: &Facts<'_>, findings: &[&Finding]) -> Option<String> {
-    let mut marked: BTreeMap<MermaidBox<'_>, (BoxFate, &str)> = BTreeMap::new();
+    let mut marked: BTreeMap<MermaidBox<'_>, (BoxFate, String)> = BTreeMap::new();
     for finding in findings {
         if let Some((item, class)) = class(finding) {
             marked.entry(item).or_insert((class, label(finding)));
@@ -75,20 +75,20 @@ fn class(finding: &Finding) -> Option<(MermaidBox<'_>, BoxFate)> {
     Some(((!is_node, &finding.name), class))
 }
 
-/// What stands behind the name in its box.
-fn label(finding: &Finding) -> &str {
+/// What stands behind the name in its box: what was expected, and what was seen.
+fn label(finding: &Finding) -> String {
     match finding.kind {
         FindingKind::TopicRateLow | FindingKind::TopicRateHigh | FindingKind::NodeLifecycle => {
-            &finding.seen
+            format!("{} → {}", finding.expected, finding.seen)
         }
-        _ => "",
+        _ => String::new(),
     }
 }
 
 /// Edges of what is marked, and those that are missing; the latter first, and dotted.
 fn edges<'a>(
     facts: &Facts<'a>,
-    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, &str)>,
+    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, String)>,
     findings: &[&'a Finding],
 ) -> Vec<(MermaidBox<'a>, MermaidBox<'a>, bool)> {
     let mut all = Vec::new();
@@ -143,7 +143,7 @@ fn edges<'a>(
 
 fn written(
     items: &BTreeSet<MermaidBox<'_>>,
-    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, &str)>,
+    marked: &BTreeMap<MermaidBox<'_>, (BoxFate, String)>,
     edges: &[(MermaidBox<'_>, MermaidBox<'_>, bool)],
 ) -> String {
     let mut place: BTreeMap<&MermaidBox<'_>, usize> = BTreeMap::new();
@@ -157,7 +157,7 @@ fn written(
         let (open, close) = if item.0 { ("[", "]") } else { ("([", "])") };
         let mark = marked.get(item);
         let name = crate::base::words::shorten(item.1, LONGEST);
-        let more = mark.map_or("", |(_, label)| *label);
+        let more = mark.map_or("", |(_, label)| label);
         let text = escaped(format!("{name} {more}").trim_end());
         let class = match mark {
             Some((BoxFate::Gone, _)) => ":::gone",

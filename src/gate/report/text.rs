@@ -54,7 +54,7 @@ fn finding(
         let _ = writeln!(out, "   |  {line}");
     }
     if let Some(cause) = finding.cause.as_ref().filter(|_| is_alone)
-        && !cause.text.starts_with(&format!("{} ", finding.name))
+        && !cause.is_about(&finding.name)
     {
         let _ = writeln!(out, "   |  since {}", cause.text);
     }

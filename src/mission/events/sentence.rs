@@ -48,7 +48,12 @@ pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry)
                     shown
                 }
             };
-            format!("{name} {}: {} → {}", kind.word(), or(from), or(to))
+            let change = format!("{} → {}", or(from), or(to));
+            if mission.ledger.compares {
+                format!("{name} {change}")
+            } else {
+                format!("{name} {}: {change}", kind.word())
+            }
         }
         (Detail::None, Kind::Restarted) => match lasted {
             Some(lasted) => format!("{name} restarted, away for {lasted}"),
@@ -59,9 +64,10 @@ pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry)
             None => format!("{name} silent to the end"),
         },
         (Detail::None, kind @ (Kind::Started | Kind::Stopped)) => {
-            format!("{name} {}{}", kind.word(), with(mission, parts, entry))
+            let word = mission.ledger.word(kind);
+            format!("{name} {word}{}", with(mission, parts, entry))
         }
-        (Detail::None, kind) => format!("{name} {}", kind.word()),
+        (Detail::None, kind) => format!("{name} {}", mission.ledger.word(kind)),
     }
 }
 

@@ -26,7 +26,7 @@ pub(crate) fn from_changes(elements: &Elements, windows: &[Window]) -> Ledger {
     }
     Ledger {
         entries: sorted(&entries),
-        phases: Vec::new(),
+        ..Ledger::default()
     }
 }
 

@@ -4,7 +4,8 @@
 
 use std::sync::Arc;
 
-use super::counts::{COUNTS, Count, FleetBag, bags_table, counts_table};
+use super::counts::{Count, FleetBag};
+use super::rows::{COUNTS, bags_table, counts_table};
 use crate::base::error::{Error, Result};
 use crate::base::table::{Batch, ColumnValues, TableColumn};
 use crate::base::time::{Period, Stamp};

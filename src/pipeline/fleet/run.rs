@@ -11,8 +11,9 @@ use std::thread;
 use std::time::UNIX_EPOCH;
 
 use super::count::{CountedBag, Tally, try_count, unreadable, version};
-use super::counts::{SCHEMA_VERSION, bags_table, counts_table};
+use super::counts::SCHEMA_VERSION;
 use super::plan::{CountDetail, FleetPlan, PlannedBag, Planning, plan};
+use super::rows::{bags_table, counts_table};
 use crate::bag::Input;
 use crate::base::digest::hex;
 use crate::base::error::{Error, Result};

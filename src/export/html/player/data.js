@@ -1,6 +1,6 @@
 // What the page holds, unpacked: any value of any element in any window is one search away. `data.rs` says what it is.
 const $ = new Proxy({}, { get: (_, id) => document.getElementById(id) });
-const say = (id, text) => { $[id].textContent = text; };
+const say = (id, text) => { const element = $[id]; if (element.textContent != text) element.textContent = text; };
 const make = (tag, props, ...inside) => {
 	const element = Object.assign(document.createElement(tag), props);
 	element.append(...inside);
@@ -18,7 +18,7 @@ const W = starts.length, last = W - 1, total = Math.max(...ends.slice(-50), 1e-3
 // The window that shows a time: the last that begins before it.
 const windowAt = s => Math.max(0, starts.findLastIndex(start => start <= s + 1e-6));
 const iso = (s, from, to) => new Date(Math.round(s * 1e3)).toISOString().slice(from, to).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '');
-const clock = s => iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
+const clock = s => data.sides?.[windowAt(s)] ?? iso(s, s < 3600 ? 14 : 11, s % 1 ? 23 : 19);
 
 // The value of a run list in a window, and the place of its run.
 function place(list, w, lo = 0, hi = list.length) {

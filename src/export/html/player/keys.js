@@ -22,7 +22,7 @@ const KEYS = {
 	'+': () => zoom(1.25), '=': () => zoom(1.25), '-': () => zoom(.8), f: () => fit(homeOf()), z: () => bring([...near]), c: () => bring(marked()),
 	'/': () => { side(true); $.q.focus(); $.q.select(); }, '?': () => $.help.showModal(), Escape: escape,
 	b: () => compare(base < 0 ? now : -1), t: () => table($.sheet.hidden), l: () => livesOn($.deck.classList.contains('small')), s: () => side(!sideIsOpen()),
-	o: () => { if (folded) { show(shown == folded ? whole : folded); search(); firstView(); } },
+	o: () => { if (group >= 0) unfold(); else if (folded) { show(shown == folded ? whole : folded); search(); firstView(); } },
 };
 const press = (key, far) => KEYS[key] ? KEYS[key]() : go(MOVES[key] ? now + Math.sign(MOVES[key]) * Math.ceil(Math.abs(MOVES[key] * far)) : Math.round(last * key / 10));
 onkeydown = e => {
@@ -51,7 +51,7 @@ document.addEventListener('click', e => {
 });
 // Keys go on working after a choice.
 $.speed.onchange = () => $.play.focus();
-const resized = () => { drawTime(); fit(view); };
+const resized = () => { wide = stage.clientWidth; high = stage.clientHeight; drawTime(); fit(view); };
 new ResizeObserver(resized).observe(stage);
 onhashchange = load;
 if ($.open) $.open.hidden = !folded;

@@ -27,11 +27,11 @@ function element(i) {
 }
 function listNews() {
 	if (base < 0) {
-		say('newstitle', 'Changes in this window');
+		say('newstitle', data.sides ? 'What differs' : 'Changes in this window');
 		const { n = 0, lines = [] } = news.get(now) ?? {};
 		// Nothing, as before.
 		if (!n && $.news.firstChild?.textContent == 'None.') return;
-		fill('news', lines, ([s, sign, i, text]) => entry(i, text, KINDS[sign], clock(Math.floor(s))));
+		fill('news', lines, ([s, sign, i, text]) => entry(i, text, KINDS[sign], data.sides ? '' : clock(Math.floor(s))));
 		if (n > lines.length) $.news.append(make('p', { textContent: `and ${n - lines.length} more` }));
 		if (!n) $.news.append(make('p', { textContent: 'None.' }));
 		return;

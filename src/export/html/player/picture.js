@@ -32,6 +32,7 @@ function dress() {
 		if (text.says != says) text.textContent = text.says = says;
 	});
 	g.svg?.classList.toggle('filtered', only && !!hits);
+	g.svg?.classList.toggle('pinned', near.size > 0);
 	return moved;
 }
 // What is marked in the present window, or differs from the base.
@@ -62,11 +63,11 @@ function seek(w, quiet) {
 }
 function header() {
 	const place = `window ${now + 1} of ${W}`, chips = chipsOf(), n = base < 0 ? news.get(now)?.n ?? 0 : marked(whole).length;
-	say('where', `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
+	say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
 	$.clock.lastChild.textContent = data.date;
 	const p = phases.findLastIndex(([from]) => from < ends[now]);
-	say('phase', p < 0 ? '' : `${p + 1} ${phases[p][2]}`);
+	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
 	$.chips.dataset.entries = n;
 	$.chips.replaceChildren(...chips.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
@@ -74,6 +75,7 @@ function header() {
 	$.seek.ariaValueText = [clock(starts[now]), place, ...chips.filter(Boolean)].join(', ');
 }
 function play(on) {
+	if (!on && !timer) return;
 	clearTimeout(timer);
 	timer = on && setTimeout(() => { seek(now + 1, 1); play(now < last); }, 1e3 / $.speed.value);
 	say('play', on ? 'Pause' : 'Play');

@@ -2,7 +2,7 @@
 let later;
 const escapes = text => encodeURIComponent(text).replace(/%2F/g, '/').replace(/%3A/g, ':');
 function link() {
-	const parts = { t: starts[now], b: base < 0 ? '' : starts[base], sel: sel < 0 ? '' : whole.key(sel), q: $.q.value, table: $.sheet.hidden ? '' : 1 };
+	const parts = { t: starts[now], b: base < 0 ? '' : starts[base], sel: sel >= 0 ? whole.key(sel) : group >= 0 ? folded.key(group) : '', q: $.q.value, table: $.sheet.hidden ? '' : 1 };
 	return '#' + Object.entries(parts).filter(([, value]) => value !== '').map(([key, value]) => key + '=' + escapes(value)).join('&');
 }
 function save() {
@@ -19,12 +19,13 @@ function load() {
 	const name = to.get('sel'), i = ['', 'node:', 'topic:', 'topics:', 'edge:'].map(kind => whole.keys.get(kind + name)).find(i => i >= 0);
 	firstView();
 	pick(name === null ? -1 : i ?? -1, 1);
+	if (!(i >= 0) && folded?.keys.has(name)) pickGroup(folded.keys.get(name));
 	search();
 	if (to.get('table')) table(true);
 }
 // The stage as it is, with the rules that colour it and the font that it is set in.
 function picture() {
-	const copy = svg().cloneNode(true), wide = stage.clientWidth, high = stage.clientHeight, k = scaleOf(view);
+	const copy = svg().cloneNode(true), k = scaleOf(view);
 	const box = [view[0] + view[2] / 2 - wide / k / 2, view[1] + view[3] / 2 - high / k / 2, wide / k, high / k];
 	for (const [key, value] of Object.entries({ xmlns: 'http://www.w3.org/2000/svg', width: wide, height: high, viewBox: box.join(' ') })) copy.setAttribute(key, value);
 	const style = document.createElementNS('http://www.w3.org/2000/svg', 'style'), ground = document.createElementNS('http://www.w3.org/2000/svg', 'rect');
@@ -44,7 +45,7 @@ function download(href, kind) {
 async function savePicture(kind) {
 	const url = 'data:image/svg+xml;charset=utf-8,' + encodeURIComponent(picture());
 	if (kind == 'svg') return download(url, kind);
-	const image = new Image(), canvas = make('canvas', { width: stage.clientWidth * 2, height: stage.clientHeight * 2 });
+	const image = new Image(), canvas = make('canvas', { width: wide * 2, height: high * 2 });
 	image.src = url;
 	await image.decode();
 	canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);

@@ -9,12 +9,11 @@ const wholeOf = i => shown == whole ? i : i < shown.N ? whole.keys.get(shown.key
 // Selects an element of everything; `look` brings it into view, `from` says that a list did.
 function pick(i, look, fromList) {
 	sel = i;
+	group = -1;
 	if (i >= 0 && look && !whole.isThere(i, now) && base < 0) toLife(i);
 	if (i >= 0 && look && shown == folded && !near_of(i).size) show(whole);
 	near = near_of(i);
 	dress();
-	svg().classList.toggle('pinned', i >= 0);
-	$.unfold.hidden = true;
 	if (i < 0) $.follow.ariaPressed = false;
 	card();
 	drawRow();
@@ -35,30 +34,46 @@ function toLife(i) {
 		}
 	}
 }
-// A folded box: what it holds, and how to see it.
-function pickFolded(i) {
-	const held = shown.holds[i];
-	sel = -1;
-	near = new Set([i, ...shown.ends(i).flatMap(end => [end, ...shown.ends(end)])]);
+// A box of the picture that stands for several: what it holds, and how to see those one by one.
+let group = -1, viewBefore;
+function pickGroup(i) {
+	pick(-1);
+	group = i;
+	pin();
+	save();
+}
+// In the picture a group and whom it is connected to; opened, what it holds with its connections.
+function pin() {
+	near = new Set(shown == folded ? nearBox(group) : folded.holds[group].flatMap(i => i < whole.N ? [i, ...whole.ends(i)] : i));
 	dress();
-	svg().classList.add('pinned');
-	$.card.hidden = false;
-	say('name', shown.name(i));
-	say('state', `${shown.kind(i)} of ${held.length} ${shown.rate(i, now)}`);
-	$.life.replaceChildren();
-	$.facts.replaceChildren();
-	$.story.hidden = true;
-	$.unfold.hidden = false;
-	$.unfold.onclick = () => unfold(held);
-	fill('ends', held, element);
+	card();
 }
-function unfold(held) {
+const nearBox = i => [i, ...shown.ends(i).flatMap(end => [end, ...shown.ends(end)])];
+// Opens the group where it stands: what it held has its middle there, as far as all of that can be seen. Or folds it
+// again and looks from where the reader came.
+function unfold() {
+	if (shown == whole) {
+		show(folded);
+		fit(viewBefore ?? homeOf());
+		return pin();
+	}
+	const k = scaleOf(view), [x, y, w, h] = folded.boxes[group], held = folded.holds[group].filter(i => i < whole.N);
+	const there = [wide / 2 + k * (x + w / 2 - view[0] - view[2] / 2), high / 2 + k * (y + h / 2 - view[1] - view[3] / 2)];
+	viewBefore = view;
 	show(whole);
-	svg().classList.remove('pinned');
-	bring(held.filter(i => i < whole.N), TOPIC);
+	bring(held, TOPIC);
+	stand(around(boxesOf(held)), there);
+	pin();
 	say('live', `${held.length} elements, one by one`);
-	$.open.focus();
 }
+// Moves the view so that the middle of a box stands at a place of the stage, and all of the box on it.
+function stand([x, y, w, h], there) {
+	const k = scaleOf(view), within = (at, part, all) => Math.max(part / 2, Math.min(all - part / 2, at));
+	if (w * k > wide || h * k > high) return;
+	const left = within(there[0], w * k, wide), top = within(there[1], h * k, high);
+	fit([x + w / 2 - left / k, y + h / 2 - top / k, wide / k, high / k]);
+}
+$.unfold.onclick = unfold;
 const STATES = { active: 'active', silent: 'silent: alive, no message now', latched: 'latched: alive by a message that is kept', declared: 'declared: known from a header only', off: 'not there now' };
 const DEGREES = { stated: 'stated by somebody', inferred: 'inferred by a rule', declared: 'declared only' };
 // What is known of an element in a window, line by line.
@@ -69,20 +84,28 @@ function explain(g, i, w) {
 	return [`${g.kind(i) == 'edge' ? 'connection' : g.kind(i)} ${g.name(i)}`, now.filter(Boolean).join(' · '), ...g.facts[i]];
 }
 function card() {
-	if ($.card.hidden = sel < 0) return;
-	const [life] = whole.lives[sel], [title, state, ...facts] = explain(whole, sel, now);
-	say('name', whole.name(sel));
-	$.title.className = 'is-' + whole.kind(sel);
-	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · against window ${base + 1}: ${whole.difference(sel, base, now)[1] || whole.difference(sel, base, now)[0] || 'the same'}`));
+	const g = group < 0 ? whole : folded, i = group < 0 ? sel : group;
+	if ($.card.hidden = i < 0) return;
+	const [title, state, ...facts] = explain(g, i, now), differs = base < 0 ? NONE : g.difference(i, base, now);
+	say('name', g.name(i));
+	$.title.className = 'is-' + g.kind(i);
+	say('state', title.split(' ')[0] + ' · ' + state + (base < 0 ? '' : ` · against window ${base + 1}: ${differs[1] || differs[0] || 'the same'}`));
+	$.facts.replaceChildren(...facts.map(fact => make('p', { textContent: fact })));
+	drawLife(g.lives[i][0], g.classes);
+	$.follow.hidden = group >= 0;
+	$.unfold.hidden = group < 0;
+	say('unfold', shown == whole ? 'Fold again' : 'Open');
+	say('endstitle', group < 0 ? 'Connected' : 'Holds');
+	const past = told.flatMap(([w, , , lines]) => lines.filter(line => group < 0 ? line[2] == sel : folded.holds[group].includes(line[2])).map(line => [w, ...line]));
+	$.story.hidden = !past.length;
+	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: data.sides ? '' : clock(Math.floor(s)) + ' ' }), text), 12);
+	fill('ends', group < 0 ? whole.ends(sel) : folded.holds[group], element);
+}
+function drawLife(life, classes) {
 	const bits = [];
-	for (let k = 0; k < life.length && bits.length < 2000; k += 2) if (life[k + 1]) bits.push([whole.classes[life[k + 1]], starts[life[k]], starts[life[k + 2]] ?? total]);
+	for (let k = 0; k < life.length && bits.length < 2000; k += 2) if (life[k + 1]) bits.push([classes[life[k + 1]], starts[life[k]], starts[life[k + 2]] ?? total]);
 	$.life.setAttribute('viewBox', `0 0 ${total} 9`);
 	$.life.innerHTML = bits.concat([['head', starts[now], Math.max(ends[now], starts[now] + total / 150)]]).map(([c, from, to]) => `<rect class="${c}" x=${from} width=${to - from} height=9 />`).join('');
-	$.facts.replaceChildren(...facts.map(fact => make('p', { textContent: fact })));
-	const past = told.flatMap(([w, , , lines]) => lines.filter(line => line[2] == sel).map(line => [w, ...line]));
-	$.story.hidden = !past.length;
-	fill('past', past, ([w, s, sign, , text]) => make('button', { className: KINDS[sign], onclick: () => go(w) }, make('b', { textContent: clock(Math.floor(s)) + ' ' }), text), 12);
-	fill('ends', whole.ends(sel), element);
 }
 onSeek.push(card);
 $.follow.onclick = () => { $.follow.ariaPressed = $.follow.ariaPressed != 'true'; };
@@ -105,7 +128,7 @@ stage.addEventListener('pointerleave', () => { $.tip.hidden = true; });
 for (const g of [whole, folded]) if (g?.svg) g.svg.onclick = e => {
 	if (far > 5) return;
 	const i = elementAt(e), same = i < 0 ? -1 : wholeOf(i);
-	if (i >= 0 && same < 0 && shown == folded && i < shown.N) pickFolded(i);
+	if (i >= 0 && same < 0 && shown == folded && i < shown.N) pickGroup(i);
 	else pick(same);
 };
 

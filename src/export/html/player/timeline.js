@@ -2,7 +2,7 @@
 const ROW = 14, part = s => s / total, percent = s => 100 * part(s) + '%';
 let pitch = ROW;
 phases.forEach(([from, to, name], p) => {
-	const button = make('button', { textContent: `${p + 1} ${name}`, title: `phase ${p + 1}: ${name}, ${clock(from)} – ${clock(to)}`, onclick: () => go(windowAt(from)) });
+	const button = make('button', { textContent: `${p + 1} · ${name}`, title: `phase ${p + 1}: ${name}, ${clock(from)} – ${clock(to)}`, onclick: () => go(windowAt(from)) });
 	button.style.left = percent(from);
 	button.style.width = percent(to - from);
 	$.band.append(button);

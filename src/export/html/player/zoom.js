@@ -4,7 +4,9 @@ const READABLE = 9, MOST = 6, pointers = new Map();
 for (const g of [whole, folded]) if (g?.svg) g.home = g.svg.getAttribute('viewBox').split(' ').map(Number);
 const svg = () => shown.svg ?? $.graph;
 const homeOf = () => shown.home ?? (shown.home = $.graph.getAttribute('viewBox').split(' ').map(Number));
-const scaleOf = ([, , w, h]) => Math.min(stage.clientWidth / w, stage.clientHeight / h);
+// The size of the stage. Who asks the page for it lays the page out, so it is asked only where it may have changed.
+let wide = stage.clientWidth, high = stage.clientHeight;
+const scaleOf = ([, , w, h]) => Math.min(wide / w, high / h);
 let view = homeOf();
 const [RATE, TOPIC, NODE] = sizes.map(size => READABLE / size);
 
@@ -18,7 +20,7 @@ function fit(box) {
 	svg().style.setProperty('--space', Math.min(Math.max(sizes[3], 10 / k), 60) + 'px');
 	minimap();
 }
-function zoom(by, dx = 0, dy = 0, x = stage.clientWidth / 2, y = stage.clientHeight / 2) {
+function zoom(by, dx = 0, dy = 0, x = wide / 2, y = high / 2) {
 	const k = scaleOf(view) * S, fits = scaleOf(homeOf());
 	by = Math.max(Math.min(fits, k) * .7, Math.min(MOST, k * by)) / k;
 	X = x + (X - x) * by + dx;
@@ -31,9 +33,9 @@ function zoom(by, dx = 0, dy = 0, x = stage.clientWidth / 2, y = stage.clientHei
 }
 // Draws anew what a gesture only moved.
 function settle() {
-	const k = scaleOf(view), left = view[0] - (stage.clientWidth / k - view[2]) / 2, top = view[1] - (stage.clientHeight / k - view[3]) / 2;
+	const k = scaleOf(view), left = view[0] - (wide / k - view[2]) / 2, top = view[1] - (high / k - view[3]) / 2;
 	svg().style.willChange = svg().style.transform = '';
-	fit([left - X / S / k, top - Y / S / k, stage.clientWidth / k / S, stage.clientHeight / k / S]);
+	fit([left - X / S / k, top - Y / S / k, wide / k / S, high / k / S]);
 	X = Y = 0;
 	S = 1;
 }
@@ -46,7 +48,7 @@ function around(boxes) {
 function bring(all, least = RATE, most = 1.5) {
 	const boxes = boxesOf(all);
 	if (!boxes.length) return;
-	const box = around(boxes), k = Math.min(most, Math.max(scaleOf(box), least)), w = stage.clientWidth / k, h = stage.clientHeight / k;
+	const box = around(boxes), k = Math.min(most, Math.max(scaleOf(box), least)), w = wide / k, h = high / k;
 	let [x, y] = [box[0] + box[2] / 2, box[1] + box[3] / 2];
 	if (box[2] > w * 1.01 || box[3] > h * 1.01) [x, y] = densest(boxes, w, h);
 	fit([x - w / 2, y - h / 2, w, h]);
@@ -76,21 +78,22 @@ function firstView() {
 // The minimap: everything small, with a frame around what is seen.
 const outline = boxes => boxes.map(([x, y, w, h]) => `M${x} ${y}h${w}v${h}h-${w}z`).join('');
 function minimap() {
-	const [x, y, w, h] = homeOf(), k = scaleOf(view), seen = [stage.clientWidth / k, stage.clientHeight / k];
+	const [x, y, w, h] = homeOf(), k = scaleOf(view), seen = [wide / k, high / k];
 	const hidden = !shown.svg || seen[0] >= w * .98 && seen[1] >= h * .98;
 	$.mini.toggleAttribute('hidden', hidden);
 	if (hidden) return;
-	const [all, changed, frame] = $.mini.children;
+	const [all, , frame] = $.mini.children;
 	if ($.mini.of != shown) {
 		$.mini.of = shown;
 		$.mini.setAttribute('viewBox', homeOf().join(' '));
 		all.setAttribute('d', outline(shown.boxes));
 	}
-	changed.setAttribute('d', outline(marked().filter(i => i < shown.N).map(i => shown.boxes[i])));
+	markMini();
 	const places = [view[0] + view[2] / 2 - seen[0] / 2, view[1] + view[3] / 2 - seen[1] / 2, ...seen];
 	['x', 'y', 'width', 'height'].forEach((name, i) => frame.setAttribute(name, places[i]));
 }
-onSeek.push(() => $.mini.hasAttribute('hidden') || minimap());
+const markMini = () => $.mini.children[1].setAttribute('d', outline(marked().filter(i => i < shown.N).map(i => shown.boxes[i])));
+onSeek.push(() => $.mini.hasAttribute('hidden') || markMini());
 function lookFromMini(e) {
 	const { left, top, width, height } = $.mini.getBoundingClientRect(), [x, y, w, h] = homeOf(), k = Math.min(width / w, height / h);
 	const cx = x + w / 2 + (e.clientX - left - width / 2) / k, cy = y + h / 2 + (e.clientY - top - height / 2) / k;

@@ -1,0 +1,145 @@
+//! Room for badges: the corner of a box, or the part of an arrow, where least else runs under the badge.
+
+use super::arrows::ArrowPath;
+use super::boxes::{ItemBox, corners};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::view::ItemKind;
+
+/// Moves all badges of this radius to where they cover no line and no other box, as far as there is such a place.
+pub(super) fn place_badges(
+    (kinds, cards): (&[ItemKind], &mut [ItemBox]),
+    tracks: &mut [ArrowPath],
+    radius: f64,
+    scale: f64,
+) {
+    let room = Room::new(cards, tracks, radius);
+    for (at, (card, kind)) in cards.iter_mut().zip(kinds).enumerate() {
+        let free = corners(*kind, card.place, scale);
+        card.badge = room.best(&free, (Some(at), None)).unwrap_or(free[0]);
+    }
+    for (at, track) in tracks.iter_mut().enumerate() {
+        let best = room.best(&track.spots, (None, Some(at)));
+        track.badge = best.unwrap_or(track.badge);
+    }
+}
+
+/// All that a badge may cover.
+struct Room {
+    boxes: Vec<Rect>,
+    /// Lines with the rectangles around them.
+    lines: Vec<(Rect, Vec<Point>)>,
+    radius: f64,
+}
+
+impl Room {
+    fn new(cards: &[ItemBox], tracks: &[ArrowPath], radius: f64) -> Self {
+        let line = |track: &ArrowPath| {
+            let points = track.points();
+            (around(&points), points)
+        };
+        Self {
+            boxes: cards.iter().map(|card| card.place).collect(),
+            lines: tracks.iter().map(line).collect(),
+            radius,
+        }
+    }
+
+    /// The first of the places with the least under a badge there, besides the box or the line that carries it.
+    fn best(&self, places: &[Point], own: (Option<usize>, Option<usize>)) -> Option<Point> {
+        let covered = |place: &&Point| self.covered(**place, own);
+        let free = places.iter().find(|place| covered(place) == 0);
+        free.or_else(|| places.iter().min_by_key(covered)).copied()
+    }
+
+    fn covered(&self, at: Point, own: (Option<usize>, Option<usize>)) -> usize {
+        let area = Rect::around(at, Size::new(2.0 * self.radius, 2.0 * self.radius));
+        let boxes = self.boxes.iter().enumerate();
+        let boxes = boxes.filter(|(k, place)| own.0 != Some(*k) && place.overlaps(&area));
+        let lines = self.lines.iter().enumerate().filter(|(k, (around, line))| {
+            own.1 != Some(*k) && around.overlaps(&area) && self.touches(at, line)
+        });
+        boxes.count() + lines.count()
+    }
+
+    fn touches(&self, at: Point, line: &[Point]) -> bool {
+        line.windows(2)
+            .any(|piece| apart(at, piece[0], piece[1]) < self.radius)
+    }
+}
+
+/// The rectangle around points, at least a pixel wide and high.
+fn around(points: &[Point]) -> Rect {
+    let of = |p: &Point| Rect::around(*p, Size::new(1.0, 1.0));
+    let all = points.iter().map(of);
+    all.reduce(|a, b| a.union(&b)).unwrap_or_default()
+}
+
+/// How far a point is from the line between two others.
+fn apart(p: Point, a: Point, b: Point) -> f64 {
+    let (dx, dy) = (b.x - a.x, b.y - a.y);
+    let length = (dx * dx + dy * dy).max(1e-9);
+    let part = (((p.x - a.x) * dx + (p.y - a.y) * dy) / length).clamp(0.0, 1.0);
+    libm::hypot(a.x + part * dx - p.x, a.y + part * dy - p.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::picture::measured::{Label, Tells};
+    use crate::draw::picture::page::GraphFit;
+    use crate::layout::Route;
+
+    fn line(from: Point, to: Point) -> ArrowPath {
+        let fit = GraphFit {
+            scale: 1.0,
+            pen: 1.0,
+            origin: Point::default(),
+        };
+        let route = Route {
+            start: from,
+            curves: vec![[from, to, to]],
+            label: None,
+        };
+        ArrowPath::new(String::new(), Default::default(), &route, None, fit)
+    }
+
+    fn card(place: Rect) -> ItemBox {
+        ItemBox {
+            id: String::new(),
+            label: Label::default(),
+            tells: Tells::Nothing,
+            place,
+            badge: Point::default(),
+        }
+    }
+
+    #[test]
+    fn a_badge_leaves_the_corner_that_a_line_runs_by() {
+        let mut cards = [card(Rect::new(0.0, 0.0, 100.0, 40.0))];
+        let along = |x: f64| line(Point::new(x, -50.0), Point::new(x, 90.0));
+        place_badges(
+            (&[ItemKind::Topic], &mut cards),
+            &mut [along(130.0)],
+            8.0,
+            1.0,
+        );
+        assert_eq!(cards[0].badge, Point::new(98.0, 1.0));
+        place_badges(
+            (&[ItemKind::Topic], &mut cards),
+            &mut [along(102.0)],
+            8.0,
+            1.0,
+        );
+        assert_eq!(cards[0].badge, Point::new(2.0, 1.0));
+    }
+
+    #[test]
+    fn a_badge_on_an_arrow_leaves_the_place_where_another_crosses() {
+        let mut both = [
+            line(Point::new(0.0, 0.0), Point::new(200.0, 0.0)),
+            line(Point::new(100.0, -30.0), Point::new(100.0, 90.0)),
+        ];
+        place_badges((&[], &mut []), &mut both, 8.0, 1.0);
+        assert!((both[0].badge.x - 100.0).abs() > 8.0, "{:?}", both[0].badge);
+    }
+}

@@ -1,0 +1,91 @@
+//! What differs between two missions, in words and in pictures.
+
+use std::fs;
+
+use super::{HEALTHY, Robot, bag, recording, run};
+
+#[test]
+fn a_difference_is_told_of_what_both_could_have_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    bag(here, "a.bag", &recording(HEALTHY, 0));
+    bag(here, "same.bag", &recording(HEALTHY, 3));
+    let other = Robot {
+        scan_ms: 200,
+        controller: "/pilot",
+        has_teleop: true,
+        ..HEALTHY
+    };
+    bag(here, "b.bag", &recording(other, 3));
+    let (code, said) = run(here, &["diff", "a.bag", "same.bag"]);
+    assert_eq!((code, said.contains("no differences")), (0, true), "{said}");
+    let outputs = [
+        "-o", "d.json", "-o", "d.md", "-o", "d.svg", "-o", "d.html", "-o", "d.gif",
+    ];
+    let (code, said) = run(here, &[&["diff", "a.bag", "b.bag"][..], &outputs].concat());
+    assert_eq!(code, 1, "{said}");
+    let wanted = [
+        "- node       /controller",
+        "+ node       /pilot",
+        "+ node       /teleop",
+        "~ rate       /scan",
+        "10 Hz → 5 Hz",
+        "a.bag and b.bag: ",
+    ];
+    for line in wanted {
+        assert!(said.contains(line), "no `{line}` in {said}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_slice(&fs::read(here.join("d.json")).unwrap()).unwrap();
+    let rows = json["differences"].as_array().unwrap();
+    assert!(
+        rows.iter()
+            .any(|r| r["kind"] == "rate" && r["name"] == "/scan" && r["in"] == "both")
+    );
+    let svg = fs::read_to_string(here.join("d.svg")).unwrap();
+    for name in ["/controller", "/pilot", "/teleop", "/scan", "/odom"] {
+        assert!(svg.contains(name), "{name}");
+    }
+    assert!(!svg.contains("window 1 of"), "time means nothing here");
+    // What is in one of them did not start or stop.
+    let html = fs::read_to_string(here.join("d.html")).unwrap();
+    for text in [&svg, &html] {
+        for words in [
+            "A: a.bag → B: b.bag",
+            "only in A",
+            "only in B",
+            "B against A",
+        ] {
+            assert!(text.contains(words), "no `{words}`");
+        }
+        for words in ["started", "stopped", "vanished", "appeared"] {
+            assert!(!text.contains(&format!(" {words}")), "{words}");
+        }
+    }
+    assert!(html.contains("<body class=\"compares\">"));
+    let (code, said) = run(here, &["diff", "a.bag", "b.bag", "-o", "d.csv"]);
+    assert!(code == 2 && said.contains("two are compared"), "{said}");
+    fs::create_dir(here.join("new")).unwrap();
+    fs::copy(here.join("b.bag"), here.join("new/a.bag")).unwrap();
+    let (_, said) = run(here, &["diff", "a.bag", "new/a.bag"]);
+    assert!(said.contains("only in new/a.bag"), "{said}");
+    assert!(fs::read(here.join("d.gif")).unwrap().starts_with(b"GIF89a"));
+    assert!(
+        fs::read_to_string(here.join("d.md"))
+            .unwrap()
+            .starts_with("### 🔀 ")
+    );
+    fs::write(
+        here.join("g.yaml"),
+        "schema: bagreel.expect/1\nnodes:\n  /teleop: {}\n",
+    )
+    .unwrap();
+    let (code, said) = run(here, &["diff", "a.bag", "g.yaml"]);
+    assert_eq!(
+        (code, said.contains("error[node-missing]: /teleop")),
+        (1, true),
+        "{said}"
+    );
+    assert_eq!(run(here, &["diff", "gone.bag", "a.bag"]).0, 2);
+    assert_eq!(run(here, &["diff", "a.bag"]).0, 2);
+}

@@ -1,0 +1,143 @@
+//! What a run keeps: the expectation that was written from it, or from another recording of the same mission.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{HEALTHY, bag, recording, run};
+use crate::support::shared;
+
+const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
+const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
+
+#[test]
+fn a_run_keeps_the_expectation_written_from_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut bags = vec![PathBuf::from(COURIER), PathBuf::from(WAREHOUSE)];
+    bags.push(bag(dir.path(), "robot.bag", &recording(HEALTHY, 0)));
+    let more = [
+        "data/bags/mission/mission.bag",
+        "data/mini/mini_lz4.bag",
+        "data/warehouse/warehouse.bag",
+    ];
+    bags.extend(more.iter().filter_map(|below| shared(below)));
+    for bag in bags {
+        let bag = bag.to_str().unwrap();
+        for period in [&[][..], &["--period", "7"]] {
+            let write = |name| {
+                let args = [&["baseline", bag, "-o", name][..], period].concat();
+                let (code, said) = run(dir.path(), &args);
+                assert_eq!(code, 0, "{bag}: {said}");
+                fs::read_to_string(dir.path().join(name)).unwrap()
+            };
+            assert_eq!(write("one.yaml"), write("two.yaml"), "{bag}");
+            let (code, said) = run(dir.path(), &["check", bag, "--expect", "one.yaml"]);
+            assert_eq!(code, 0, "{bag}: {said}");
+            assert!(said.contains("no findings"), "{bag}: {said}");
+        }
+    }
+}
+
+/// Every recording below a folder: files, and folders with metadata.
+fn recordings(folder: &Path, all: &mut Vec<PathBuf>) {
+    let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+    let mut entries: Vec<PathBuf> = entries.collect();
+    entries.sort();
+    if entries.iter().any(|e| e.ends_with("metadata.yaml")) {
+        all.push(folder.to_owned());
+        return;
+    }
+    for entry in entries {
+        let name = entry.to_str().unwrap();
+        if entry.is_dir() {
+            recordings(&entry, all);
+        } else if [".bag", ".db3", ".mcap", ".active"]
+            .iter()
+            .any(|e| name.ends_with(e))
+        {
+            all.push(entry);
+        }
+    }
+}
+
+#[test]
+fn every_bag_at_hand_keeps_its_own_expectation() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let mut bags = Vec::new();
+    for folder in ["data/bags", "data/mini"] {
+        shared(folder).inspect(|folder| recordings(folder, &mut bags));
+    }
+    let mut judged = 0;
+    for bag in &bags {
+        let bag = bag.to_str().unwrap();
+        let (code, said) = run(here, &["baseline", bag, "-o", "g.yaml"]);
+        // There are bags without a message, and files that are none.
+        if code == 1 {
+            continue;
+        }
+        assert!(matches!(code, 0 | 3), "{bag}: {said}");
+        let (kept, said) = run(here, &["check", bag, "--expect", "g.yaml"]);
+        // What is damaged is damaged in both.
+        assert!(
+            kept == code && said.contains("no findings"),
+            "{bag}: {said}"
+        );
+        judged += 1;
+    }
+    assert!(bags.is_empty() || judged > 40, "{judged}");
+}
+
+#[test]
+fn names_that_are_no_keys_find_no_room_in_an_expectation() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let mut robot = recording(HEALTHY, 0);
+    for name in ["n".repeat(5000), "\u{202e}".repeat(300)] {
+        let own = robot.publisher(&format!("/{name}"), "/odd", "std_msgs/String");
+        robot.send(own, (1_000, 170_000), 1_000, b"\x01\0\0\0a");
+    }
+    bag(here, "run.bag", &robot);
+    let (code, said) = run(here, &["baseline", "run.bag", "-o", "g.yaml"]);
+    assert!(
+        code == 0 && said.contains("2 names found no room"),
+        "{said}"
+    );
+    let (code, said) = run(here, &["check", "run.bag", "--expect", "g.yaml"]);
+    assert!(code == 0 && said.contains("no findings"), "{said}");
+}
+
+#[test]
+fn other_recordings_of_one_mission_keep_its_expectation() {
+    let pairs = [
+        (
+            "data/warehouse/warehouse.bag",
+            "data/warehouse/warehouse_lz4.bag",
+        ),
+        (
+            "data/bags/mission/mission.bag",
+            "data/bags/mission/killed_bz2.bag.active",
+        ),
+        ("data/mini/mini_lz4.bag", "data/mini/mini_bz2.bag"),
+        (
+            "data/bags/example/example.bag",
+            "data/bags/example/example-lz4.bag",
+        ),
+    ];
+    let dir = tempfile::tempdir().unwrap();
+    for (one, other) in pairs {
+        let (Some(one), Some(other)) = (shared(one), shared(other)) else {
+            continue;
+        };
+        let (code, said) = run(
+            dir.path(),
+            &["baseline", one.to_str().unwrap(), "-o", "g.yaml"],
+        );
+        assert_eq!(code, 0, "{said}");
+        let (code, said) = run(
+            dir.path(),
+            &["check", other.to_str().unwrap(), "--expect", "g.yaml"],
+        );
+        assert!(matches!(code, 0 | 3) && !said.contains("error["), "{said}");
+        assert!(!said.contains("warning["), "{said}");
+    }
+}

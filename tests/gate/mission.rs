@@ -1,0 +1,175 @@
+//! A recorded mission: each of its reconfigurations breaks the rule written for it, and no other.
+
+use std::fs;
+
+use super::bagreel;
+use crate::support::shared;
+
+/// Each reconfiguration of the mission, the rule that it breaks, and when.
+const MISSION: &str = "\
+schema: bagreel.expect/1
+nodes:
+  /camera_driver: {}
+  /controller: {}
+  /probe: {}
+  /camera_backup: {}
+rules:
+  - {id: localizer-starts, node: /localizer, present_within: 1s}
+  - {id: planner-starts, node: /planner, present_within: 50s}
+  - {id: controller-starts, node: /controller, present_within: 80s}
+  - {id: backup-takes-over, when: {removed: /camera_driver}, expect: {handed_over: /image_small, to: /camera_backup}, within: 20s}
+  - {id: probe-starts, node: /probe, present_within: 160s}
+  - {id: planner-restarts, node: /planner, restarts: ..0}
+  - {id: probe-restarts, node: /probe, restarts: ..0}
+  - {id: successor-starts, node: /controller_v2, present_within: 200s}
+  - {id: joystick-starts, node: /joystick, present_within: 200s}
+  - {id: localizer-restarts, node: /localizer, restarts: ..0}
+  - {id: quiet-at-end, during: -30s.., changes: ..0}
+  - {id: kept-order, appear_in_order: [/localizer, /planner, /controller]}
+  - {id: kept-takeover, when: {removed: /camera_driver}, expect: {added: /camera_backup}, within: 40s}
+  - {id: kept-rate, topic: /scan_small, hz: 4..6}
+  - {id: kept-restarts, node: /probe, restarts: ..1}
+";
+
+#[test]
+fn each_reconfiguration_breaks_the_rule_written_for_it() {
+    let Some(bag) = shared("data/bags/mission/mission.bag") else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("graph.yaml"), MISSION).unwrap();
+    let args = [
+        "check",
+        bag.to_str().unwrap(),
+        "--expect",
+        "graph.yaml",
+        "--format",
+        "json",
+    ];
+    let output = bagreel(dir.path(), &args);
+    assert_eq!(output.status.code(), Some(1));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let broken = |rule: &serde_json::Value| {
+        let findings = rule["findings"].as_array()?;
+        assert_eq!(findings.len(), 1, "{rule}");
+        let title = rule["rule"].as_str().unwrap().split(':').next().unwrap();
+        let (id, severity) = (&findings[0]["id"], &findings[0]["severity"]);
+        assert_eq!(severity, "error", "{rule}");
+        Some((title.to_owned(), id.as_str().unwrap().to_owned()))
+    };
+    let rules = report["rules"].as_array().unwrap();
+    let found: Vec<_> = rules.iter().filter_map(broken).collect();
+    let found: Vec<_> = found
+        .iter()
+        .map(|(a, b)| (a.as_str(), b.as_str()))
+        .collect();
+    let expected = [
+        ("/camera_driver", "node-gone"),
+        ("/controller", "node-gone"),
+        ("/probe", "node-gone"),
+        ("/camera_backup", "node-gone"),
+        ("localizer-starts", "node-late"),
+        ("planner-starts", "node-late"),
+        ("controller-starts", "node-late"),
+        ("backup-takes-over", "reaction-missing"),
+        ("probe-starts", "node-late"),
+        ("planner-restarts", "node-restarted"),
+        ("probe-restarts", "node-restarted"),
+        ("successor-starts", "node-late"),
+        ("joystick-starts", "node-late"),
+        ("localizer-restarts", "node-restarted"),
+        ("quiet-at-end", "too-many-changes"),
+    ];
+    assert_eq!(found, expected);
+}
+
+/// Of the mission's reconfigurations each has a rule.
+const STEPS: &str = "\
+schema: bagreel.expect/1
+nodes:
+  /camera_backup: {optional: true}
+  /camera_driver: {}
+  /controller: {optional: true}
+  /localizer: {optional: true}
+  /planner: {optional: true}
+  /probe: {optional: true}
+rules:
+  - {id: localizer-starts, node: /localizer, forbidden: true}
+  - {id: planner-starts, node: /planner, forbidden: true}
+  - {id: controller-starts, node: /controller, forbidden: true}
+  - {id: camera-is-replaced, when: {removed: /camera_driver}, expect: {handed_over: /image_small}, within: 20s}
+  - {id: backup-starts, node: /camera_backup, forbidden: true}
+  - {id: probe-starts, node: /probe, forbidden: true}
+  - {id: planner-restarts, node: /planner, restarts: ..0}
+  - {id: probe-restarts, node: /probe, restarts: ..0}
+  - {id: successor-starts, node: /controller_v2, forbidden: true}
+  - {id: joystick-starts, node: /joystick, forbidden: true}
+  - {id: localizer-restarts, node: /localizer, restarts: ..0}
+";
+
+/// From one end of the mission, in seconds, to the next: which rules are broken then and were not before, and which were.
+type Step = (
+    &'static str,
+    &'static [&'static str],
+    &'static [&'static str],
+);
+
+#[test]
+fn from_one_reconfiguration_to_the_next_exactly_its_rule_breaks() {
+    let Some(bag) = shared("data/bags/mission/mission.bag") else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("graph.yaml"), STEPS).unwrap();
+    let steps: [Step; 16] = [
+        ("50", &["localizer-starts"], &[]),
+        ("80", &["planner-starts"], &[]),
+        ("110", &["controller-starts"], &[]),
+        // Whether the camera is replaced in time nobody knows by now.
+        ("130", &["/camera_driver"], &[]),
+        ("140", &["camera-is-replaced"], &[]),
+        ("160", &["backup-starts"], &[]),
+        ("174", &["probe-starts"], &[]),
+        ("184", &["/planner"], &[]),
+        ("196", &["/probe"], &[]),
+        // Who is back has not gone.
+        ("207", &["planner-restarts"], &["/planner"]),
+        ("220", &["probe-restarts"], &["/probe"]),
+        // Half a second apart, as the next two.
+        ("243", &["/controller", "successor-starts"], &[]),
+        ("258", &["/probe", "joystick-starts"], &[]),
+        ("275", &["/localizer"], &[]),
+        ("300", &["localizer-restarts"], &["/localizer"]),
+        ("325", &["/camera_backup"], &[]),
+    ];
+    let mut broken: Vec<String> = Vec::new();
+    for (end, came, went) in steps {
+        let bag = bag.to_str().unwrap();
+        let args = [
+            "check",
+            bag,
+            "--expect",
+            "graph.yaml",
+            "--format",
+            "json",
+            "--end",
+            end,
+        ];
+        let output = bagreel(dir.path(), &args);
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let rules = report["rules"].as_array().unwrap().iter();
+        let rules = rules.filter(|rule| rule["outcome"] == "broken");
+        let title = |rule: &serde_json::Value| {
+            let title = rule["rule"].as_str().unwrap();
+            title.split(':').next().unwrap().to_owned()
+        };
+        let now: Vec<String> = rules.map(title).collect();
+        let only = |these: &[String], those: &[String]| {
+            let own = these.iter().filter(|rule| !those.contains(rule));
+            own.cloned().collect::<Vec<_>>()
+        };
+        assert_eq!(only(&now, &broken), came, "until {end} s");
+        assert_eq!(only(&broken, &now), went, "until {end} s");
+        broken = now;
+    }
+}
