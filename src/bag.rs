@@ -47,19 +47,20 @@ pub const FORMATS: &[FormatRow] = &[
     zstd::FORMAT,
 ];
 
-/// What an input is, from its first bytes.
+/// The kind of an input, told by its first bytes.
 #[derive(Clone, Copy)]
 pub enum InputKind {
-    /// A bag of this format. Standard input and URLs are not looked into and count as ROS 1 bags here.
+    /// A bag of this format. Standard input and URLs are not read for this and count as ROS 1 bags here.
     Bag(&'static FormatRow),
-    /// JSON text, such as an evolution of ours: no bag.
+    /// JSON text, such as an evolution of ours, which is not a bag.
     Json,
 }
 
-/// Tells what `input` is from its first bytes. Standard input is left untouched.
+/// Tells the kind of `input` by its first bytes. Standard input is left untouched.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag) with a hint if it is none of ours.
+/// [`Error::Io`](crate::Error::Io) if it cannot be read, [`Error::UnknownBag`](crate::Error::UnknownBag) with a hint if
+/// it is of no known format.
 pub fn sniff(input: &Input) -> Result<InputKind> {
     let path = match input {
         Input::Path(path) if !input.is_pipe() => path,

@@ -1,4 +1,5 @@
-//! The nouns that all stations share: times, names, errors, notices, points, and the small formats around them.
+//! The types and helpers that all other modules share: times, names, errors, notices, points, and the small formats
+//! around them.
 
 pub(crate) mod budget;
 pub(crate) mod csv;

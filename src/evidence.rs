@@ -1,4 +1,4 @@
-//! Who talks to whom, and how we know: one file per kind of proof below `source/`, one row each in [`SOURCES`].
+//! Evidence of who talks to whom: one file per kind of proof below `source/`, one row each in [`SOURCES`].
 //!
 //! A source reads messages whose layout it knows, or the announcement of a connection, or draws a conclusion from the
 //! whole mission; what it finds are claims.

@@ -1,4 +1,4 @@
-//! Where everything goes: one layout of the union of all windows, so that nothing moves between frames.
+//! The places of everything: one layout of the union of all windows, so that nothing moves between frames.
 //!
 //! An engine sees sizes and connections only, never colours, rates or changes.
 
@@ -29,9 +29,9 @@ pub enum Outline {
 /// A box to place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vertex {
-    /// Its size with the widest label it ever shows.
+    /// Its size in pixels, with the widest label it ever shows.
     pub size: Size,
-    /// Where routes meet it.
+    /// The outline at which routes meet it.
     pub outline: Outline,
     /// The innermost cluster it stands in: a place in [`Plan::clusters`].
     pub cluster: Option<usize>,
@@ -40,9 +40,9 @@ pub struct Vertex {
 /// An edge to route. Parallel edges and self loops are allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
-    /// Where it begins: a place in [`Plan::vertices`].
+    /// The vertex it begins at: a place in [`Plan::vertices`].
     pub from: usize,
-    /// Where it ends.
+    /// The vertex it ends at: a place in [`Plan::vertices`].
     pub to: usize,
     /// The size of the widest label it ever shows, if any.
     pub label: Option<Size>,
@@ -57,7 +57,7 @@ pub struct Cluster {
     pub title: Size,
 }
 
-/// What to lay out. The order of vertices and links is the order of names, and part of the input: the same plan
+/// The input of an engine. The order of vertices and links is the order of names, and part of the input: the same plan
 /// gives the same layout on every machine. Links come publish edges first, then subscribe edges.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
@@ -69,7 +69,7 @@ pub struct Plan {
     pub clusters: Vec<Cluster>,
 }
 
-/// Which way the edges run.
+/// The direction in which the edges run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Orientation {
     /// From left to right.
@@ -88,7 +88,7 @@ impl Orientation {
     }
 }
 
-/// What the caller wants of a layout.
+/// The wishes of the caller for a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayoutOptions {
     /// The page to fill, in pixels: its aspect steers packing and the choice of orientation.
@@ -101,9 +101,9 @@ pub struct LayoutOptions {
 /// controls on the line. It runs from the outline of `from` to the outline of `to`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Route {
-    /// Where it begins.
+    /// Its start point.
     pub start: Point,
-    /// The pieces.
+    /// The cubic pieces `(control, control, end)`.
     pub curves: Vec<[Point; 3]>,
     /// The middle of its label, if it has one and there was room.
     pub label: Option<Point>,
@@ -112,7 +112,7 @@ pub struct Route {
 /// Everything placed; the top left corner of the whole is (0, 0).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// Which way the edges run.
+    /// The direction in which the edges run.
     pub orientation: Orientation,
     /// The size of the whole, margins excluded.
     pub size: Size,
@@ -122,20 +122,20 @@ pub struct Layout {
     pub routes: Vec<Route>,
     /// A box per cluster: nested as their parents say, disjoint otherwise.
     pub clusters: Vec<Rect>,
-    /// What the user should know, such as a cruder fallback; lower case, no period.
+    /// Remarks for the user, such as a cruder fallback; lower case, no period.
     pub remarks: Vec<String>,
 }
 
-/// A way of laying out.
+/// A layout engine.
 pub trait Engine {
     /// Places every box and routes every edge.
     ///
     /// # Errors
-    /// Where the engine cannot do this plan; the caller may then take another.
+    /// A plan that the engine cannot do; the caller may then take another.
     fn lay_out(&self, plan: &Plan, options: &LayoutOptions) -> Result<Layout>;
 }
 
-/// Clusters are nested at most this deep; what is deeper is drawn in its ancestor.
+/// The largest depth of nested clusters; members of deeper ones are drawn in an ancestor.
 const DEEPEST: usize = 16;
 
 /// Every engine: its word on the command line, and itself. The first is the default.
@@ -165,7 +165,7 @@ pub fn engine(word: &str) -> Result<&'static (dyn Engine + Sync)> {
 
 /// The layout of this plan by this engine; where the engine cannot, by the default one with a remark.
 ///
-/// Impossible numbers are taken for zero, links and clusters that name nothing are left out.
+/// Impossible numbers are taken for zero; links and clusters that name no existing vertex or cluster are left out.
 pub fn lay_out(plan: &Plan, options: &LayoutOptions, engine: &dyn Engine) -> Layout {
     let (plan, options) = (plan.sane(), options.sane());
     engine.lay_out(&plan, &options).unwrap_or_else(|error| {
@@ -264,7 +264,7 @@ impl Plan {
 }
 
 impl Layout {
-    /// The layout of nothing at all.
+    /// The layout of an empty plan.
     pub fn empty() -> Self {
         Self {
             orientation: Orientation::LeftRight,
@@ -326,7 +326,7 @@ fn sane_size(size: Size) -> Size {
     Size::new(sane(size.w), sane(size.h))
 }
 
-/// Vertices that belong together, by links or by a shared namespace. Everything in it is told by places in `vertices`;
+/// Vertices that belong together, by links or by a shared namespace. Everything in it is given by places in `vertices`;
 /// cluster `i + 1` is `clusters[i]` of the plan, and 0 is the outside.
 #[derive(Clone, Debug, Default)]
 struct Component {
@@ -346,7 +346,7 @@ struct Component {
     pieces: Vec<usize>,
 }
 
-/// What an item of a layer stands for.
+/// The kind of thing that an item of a layer stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LayerItem {
     /// A vertex of the plan.
@@ -362,13 +362,13 @@ enum LayerItem {
 /// The items of each layer, in order across.
 type LayerRows = Vec<Vec<usize>>;
 
-/// One part cut into layers: what the steps of the layered engine hand on. `along` is the way the edges run, `across`
-/// the way along a layer. Items `0..vertices` are the vertices; bends and borders follow.
+/// One part cut into layers, which the steps of the layered engine hand on. `along` is the direction in which the edges
+/// run, `across` the direction along a layer. Items `0..vertices` are the vertices; bends and borders follow.
 #[derive(Clone, Debug, Default)]
 struct Layers {
-    /// How many items are vertices.
+    /// The number of items that are vertices.
     vertices: usize,
-    /// What each item is.
+    /// The kind of each item.
     kind: Vec<LayerItem>,
     /// The layer of each item.
     rank: Vec<usize>,
@@ -386,7 +386,7 @@ struct Layers {
     span: Vec<(usize, usize)>,
     /// The top and bottom border of each cluster in its first layer; those in its next layers follow, two by two.
     borders: Vec<(usize, usize)>,
-    /// How many layers.
+    /// The number of layers.
     ranks: usize,
 }
 

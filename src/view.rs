@@ -1,4 +1,4 @@
-//! What the picture shows: the full graph filtered, grouped and collapsed; the full graph stays as it is.
+//! The view of a mission: the full graph filtered, grouped and collapsed; the full graph stays as it is.
 
 mod caption;
 mod cluster;
@@ -40,7 +40,7 @@ pub(crate) use nothing::nothing;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 pub use showing::Showing;
 
-/// What the picture shows of a mission, and a notice for everything that it leaves out.
+/// The part of a mission that the picture shows, and a notice for everything that it leaves out.
 pub fn view(mission: &Mission, options: &ViewOptions) -> (View, Notices) {
     let viewed = items::Viewed::new(&mission.elements, options);
     let notices = hidden::notes(&mission.elements, &viewed, options);
@@ -85,7 +85,7 @@ fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) 
     }
 }
 
-/// What a box of the picture stands for.
+/// The kind of thing that a box of the picture stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ItemKind {
     /// A node: drawn as an ellipse.
@@ -111,7 +111,7 @@ impl ItemKind {
 /// A box of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// What it stands for.
+    /// The kind of thing it stands for.
     pub kind: ItemKind,
     /// The full name, unique among items of its word: `/base/driver`, `/go/action_topics`, `/tf`.
     pub name: Arc<str>,
@@ -132,31 +132,31 @@ pub struct Namespace {
     pub name: Arc<str>,
     /// The namespace around it: a place in [`View::namespaces`], smaller than its own.
     pub parent: Option<usize>,
-    /// Where several equal namespaces are drawn as this one, what tells each from the others: `01`, `02`.
+    /// The indices of the equal namespaces drawn as this one: `01`, `02`; empty where it stands for itself alone.
     pub replicas: Vec<Arc<str>>,
 }
 
-/// Whether one of several equal namespaces is there in a window.
+/// The presence of one of several equal namespaces in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Attendance {
-    /// It is not.
+    /// Not there.
     Away,
-    /// It is, from the beginning to the end.
+    /// There from the beginning to the end.
     Here,
-    /// It came.
+    /// Not there at the beginning, there at the end.
     Joined,
-    /// It went.
+    /// There at the beginning, no longer at the end.
     Left,
 }
 
-/// What an arrow of the picture stands for.
+/// The kind of connection that an arrow of the picture stands for.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ArrowKind {
     /// From a node to a topic that it publishes.
     Publish,
     /// From a topic to a node that subscribes it.
     Subscribe,
-    /// From a node to a node, over this topic (mode *nodes only*).
+    /// From a node to a node over this topic (mode *nodes only*).
     Direct(Arc<str>),
     /// From a box to a box, over all topics between them (mode *bundles*).
     Bundle,
@@ -177,18 +177,19 @@ impl ArrowKind {
 /// An arrow of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrow {
-    /// Where it begins: a place in [`View::items`].
+    /// The item it begins at: a place in [`View::items`].
     pub from: u32,
-    /// Where it ends: a place in [`View::items`].
+    /// The item it ends at: a place in [`View::items`].
     pub to: u32,
-    /// What it stands for.
+    /// The kind of connection it stands for.
     pub kind: ArrowKind,
     /// The edges it stands for, sorted.
     pub members: Vec<Element>,
 }
 
 impl Arrow {
-    /// What an arrow from node to node carries in a window: a topic, or how many; `None` for one from or to a topic.
+    /// The topic that an arrow from node to node carries, or the number of topics of a bundle in a window (`3 topics`);
+    /// `None` for one from or to a topic.
     pub fn carries(&self, shown: &Shown) -> Option<String> {
         match &self.kind {
             ArrowKind::Publish | ArrowKind::Subscribe => None,
@@ -198,7 +199,7 @@ impl Arrow {
     }
 }
 
-/// What happened to an item or arrow in a window.
+/// The change of an item or arrow in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Mark {
     /// It began.
@@ -209,9 +210,9 @@ pub enum Mark {
     Faster,
     /// Its rate fell.
     Slower,
-    /// A topic whose messages come from other senders.
+    /// It is a topic whose messages now come from other senders.
     HandedOver,
-    /// A node that ended and came back.
+    /// It is a node that ended and came back.
     Restarted,
     /// It paused.
     Paused,
@@ -232,32 +233,32 @@ impl Mark {
     }
 }
 
-/// An item or arrow in one window.
+/// The look of an item or arrow in one window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
     /// Its place in [`View::items`] or [`View::arrows`].
     pub id: u32,
-    /// How alive; for a ghost, how alive it was.
+    /// Its state; for a ghost, the last one before its end.
     pub state: State,
-    /// How well known.
+    /// The strength of the evidence for it.
     pub degree: Degree,
-    /// What happened to it.
+    /// Its change in the window, if any.
     pub mark: Option<Mark>,
     /// Messages per second in the window, if known (0 for a ghost).
     pub hz: Option<f64>,
-    /// Messages per second from one change of its rate to the next, which this window lies between.
+    /// Messages per second, averaged between the two changes of its rate that this window lies between.
     pub steady_hz: Option<f64>,
     /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
     pub rates: Option<(f64, f64)>,
     /// Whether it is silent or away all through the window, with a beginning and an end in the ledger.
     pub is_paused: bool,
-    /// The headlines that `mark` tells, sorted: places in the ledger.
+    /// The headlines behind `mark`, sorted: places in the ledger.
     pub entries: Vec<EntryId>,
-    /// How many topics a bundle carries; 0 for all else.
+    /// The number of topics a bundle carries; 0 for all else.
     pub topics: usize,
-    /// For how many of several equal namespaces it stands in the window; 0 for all else.
+    /// The number of equal namespaces it stands for in the window; 0 for all else.
     pub each: usize,
-    /// What happened inside a folded namespace or a bundle.
+    /// The number of headlines about what is inside a folded namespace or a bundle; `None` without any.
     pub inside: Option<Box<Counts>>,
     /// Messages in the window, if known.
     pub count: Option<u64>,
@@ -287,7 +288,7 @@ impl Shown {
     }
 }
 
-/// How many headlines of each kind a window tells, for chips and captions. They count the whole graph, whatever is
+/// The number of headlines of each kind in a window, for chips and captions. They count the whole graph, whatever is
 /// drawn as one box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
@@ -315,25 +316,25 @@ pub struct Counts {
     pub values: usize,
 }
 
-/// A headline of the ledger, as a window tells it.
+/// A headline of the ledger in the window that tells it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Headline {
     /// Its place in the ledger.
     pub entry: EntryId,
-    /// What kind of thing happened.
+    /// The kind of event.
     pub kind: Kind,
-    /// To whom or what.
+    /// The element it is about.
     pub what: Element,
-    /// When.
+    /// The time of the event.
     pub time: Stamp,
 }
 
-/// A few words of a caption, and for how many headlines they stand.
+/// A few words of a caption, and the number of headlines they stand for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Phrase {
     /// The words: `/robot1/planner started`.
     pub text: String,
-    /// How many headlines they tell, 1...
+    /// The number of headlines that they tell; 0 for a return.
     pub headlines: usize,
 }
 
@@ -353,16 +354,16 @@ impl Headline {
 /// The items and arrows of a window, ghosts included, each list sorted by id.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SeenWindow {
-    /// Items.
+    /// The items.
     pub items: Vec<Shown>,
-    /// Arrows.
+    /// The arrows.
     pub arrows: Vec<Shown>,
 }
 
 /// One window of the picture; what is seen in it is in [`View::seen`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// The window's index, 0...
+    /// The window's index, counted from 0.
     pub index: usize,
     /// Its time.
     pub span: Span,
@@ -370,18 +371,19 @@ pub struct Frame {
     pub partial: bool,
     /// All messages of the bag in the window, hidden topics included.
     pub messages: u64,
-    /// For each namespace that stands for several, in the order of [`View::namespaces`], which of them are there.
+    /// For each namespace that stands for several, in the order of [`View::namespaces`], the presence of each of them.
     pub rolls: Vec<Vec<Attendance>>,
-    /// What happened in it, in the order of the ledger. Chips, caption, marks and timeline all tell this.
+    /// The headlines in it, in the order of the ledger. Chips, caption, marks and timeline are all made from these.
     pub headlines: Vec<Headline>,
-    /// The headlines counted.
+    /// The number of headlines of each kind.
     pub counts: Counts,
-    /// The headlines in words, the most important first.
+    /// The headlines in words, the most important first, and behind them who is back from a silence or an absence. That
+    /// is no headline again: an entry counts in the window in which it begins.
     pub caption: Vec<Phrase>,
 }
 
 impl Frame {
-    /// A window in which nothing is.
+    /// A window without messages and headlines.
     pub fn empty(index: usize, span: Span) -> Self {
         Self {
             index,
@@ -425,9 +427,9 @@ pub struct View {
     pub namespaces: Vec<Namespace>,
     /// The windows.
     pub frames: Vec<Frame>,
-    /// What is shown of each item, window by window.
+    /// The looks of each item, window by window.
     pub items_shown: Vec<Showing>,
-    /// What is shown of each arrow.
+    /// The looks of each arrow, window by window.
     pub arrows_shown: Vec<Showing>,
     /// Whether two missions are compared, A and B, so that no time, no window and no timeline means anything; of two
     /// windows the first is A alone.
@@ -435,8 +437,8 @@ pub struct View {
 }
 
 impl View {
-    /// Where window `k` begins, as a part of the time from the first window's start to the last's end, 0..=1; 1 after
-    /// the last.
+    /// The beginning of window `k` as a part of the time from the first window's start to the last's end, 0..=1; 1
+    /// after the last.
     pub(crate) fn place_in_time(&self, k: usize) -> f64 {
         let (Some(first), Some(last)) = (self.frames.first(), self.frames.last()) else {
             return 0.0;
@@ -460,7 +462,7 @@ impl View {
             .is_some_and(|frame| !frame.headlines.is_empty())
     }
 
-    /// What is seen in the window at place `k`; nothing past the last one.
+    /// The items and arrows seen in the window at place `k`; none past the last one.
     pub fn seen(&self, k: usize) -> SeenWindow {
         let of = |all: &[Showing]| {
             let there = all.iter().filter_map(|one| one.at(k));
@@ -472,7 +474,7 @@ impl View {
         }
     }
 
-    /// The same windows, in which this is seen.
+    /// The same view with `seen` in its windows, one entry per window, in place of what it showed.
     #[must_use]
     pub fn showing(self, seen: &[SeenWindow]) -> Self {
         let shown = |count: usize, list: fn(&SeenWindow) -> &[Shown]| {
@@ -493,7 +495,7 @@ impl View {
         }
     }
 
-    /// Everything that is ever shown of any item or arrow, in no order.
+    /// Every look of any item or arrow, in no particular order.
     pub fn looks(&self) -> impl Iterator<Item = &Shown> {
         let all = self.items_shown.iter().chain(&self.arrows_shown);
         all.flat_map(Showing::looks)

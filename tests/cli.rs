@@ -63,7 +63,13 @@ fn what_is_no_bag_is_refused_with_a_way_out() {
         "hint: check the spelling",
     );
     refused(dir.path(), &["render", "empty.bag"], 1, "is empty", "hint:");
-    refused(dir.path(), &["render", "text.bag"], 1, "is no bag", "hint:");
+    refused(
+        dir.path(),
+        &["render", "text.bag"],
+        1,
+        "is not a bag",
+        "hint:",
+    );
     refused(dir.path(), &["render", "lfs.bag"], 1, "LFS", "git lfs pull");
     refused(dir.path(), &["render", "old.bag"], 1, "1.2", "hint:");
 }

@@ -87,13 +87,16 @@ fn every_frame_counts_what_the_data_says() {
         let mission: Value = serde_json::from_str(&text("x.json")).unwrap();
         let expected = headlines(&mission);
         let digits = (expected.len() - 1).to_string().len();
+        let over = over(&mission);
         for (index, told) in expected.iter().enumerate() {
             let svg = text(&format!("x{index:0digits$}.svg"));
             let at = format!("{bag} by {period} s, window {index}");
             frame(&svg, told, &at);
+            let is_back = svg.contains(" is back after ") || svg.contains(" are back");
+            assert_eq!(is_back, over.contains(&index), "who is back in {at}");
             chart(&text(&format!("x{index:0digits$}.mmd")), told, &at);
         }
-        settled(&folder.path().join("x"), &expected, &over(&mission), digits);
+        settled(&folder.path().join("x"), &expected, &over, digits);
         terminal(&said, &expected);
         strip(bag, period, &expected, folder.path());
         timeline(
@@ -303,19 +306,24 @@ fn settled(stem: &Path, expected: &[BTreeSet<u64>], over: &BTreeSet<usize>, digi
     }
 }
 
-/// The windows in which something ends that lasted, such as a silence.
+/// The windows in which a headline of an earlier one ends, such as a silence: their captions say who is back.
 fn over(mission: &Value) -> BTreeSet<usize> {
-    let entries = mission["ledger"].as_array().unwrap().iter();
-    let ends: Vec<i64> = entries
-        .filter_map(|entry| entry["until_ns"].as_i64())
-        .collect();
-    let windows = mission["windows"].as_array().unwrap().iter().enumerate();
-    let holds = |window: &Value| {
-        let span = window["start_ns"].as_i64().unwrap()..window["end_ns"].as_i64().unwrap();
-        ends.iter().any(|end| span.contains(end))
+    let windows = mission["windows"].as_array().unwrap();
+    let span = |k: usize| {
+        let nanos = |key: &str| windows[k][key].as_i64().unwrap();
+        nanos("start_ns")..nanos("end_ns")
     };
-    windows
-        .filter(|(_, window)| holds(window))
-        .map(|(k, _)| k)
-        .collect()
+    let ledger = mission["ledger"].as_array().unwrap();
+    let headlines: BTreeSet<u64> = headlines(mission).into_iter().flatten().collect();
+    let lasts = ledger
+        .iter()
+        .filter(|e| headlines.contains(&e["id"].as_u64().unwrap()))
+        .filter_map(|e| Some((e["time_ns"].as_i64()?, e["until_ns"].as_i64()?)));
+    let lasts: Vec<(i64, i64)> = lasts.collect();
+    let ends = |k: &usize| {
+        let is_over =
+            |(time, until): &(i64, i64)| span(*k).contains(until) && *time < span(*k).start;
+        lasts.iter().any(is_over)
+    };
+    (0..windows.len()).filter(ends).collect()
 }

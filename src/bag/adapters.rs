@@ -7,7 +7,7 @@ use crate::bag::model::{Connection, ConnectionId, Message, Sink, Want};
 use crate::base::notice::Notice;
 use crate::base::time::{Span, Stamp};
 
-/// Lets through what lies inside a range, and notes whether anything was lost.
+/// A sink that lets through only messages inside a range, and notes whether anything was lost.
 pub(crate) struct Clip<'a> {
     range: Option<Span>,
     sink: &'a mut dyn Sink,
@@ -16,7 +16,7 @@ pub(crate) struct Clip<'a> {
 }
 
 impl<'a> Clip<'a> {
-    /// Before `sink`; without a range all goes through.
+    /// A clip in front of `sink`; without a range everything passes.
     pub(crate) fn new(range: Option<Span>, sink: &'a mut dyn Sink) -> Self {
         Self {
             range,
@@ -47,7 +47,7 @@ impl Sink for Clip<'_> {
         }
     }
 
-    /// A reader with a range lumps together only what lies inside.
+    /// A reader with a range lumps together only messages inside it.
     fn lump(&mut self, connection: ConnectionId, window: Stamp, count: u64) {
         self.sink.lump(connection, window, count);
     }
@@ -76,11 +76,11 @@ pub(crate) struct Gather {
     runs: Vec<(Vec<Stamp>, Vec<u32>)>,
     touched: Vec<ConnectionId>,
     held: usize,
-    /// Some of it had to be handed over before its time.
+    /// Whether some stamps had to be handed over early.
     spilled: bool,
 }
 
-/// How many stamps are gathered at most: 3 MB.
+/// The most stamps that are gathered: 3 MB.
 const MOST_GATHERED: usize = 1 << 18;
 
 impl Gather {
@@ -103,13 +103,13 @@ impl Gather {
         }
     }
 
-    /// How many messages of a connection are held.
+    /// The number of messages held of a connection.
     pub(crate) fn count(&self, id: ConnectionId) -> u64 {
         let run = self.runs.get(id.0 as usize);
         run.map_or(0, |run| run.0.len() as u64)
     }
 
-    /// Whether exactly these are held of a connection, in any order.
+    /// Whether exactly these stamps are held of a connection, in any order.
     pub(crate) fn holds(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
         let held = self.runs.get(id.0 as usize).map_or(&[][..], |run| &run.0);
         let sorted = |stamps: &[Stamp]| {
@@ -120,7 +120,7 @@ impl Gather {
         held == stamps || held.len() == stamps.len() && sorted(held) == sorted(stamps)
     }
 
-    /// Forgets what is held of a connection; answers how much that was, or nothing if some has been handed over.
+    /// Drops the stamps held of a connection; returns their number, or `None` if some have been handed over.
     pub(crate) fn take(&mut self, id: ConnectionId) -> Option<u64> {
         if self.spilled {
             return None;
@@ -136,7 +136,8 @@ impl Gather {
         Some(held as u64)
     }
 
-    /// Keeps the messages whose time is right, and of those at one time one; answers how many are gone.
+    /// Keeps the messages whose time is right, and one of those at the same time; returns the number of messages
+    /// dropped.
     pub(crate) fn retain(&mut self, is_right: impl Fn(Stamp) -> bool) -> u64 {
         let mut gone = 0;
         for id in &self.touched {
@@ -152,7 +153,7 @@ impl Gather {
         gone as u64
     }
 
-    /// Hands over all that was gathered, by connection.
+    /// Hands over all gathered stamps, by connection.
     pub(crate) fn flush(&mut self, sink: &mut dyn Sink) {
         self.touched.sort_unstable();
         self.spilled = false;
@@ -169,7 +170,7 @@ impl Gather {
     }
 }
 
-/// What one thread found, to be told to a sink on another.
+/// The findings of one thread, to be told to a sink on another.
 #[derive(Default)]
 struct Delivery {
     runs: Vec<(ConnectionId, usize, bool)>,
@@ -208,7 +209,7 @@ impl Delivery {
     }
 }
 
-/// The end of a thread's work on one part, or some of it.
+/// A part of a thread's findings, or the end of its work on one part.
 enum Sent {
     Some(Delivery),
     Done,
@@ -217,7 +218,7 @@ enum Sent {
 struct BatchSender {
     batch: Delivery,
     to: SyncSender<Sent>,
-    /// Nobody listens any more.
+    /// Whether the receiver is gone.
     deaf: bool,
 }
 
@@ -267,7 +268,7 @@ impl Sink for BatchSender {
     }
 }
 
-/// How many chunks are one part: handing over to another thread costs more than reading a small index.
+/// The number of chunks in one part: handing over to another thread costs more than reading a small index.
 pub(crate) const GROUP: usize = 16;
 
 /// Does `work` on the parts `0..count` on `threads` threads and tells `sink` what they find, in the order of the
@@ -306,7 +307,7 @@ pub(crate) fn in_order(
     });
 }
 
-/// Every `step`th part from `first` on.
+/// Works on every `step`th part from `first` on.
 fn work_on(
     first: usize,
     count: usize,

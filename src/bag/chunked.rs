@@ -1,7 +1,7 @@
 //! Bags made of chunks, ROS 1 and MCAP alike: one driver over two grammars of records.
 //!
-//! A [`Grammar`] says what stands in a bag and what its tail promises. The driver reads a file by the index behind each
-//! chunk, or record by record from the front where that is missing; a pipe only so.
+//! A [`Grammar`] parses the records of a bag and its tail. The driver reads a file by the index behind each chunk, or
+//! record by record from the front where that is missing; a pipe only so.
 
 mod check;
 mod chunk;
@@ -31,20 +31,20 @@ pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slic
 pub(crate) use plan::{Chunk, ChunkPlan, MOST_CHUNKS, Unindexed, Used};
 pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass};
 
-/// What tells one format of chunked bags from another. Its values remember what one description says of the next.
+/// The parser for one format of chunked bags. A value keeps what one description says about later ones.
 pub(crate) trait Grammar: Default + Send + 'static {
-    /// The format's word in JSON.
+    /// The format's name in JSON.
     const NAME: &'static str;
-    /// Whether the tail does not say where the index of a chunk lies.
+    /// Whether the tail lacks the place of a chunk's index.
     const INDEX_IS_GUESSED: bool;
-    /// Whether a bag ends in a record of its own.
+    /// Whether a bag ends in a special last record.
     const HAS_END: bool;
-    /// What stands behind that record.
+    /// The bytes behind that record.
     const CLOSING: &'static [u8];
-    /// What the head of a description says.
+    /// The head of a description record.
     type Description;
 
-    /// Refuses what is not of this format after all, from its first bytes.
+    /// Refuses input that turns out not to be of this format, from its first bytes.
     fn accept(path: &Path, head: &[u8]) -> Result<()>;
 
     /// Goes to the first record.
@@ -53,8 +53,8 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// Takes the head of the next record.
     fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Self::Description>, NoRecord>;
 
-    /// The connection that a description announces, with the bag's number for it; `None` if it announces none, or one
-    /// that is known.
+    /// The connection that a description announces, with the bag's number for it; `None` if there is none, or a known
+    /// one.
     fn describe(
         &mut self,
         what: &Self::Description,
@@ -74,10 +74,10 @@ pub(crate) trait Grammar: Default + Send + 'static {
     /// Reads the tail.
     fn plan(source: &FileSource) -> std::io::Result<Result<ChunkPlan, Unindexed>>;
 
-    /// Stored facts worth telling, from the first bytes.
+    /// Stored facts worth showing, from the first bytes.
     fn facts(head: &[u8]) -> Vec<(String, String)>;
 
-    /// Tells `sink` all that somebody else's reader finds.
+    /// Tells `sink` everything that an independent reader finds.
     fn verify(
         source: &FileSource,
         plan: &Result<ChunkPlan, Unindexed>,
@@ -85,17 +85,17 @@ pub(crate) trait Grammar: Default + Send + 'static {
     ) -> SecondReading;
 }
 
-/// What a second reader did.
+/// The result of the second, independent reader.
 #[derive(Default)]
 pub(crate) struct SecondReading {
     pub(crate) compression: BTreeSet<Compression>,
-    /// Why it did not get to the end.
+    /// The reason why it did not get to the end, if so.
     pub(crate) stopped: Option<String>,
-    /// It told nothing at all.
+    /// Whether it told nothing at all.
     pub(crate) refused: bool,
 }
 
-/// A bag in a file, with its tail if that can be relied on.
+/// A bag in a file, with its tail if that is reliable.
 struct Indexed<G> {
     source: FileSource,
     plan: Result<ChunkPlan, Unindexed>,
@@ -112,7 +112,7 @@ struct Piped<G> {
     grammar: PhantomData<fn() -> G>,
 }
 
-/// How many first bytes say whether a bag is of this format after all.
+/// The number of first bytes that tell whether a bag is of this format.
 const HEAD: usize = 32;
 
 /// Opens a bag of this grammar.
@@ -225,7 +225,8 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    /// Counts chunks as a whole where that is asked for and enough; answers the others, and how the bag is read then.
+    /// Counts chunks as a whole where that is asked for and enough; returns the other chunks, and the way the bag is
+    /// read then.
     fn in_lumps<'p>(
         &self,
         plan: &ChunkPlan,
@@ -268,8 +269,8 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    /// Everything, by somebody else's reader; where that refuses, our own way from the front is the next best: it looks
-    /// at no index.
+    /// Reads everything with the independent reader; where that refuses, reads from the front with ours, which uses no
+    /// index.
     fn by_the_second_reader(&self, sink: &mut Clip<'_>) -> Report {
         let verified = G::verify(&self.source, &self.plan, sink);
         let Some(why) = verified.stopped else {
@@ -306,14 +307,14 @@ impl<G: Grammar> Indexed<G> {
     }
 }
 
-/// Where the indexes of these chunks lie, as far as they are read whole.
+/// The places of the indexes of these chunks, of those that are read whole.
 fn indexes(chunks: &[&Chunk]) -> Vec<Range<u64>> {
     let ranges = chunks.iter().map(|chunk| chunk.index.clone());
     let is_held = |r: &Range<u64>| r.end - r.start <= LONGEST_INDEX;
     ranges.filter(is_held).collect()
 }
 
-/// What every report begins with.
+/// A report with the values common to all ways of reading.
 fn report<G: Grammar>(name: String, tier: Tier, compression: &BTreeSet<Compression>) -> Report {
     Report {
         name,
@@ -345,8 +346,8 @@ impl<G: Grammar> Reader for Piped<G> {
     }
 }
 
-/// How many threads pay for `chunks` chunks of which the longest index takes `index` bytes: the reads wait for the
-/// disk, and a long index takes memory.
+/// The number of threads worth using for `chunks` chunks of which the longest index takes `index` bytes: the reads wait
+/// for the disk, and a long index takes memory.
 fn threads(chunks: usize, index: u64) -> usize {
     if index > LONGEST_INDEX / 16 {
         return 1;

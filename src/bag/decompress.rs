@@ -1,4 +1,4 @@
-//! The compressions of bags as streams: what comes out is read piece by piece, so no number in a file sizes memory.
+//! The compressions of bags as streams: the output is read piece by piece, so no number in a file sizes memory.
 
 use std::io::{self, Read};
 use std::ops::Range;
@@ -21,7 +21,7 @@ pub(crate) enum Compression {
 }
 
 impl Compression {
-    /// The compression that a bag calls `name`; `None` for one that we do not know.
+    /// The compression that a bag calls `name`; `None` for an unknown one.
     pub(crate) fn named(name: &[u8]) -> Option<Self> {
         Some(match name {
             b"" | b"none" => Self::None,
@@ -32,7 +32,7 @@ impl Compression {
         })
     }
 
-    /// Its word in JSON.
+    /// The compression's name in JSON.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -42,7 +42,8 @@ impl Compression {
         }
     }
 
-    /// The work of unpacking a byte, by the fastest. bzip2 takes that many times as long, even for zeros.
+    /// The cost of unpacking a byte, in units of the fastest compression's. bzip2 takes that many times as long, even
+    /// for zeros.
     fn cost(self) -> u64 {
         match self {
             Self::Bz2 => 16,
@@ -50,10 +51,10 @@ impl Compression {
         }
     }
 
-    /// A reader of what `from` holds compressed. Memory: at most 4 MiB per LZ4 block, 8 MiB per Zstandard window.
+    /// A reader of the unpacked content of `from`. Memory: at most 4 MiB per LZ4 block, 8 MiB per Zstandard window.
     ///
     /// # Errors
-    /// Where a decompressor cannot be set up. Damage in the data shows when it is read.
+    /// Fails where a decompressor cannot be set up. Damage in the data shows when it is read.
     pub(crate) fn reader<'a>(
         self,
         from: impl Read + Send + 'a,
@@ -71,8 +72,8 @@ impl Compression {
     }
 }
 
-/// How much may be unpacked of one bag, wherever it is unpacked, so that a small file cannot keep a reader busy for
-/// hours. Shared by threads; which of them first meets the end of a bomb's allowance is chance.
+/// The amount that may be unpacked of one bag, in all places together, so that a small file cannot keep a reader busy
+/// for hours. Shared by threads; which of them first meets the end of a bomb's allowance is chance.
 #[derive(Debug, Default)]
 pub(crate) struct Allowance {
     packed: AtomicU64,
@@ -80,7 +81,7 @@ pub(crate) struct Allowance {
 }
 
 impl Allowance {
-    /// A reader of what `from` holds compressed, which fails once the allowance is spent.
+    /// A reader of the unpacked content of `from`, which fails once the allowance is spent.
     ///
     /// # Errors
     /// As [`Compression::reader`].
@@ -118,11 +119,11 @@ impl Allowance {
     }
 }
 
-/// Counts what is read.
+/// A reader that counts the bytes it reads.
 struct Counted<R> {
     from: R,
     allowance: Arc<Allowance>,
-    /// What a byte costs of the allowance; `None` for packed bytes, which add to it.
+    /// The cost of a byte for the allowance; `None` for packed bytes, which add to it.
     spends: Option<u64>,
 }
 
@@ -137,7 +138,7 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-/// What is said of a bag that spent its [`Allowance`].
+/// The error for a bag that spent its [`Allowance`].
 const UNFOLDS: &str = "the bag unfolds to far more than its size";
 
 /// The largest look-back that a Zstandard frame may ask for, as a power of two: 8 MiB, what every decoder must offer.
@@ -191,11 +192,11 @@ fn lz4<'a>(mut from: impl Read + Send + 'a) -> io::Result<Box<dyn Read + Send + 
 /// The independent blocks of one LZ4 frame.
 struct Blocks<R> {
     from: R,
-    /// Whether each block is followed by one, which nobody looks at.
+    /// Whether each block is followed by a checksum, which is ignored.
     checksums: bool,
     packed: Vec<u8>,
     plain: Vec<u8>,
-    /// What of `plain` has not been handed out.
+    /// The part of `plain` that has not been handed out.
     ready: Range<usize>,
     ended: bool,
 }

@@ -5,18 +5,20 @@ use super::model::{OpenOptions, Reader, Report, Sink};
 use crate::base::error::Result;
 use crate::base::time::Span;
 
-/// So many of a list stay open until they have been read; each of them may be a folder that keeps as many.
+/// The number of bags of a list that stay open until they have been read; each of them may be a folder that keeps as
+/// many.
 const STAY_OPEN: usize = 8;
 
-/// A bag that is opened when something is asked of it.
+/// A bag that is opened when it is needed.
 struct Deferred {
     input: Input,
     options: OpenOptions,
-    /// If it has been opened already.
+    /// The open reader, if there is one.
     open: Option<Box<dyn Reader>>,
 }
 
-/// The readers of `inputs`, in order; each has been looked into, so that what is no bag is told at once.
+/// The readers of `inputs`, in order; each has been opened once, so that an input that is not a bag is reported at
+/// once.
 pub(crate) fn open_each(
     inputs: impl IntoIterator<Item = Input>,
     options: &OpenOptions,

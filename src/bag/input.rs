@@ -1,4 +1,4 @@
-//! Where a bag lies, and its first bytes, which tell its format.
+//! The place of a bag, and its first bytes, which tell its format.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -21,7 +21,7 @@ pub enum Input {
     Stdin,
 }
 
-/// How URLs begin that are no paths.
+/// The beginnings of URLs, by which they are told apart from paths.
 const SCHEMES: &[&str] = &[
     "s3://", "s3a://", "gs://", "az://", "abfs://", "abfss://", "azure://", "https://", "http://",
 ];
@@ -47,7 +47,7 @@ impl Input {
         }
     }
 
-    /// The bag's own name, no path.
+    /// The bag's own name, without a path.
     pub fn name(&self) -> String {
         match self {
             Self::Path(path) => file_name(path),
@@ -69,7 +69,8 @@ pub(crate) fn told_url(url: &str) -> String {
     format!("{scheme}://{host}/{path}")
 }
 
-/// The bytes that an input takes on disk, a folder's own files together; `None` for pipes and what cannot be looked at.
+/// The bytes that an input takes on disk, a folder's own files together; `None` for pipes and inputs whose
+/// size is not known.
 pub fn size_on_disk(input: &Input) -> Option<u64> {
     let Input::Path(path) = input else {
         return None;
@@ -86,21 +87,21 @@ pub fn size_on_disk(input: &Input) -> Option<u64> {
 
 /// A row of `FORMATS`.
 pub struct FormatRow {
-    /// Its word in JSON.
+    /// The format's name in JSON.
     pub name: &'static str,
-    /// What it is, for people.
+    /// A description for people.
     pub what: &'static str,
-    /// The names that such bags usually end in. Only told, never asked: the first bytes decide.
+    /// The names that such bags usually end in. For information only: the first bytes decide.
     pub extensions: &'static [&'static str],
-    /// What it is read from.
+    /// The kind of input that it is read from.
     pub(crate) medium: Medium,
-    /// Whether a bag begins so.
+    /// Whether the first bytes of an input are those of such a bag.
     pub(crate) sniff: fn(&BagPlace, &[u8]) -> bool,
     /// Makes a reader.
     pub(crate) open: fn(BagPlace, &OpenOptions) -> Result<Box<dyn Reader>>,
 }
 
-/// What a format is read from.
+/// The kind of input that a format is read from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Medium {
     /// A file, or a pipe.
@@ -113,7 +114,7 @@ pub(crate) enum Medium {
     Wrapping,
 }
 
-/// Where a bag lies.
+/// The place of a bag, opened.
 pub(crate) enum BagPlace {
     /// A folder.
     Folder(PathBuf),
@@ -123,10 +124,10 @@ pub(crate) enum BagPlace {
     Pipe(String, ByteStream<'static>),
 }
 
-/// How many first bytes tell a format.
+/// The number of first bytes that tell a format.
 pub(crate) const HEAD: usize = 512;
 
-/// Opens what lies there, without reading more than its kind.
+/// Opens an input, without reading more than its kind.
 pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     let path = match input {
         Input::Path(path) => path,
@@ -147,7 +148,7 @@ pub(crate) fn place(input: &Input) -> Result<BagPlace> {
     Ok(BagPlace::Pipe(file_name(path), ByteStream::of_reader(pipe)))
 }
 
-/// The first bytes; none for a folder.
+/// The first bytes; empty for a folder.
 pub(crate) fn head(place: &mut BagPlace) -> Result<Vec<u8>> {
     match place {
         BagPlace::Folder(_) => Ok(Vec::new()),

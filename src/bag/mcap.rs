@@ -34,7 +34,7 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     open: chunked::open::<Mcap>,
 };
 
-/// Remembers schemas, which channels refer to.
+/// The schemas seen, which channels refer to.
 #[derive(Default)]
 struct Mcap {
     schemas: HashMap<u16, SchemaRecord>,
@@ -119,7 +119,7 @@ impl Grammar for Mcap {
         summary::read(source)
     }
 
-    /// What the file's header says of itself.
+    /// The facts in the file's header.
     fn facts(head: &[u8]) -> Vec<(String, String)> {
         let mut cursor = FieldCursor(head.get(MAGIC.len()..).unwrap_or_default());
         let (kind, len) = (cursor.u8(), cursor.u64().unwrap_or(0));

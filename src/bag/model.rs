@@ -1,4 +1,4 @@
-//! What a bag holds and how it is told: connections, messages, the sink that takes them in, the reader that feeds it.
+//! The data model of bags: connections, messages, the sink that takes them in, the reader that feeds it.
 
 use std::io;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Period, Span, Stamp};
 
-/// How a payload is written.
+/// The serialisation of a payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// ROS 1 serialisation: little-endian, packed.
@@ -19,14 +19,14 @@ pub enum Encoding {
     Other(String),
 }
 
-/// The place of a connection among those that one reader has announced: 0.., no holes.
+/// The place of a connection among those that one reader has announced, counted from 0 without gaps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConnectionId(pub u32);
 
 /// A publisher's connection (ROS 1), a channel (MCAP) or a topic row (sqlite3): one source of messages.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
-    /// Its place among the reader's connections.
+    /// The place among the reader's connections.
     pub id: ConnectionId,
     /// The topic as recorded.
     pub topic: TopicName,
@@ -42,11 +42,11 @@ pub struct Connection {
     pub latching: bool,
     /// `offered_qos_profiles` as recorded (ROS 2): YAML text or YAML converted to JSON text; empty means none.
     pub qos: Option<Arc<str>>,
-    /// How its payloads are written.
+    /// The serialisation of its payloads.
     pub encoding: Encoding,
 }
 
-/// What a sink wants to see of a connection's payloads. Stamps come in any case.
+/// The part of a connection's payloads that a sink wants. Stamps come in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Want {
     /// Nothing: the reader stays at its index.
@@ -54,7 +54,7 @@ pub enum Want {
     Stamps,
     /// The size of each payload, even if that means reading more than the index.
     Sizes,
-    /// The first bytes of each payload, at least this many if it is that long; more may come.
+    /// The first bytes of each payload: at least this many, or all of a shorter payload; more may come.
     Head(usize),
     /// Each payload whole.
     Payload,
@@ -63,9 +63,9 @@ pub enum Want {
 /// One wanted message.
 #[derive(Clone, Copy, Debug)]
 pub struct Message<'a> {
-    /// Its connection, announced before.
+    /// The connection, announced before.
     pub connection: ConnectionId,
-    /// When the recorder received it.
+    /// The time at which the recorder received it.
     pub time: Stamp,
     /// The payload, or its head ([`Want::Head`]).
     pub data: &'a [u8],
@@ -73,37 +73,37 @@ pub struct Message<'a> {
     pub size: u32,
 }
 
-/// What takes in what a reader finds.
+/// The receiver of everything that a reader finds.
 ///
 /// Order: a connection is announced before its stamps and messages, otherwise anything may come in any order.
 /// Every message of the bag (inside the range asked for) is stamped exactly once through [`Sink::stamps`]; a wanted
 /// one comes through [`Sink::message`] as well, before or after.
 pub trait Sink {
-    /// A new connection; answers what is wanted of it.
+    /// Takes a new connection; returns the wanted part of its payloads.
     fn connection(&mut self, connection: &Connection) -> Want;
 
-    /// Log times of messages of one connection, in file order. `sizes` holds each payload's bytes where the reader
-    /// knows them (always if wanted); then it is as long as `stamps`.
+    /// Takes log times of messages of one connection, in file order. `sizes` holds each payload's bytes where the
+    /// reader knows them (always if wanted); then it is as long as `stamps`.
     fn stamps(&mut self, connection: ConnectionId, stamps: &[Stamp], sizes: Option<&[u32]>);
 
-    /// Messages of one connection of which no more is known than that they lie in the window that begins at `window`:
-    /// instead of their stamps, and only where [`OpenOptions::lumps`] asks for it.
+    /// Takes the number of messages of one connection in the window that begins at `window`, of which nothing more is
+    /// known: instead of their stamps, and only where [`OpenOptions::lumps`] asks for it.
     fn lump(&mut self, _connection: ConnectionId, _window: Stamp, _count: u64) {}
 
-    /// A wanted message.
+    /// Takes a wanted message.
     fn message(&mut self, message: Message<'_>);
 
-    /// Something worth saying.
+    /// Takes a notice for the user.
     fn notice(&mut self, notice: Notice);
 
-    /// How far the reader is, in bytes of `total` (0 where the size is not known).
+    /// Takes the progress of the reader, in bytes of `total` (0 where the size is not known).
     fn progress(&mut self, _done: u64, _total: u64) {}
 }
 
 /// The way a bag was read; `reading.md` calls them tiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Tier {
-    /// By its index: no payload is read that is not wanted.
+    /// By its index: only wanted payloads are read.
     Index,
     /// By its tail, which counts the messages of each chunk; by the index only where a chunk lies in several windows.
     Chunks,
@@ -114,7 +114,7 @@ pub enum Tier {
 }
 
 impl Tier {
-    /// Its word in JSON.
+    /// The tier's name in JSON.
     pub fn word(self) -> &'static str {
         match self {
             Self::Index => "index",
@@ -128,18 +128,18 @@ impl Tier {
 /// The fact that is the version of an object in a store.
 pub(crate) const ETAG: &str = "etag";
 
-/// What a reader says about its bag when it is done.
+/// The report of a reader about its bag when it is done.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {
-    /// The file's or folder's own name, no path.
+    /// The file's or folder's own name, without a path.
     pub name: String,
-    /// The format's word in JSON: `rosbag1`, `sqlite3`, `mcap`, `evolution`.
+    /// The format's name in JSON: `rosbag1`, `sqlite3`, `mcap`, `evolution`.
     pub format: String,
     /// Every compression seen, sorted: `none`, `bz2`, `lz4`, `zstd`.
     pub compression: Vec<String>,
-    /// How it was read.
+    /// The way it was read.
     pub tier: Tier,
-    /// Why not by its index, if so.
+    /// The reason why it was not read by its index, if so.
     pub tier_reason: Option<String>,
     /// Whether nothing was lost.
     pub complete: bool,
@@ -147,11 +147,11 @@ pub struct Report {
     pub bytes_read: u64,
     /// The size of the bag on disk in bytes; 0 where not known.
     pub file_bytes: u64,
-    /// Stored facts worth telling in `info`: `ros_distro`, `library`, `storage`, …
+    /// Stored facts to show in `info`: `ros_distro`, `library`, `storage`, …
     pub facts: Vec<(String, String)>,
 }
 
-/// A bag, open.
+/// An open bag.
 pub trait Reader: Send {
     /// The time covered: `[first log time, last log time + 1 ns)`, if the tail or an index tells it without
     /// reading the bag. `None` when only reading will tell. A big bag with a lying tail may hold stamps outside.
@@ -161,32 +161,33 @@ pub trait Reader: Send {
     /// stamped, and parts of the bag outside are not read where the index allows; connections are announced anyway.
     ///
     /// # Errors
-    /// Only where nothing at all can be read. Whatever is lost on the way is a notice, and `Report::complete` false.
+    /// Fails only where nothing at all can be read. Anything lost on the way is a notice, and `Report::complete` is
+    /// false.
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report>;
 }
 
-/// How to open a bag.
+/// Options for opening a bag.
 #[derive(Clone, Debug, Default)]
 pub struct OpenOptions {
     /// Read everything by the second, independent reader instead (tier `verify`).
     pub verify: bool,
-    /// Whether to count by chunks where that is enough.
+    /// The way to count by chunks where that is enough; `None` to count message by message.
     pub lumps: Option<Lumps>,
 }
 
-/// How to count a chunk as a whole if all of it lies in one window: nothing of it is read then.
+/// The way to count a chunk as a whole if all of it lies in one window: nothing of it is read then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lumps {
-    /// A moment at which a window begins.
+    /// The start of one of the windows.
     pub origin: Stamp,
     /// The length of all windows.
     pub period: Period,
-    /// Only in bags of more chunks than this, 0...
+    /// Only bags of more chunks than this are counted so, ≥ 0.
     pub above: usize,
 }
 
 impl Lumps {
-    /// When the window begins in which `at` lies; held at the ends of the range.
+    /// The start of the window in which `at` lies; held at the ends of the range.
     pub fn window(&self, at: Stamp) -> Stamp {
         let (origin, period) = (i128::from(self.origin.0), i128::from(self.period.nanos()));
         let start = (i128::from(at.0) - origin).div_euclid(period) * period + origin;
@@ -197,7 +198,7 @@ impl Lumps {
 /// The longest payload, or connection record, that is held in memory, in bytes.
 pub(crate) const MOST_PAYLOAD: usize = 16 << 20;
 
-/// Tells `sink` that something was lost because the system refused.
+/// Tells `sink` that data was lost because of an error of the system.
 pub(crate) fn lost(sink: &mut dyn Sink, what: &str, why: &io::Error) {
     sink.notice(Notice::new(NoticeKind::Damaged, format!("{what}: {why}")));
 }

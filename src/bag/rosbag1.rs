@@ -31,14 +31,14 @@ pub(crate) const FORMAT: FormatRow = FormatRow {
     open: chunked::open::<Rosbag1>,
 };
 
-/// Remembers the definitions seen, of which equal ones share one text.
+/// The definitions seen, of which equal ones share one text.
 #[derive(Default)]
 struct Rosbag1 {
     definitions: HashSet<Arc<str>>,
     held: usize,
 }
 
-/// What the head of a connection record says.
+/// The head of a connection record.
 struct Described {
     raw: u32,
     topic: Vec<u8>,
@@ -51,7 +51,7 @@ impl Grammar for Rosbag1 {
     const CLOSING: &'static [u8] = b"";
     type Description = Described;
 
-    /// Refuses what is older than version 2.
+    /// Refuses bags older than version 2.
     fn accept(path: &Path, head: &[u8]) -> Result<()> {
         if head.starts_with(b"#ROSBAG V2.") {
             return Ok(());

@@ -19,7 +19,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 use metadata::{Metadata, is_storage};
 
-/// Folders.
+/// The format of rosbag2 folders.
 pub(crate) const FORMAT: FormatRow = FormatRow {
     name: "rosbag2",
     what: "ROS 2 recording: a folder with metadata.yaml or storage files",
@@ -44,7 +44,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     let BagPlace::Folder(path) = place else {
         return Err(Error::Unsupported {
             path: PathBuf::new(),
-            what: "it is no folder".to_owned(),
+            what: "it is not a folder".to_owned(),
             hint: String::new(),
         });
     };
@@ -98,7 +98,7 @@ fn holds_storage(folder: &Path) -> bool {
     !(files.is_empty() && links.is_empty())
 }
 
-/// The storage files in a folder, and what looks like one but is a link out of it.
+/// The storage files in a folder, and links out of it that look like some.
 fn storage_and_links(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let Ok(entries) = folder.read_dir() else {
         return (Vec::new(), Vec::new());
@@ -113,7 +113,7 @@ impl BagFolder {
         self.notices.push(Notice::new(kind, text));
     }
 
-    /// The files to read: those that the metadata names; if none of them is there, all that look like it.
+    /// The files to read: those that the metadata names; if none of them is there, all that look like storage files.
     fn files(&mut self, path: &Path) -> Vec<PathBuf> {
         let named = std::mem::take(&mut self.metadata.files);
         let mut found = Vec::new();
@@ -153,7 +153,7 @@ impl BagFolder {
         found
     }
 
-    /// The error for a folder of which no file is there.
+    /// The error for a folder without any of its files.
     fn nothing(&self, path: &Path) -> Error {
         let mut said: Vec<String> = self.notices.iter().map(|n| n.text.clone()).collect();
         if said.is_empty() {
@@ -189,7 +189,7 @@ impl Reader for BagFolder {
                 end: w.end.max(span.end),
             }));
         }
-        // A part without an answer is empty or must be read; either way the rest is no answer if it is all we have.
+        // A part without a span is empty or must be read; either way the spans of the other parts alone are not enough.
         Ok(whole.filter(|_| parts == self.parts.len()))
     }
 
@@ -249,10 +249,10 @@ impl BagFolder {
     }
 }
 
-/// Connections that are one across the parts of a recording.
+/// The identity of a connection across the parts of a recording: those with the same key are one.
 type ConnectionKey = (Arc<str>, Arc<str>, Option<NodeName>);
 
-/// Gives the parts' connections ids that are the same in all parts.
+/// A sink that gives the parts' connections ids that are the same in all parts.
 struct PartsAdapter<'a> {
     metadata: &'a Metadata,
     sink: &'a mut dyn Sink,
@@ -283,7 +283,7 @@ impl<'a> PartsAdapter<'a> {
         (id, want)
     }
 
-    /// Announces the topics that only the metadata names: nothing was said on them.
+    /// Announces the topics that only the metadata names: they have no messages.
     fn silent(&mut self) {
         for (name, topic) in &self.metadata.topics {
             if self.known.keys().any(|(known, ..)| **known == **name) {

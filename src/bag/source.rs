@@ -1,4 +1,4 @@
-//! Where bytes come from: files and objects read at any place, and streams that can be peeked into and skipped through.
+//! Sources of bytes: files and objects read at any place, and streams that can be peeked into and skipped through.
 
 use std::fmt::Debug;
 use std::fs::File;
@@ -10,18 +10,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
-/// What gives bytes at any place, to several threads at once.
+/// A source of bytes that several threads read at any place at once.
 pub(crate) trait Ranges: Debug + Send + Sync {
-    /// Reads some of the bytes from `at` on; none only at the end.
+    /// Reads some of the bytes from `at` on; 0 bytes only at the end.
     fn read_once(&self, at: u64, into: &mut [u8]) -> io::Result<usize>;
 
-    /// These will be asked for next: what waits for each answer asks for all of them at once.
+    /// Announces the ranges that will be asked for next, so that a source that waits for each answer can ask for all of
+    /// them at once.
     fn expect(&self, _ranges: &[Range<u64>]) -> io::Result<()> {
         Ok(())
     }
 }
 
-/// A regular file, or an object somewhere else, that several threads read at any place at once. Counts the bytes it
+/// A regular file, or an object somewhere else, that several threads read at any place at once. It counts the bytes it
 /// hands out.
 #[derive(Debug)]
 pub(crate) struct FileSource {
@@ -35,14 +36,14 @@ impl FileSource {
     /// Opens the file at `path` for reading.
     ///
     /// # Errors
-    /// The system's refusal.
+    /// An error of the system.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(Error::io("read", path))?;
         let len = file.metadata().map_err(Error::io("read", path))?.len();
         Ok(Self::of(path, len, file))
     }
 
-    /// The `len` bytes that `from` gives, called `path`.
+    /// A source of the `len` bytes that `from` gives, called `path`.
     pub(crate) fn of(path: &Path, len: u64, from: impl Ranges + 'static) -> Self {
         Self {
             path: path.to_owned(),
@@ -55,17 +56,17 @@ impl FileSource {
     /// As [`Ranges::expect`].
     ///
     /// # Errors
-    /// The system's refusal.
+    /// An error of the system.
     pub(crate) fn expect(&self, ranges: &[Range<u64>]) -> io::Result<()> {
         self.from.expect(ranges)
     }
 
-    /// Its path, as it was opened.
+    /// The path, as it was opened.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Its size in bytes when it was opened.
+    /// The size in bytes when it was opened.
     pub(crate) fn len(&self) -> u64 {
         self.len
     }
@@ -75,10 +76,10 @@ impl FileSource {
         self.read.load(Ordering::Relaxed)
     }
 
-    /// Reads from byte `at` on until `into` is full or the file ends; answers how many bytes came.
+    /// Reads from byte `at` on until `into` is full or the file ends; returns the number of bytes read.
     ///
     /// # Errors
-    /// The system's refusal.
+    /// An error of the system.
     pub(crate) fn read_at(&self, at: u64, into: &mut [u8]) -> io::Result<usize> {
         let mut filled = 0;
         while filled < into.len() {
@@ -111,7 +112,7 @@ fn read_once(file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, into, at)
 }
 
-/// Elsewhere the place is shared, so one thread at a time.
+/// Reads at a place on systems where threads share the position, so one thread at a time.
 #[cfg(not(any(unix, windows)))]
 fn read_once(mut file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     use std::io::{Seek as _, SeekFrom};
@@ -121,17 +122,17 @@ fn read_once(mut file: &File, at: u64, into: &mut [u8]) -> io::Result<usize> {
     file.read(into)
 }
 
-/// A folder of ours that is gone when this is dropped.
+/// A temporary folder of ours, removed when this is dropped.
 pub(crate) struct Temporary {
     folder: tempfile::TempDir,
     _left: Leftover,
 }
 
 impl Temporary {
-    /// Makes one where the system keeps such folders.
+    /// Makes one in the system's folder for temporary files.
     ///
     /// # Errors
-    /// The system's refusal.
+    /// An error of the system.
     pub(crate) fn new() -> Result<Self> {
         let mut builder = tempfile::Builder::new();
         // What is copied here may be private where it comes from.
@@ -145,7 +146,7 @@ impl Temporary {
         })
     }
 
-    /// Where it is.
+    /// The path of the folder.
     pub(crate) fn path(&self) -> &Path {
         self.folder.path()
     }
@@ -154,24 +155,24 @@ impl Temporary {
 enum From<'a> {
     /// Part of a file, up to byte `end`.
     File { source: &'a FileSource, end: u64 },
-    /// Anything that can only be read on.
+    /// Any reader that can only be read on.
     Reader(Box<dyn Read + Send + 'a>),
 }
 
-/// Bytes in order, with a look ahead; skipping costs nothing in a file.
+/// A stream of bytes in order, with a look ahead; skipping costs nothing in a file.
 pub(crate) struct ByteStream<'a> {
     from: From<'a>,
-    /// Where `buffer[used]` stands.
+    /// The position of `buffer[used]`.
     at: u64,
     buffer: Vec<u8>,
     used: usize,
-    /// How much is read at a time.
+    /// The number of bytes read at a time.
     step: usize,
 }
 
-/// For reading through.
+/// The step for reading through.
 pub(crate) const FAR: usize = 256 * 1024;
-/// For picking small records here and there.
+/// The step for picking small records here and there.
 pub(crate) const NEAR: usize = 4096;
 
 impl<'a> ByteStream<'a> {
@@ -181,7 +182,7 @@ impl<'a> ByteStream<'a> {
         Self::new(From::File { source, end }, start, step)
     }
 
-    /// All that `reader` gives, counted from 0.
+    /// All bytes of `reader`, counted from 0.
     pub(crate) fn of_reader(reader: impl Read + Send + 'a) -> Self {
         Self::new(From::Reader(Box::new(reader)), 0, FAR)
     }
@@ -196,7 +197,7 @@ impl<'a> ByteStream<'a> {
         }
     }
 
-    /// Where the next byte stands.
+    /// The position of the next byte.
     pub(crate) fn position(&self) -> u64 {
         self.at
     }
@@ -204,7 +205,7 @@ impl<'a> ByteStream<'a> {
     /// The next `n` bytes without taking them; fewer only where the stream ends. `n` must be bounded by the caller.
     ///
     /// # Errors
-    /// The system's refusal, or a decompressor's complaint.
+    /// An error of the system, or of a decompressor.
     pub(crate) fn peek(&mut self, n: usize) -> io::Result<&[u8]> {
         if self.buffer.len() - self.used < n {
             self.fill(n)?;
@@ -213,7 +214,7 @@ impl<'a> ByteStream<'a> {
         Ok(&self.buffer[self.used..end])
     }
 
-    /// How many bytes follow, if that is known without reading on.
+    /// The number of bytes that follow, if known without reading on.
     pub(crate) fn left(&self) -> Option<u64> {
         match self.from {
             From::File { end, .. } => Some(end.saturating_sub(self.at)),
@@ -221,7 +222,7 @@ impl<'a> ByteStream<'a> {
         }
     }
 
-    /// All that has been read ahead and not taken.
+    /// The number of bytes that have been read ahead and not taken.
     fn ahead(&self) -> usize {
         self.buffer.len() - self.used
     }
@@ -258,8 +259,8 @@ impl<'a> ByteStream<'a> {
         self.at += n as u64;
     }
 
-    /// Passes over `n` bytes; answers how many there were, fewer only at the end. Past the end of a file the answer is
-    /// right without reading.
+    /// Passes over `n` bytes; returns their number, fewer only at the end. Past the end of a file the number is right
+    /// without reading.
     ///
     /// # Errors
     /// As [`ByteStream::peek`].

@@ -40,11 +40,11 @@ struct Sqlite3Bag {
     path: PathBuf,
     file_bytes: u64,
     ready: Ready,
-    /// What was wrong when it was opened.
+    /// The problems found when it was opened.
     notices: Vec<Notice>,
     topics: Vec<Connection>,
     ids: HashMap<i64, ConnectionId>,
-    /// Payloads are Zstandard frames, so their lengths are not those of the messages.
+    /// Whether payloads are Zstandard frames, so that their lengths are not those of the messages.
     packed: bool,
     verify: bool,
     facts: Vec<(String, String)>,
@@ -103,7 +103,7 @@ fn tables(ready: &Ready, path: &Path) -> Result<(Db, Vec<String>)> {
     Ok((db, columns))
 }
 
-/// Says so if the file is shorter than its own head has it.
+/// A notice if the file is shorter than its own head states.
 ///
 /// The head: <https://www.sqlite.org/fileformat2.html>, sections 1.3.2 and 1.3.7.
 fn cut(source: &FileSource) -> Option<String> {
@@ -138,7 +138,7 @@ fn broken(path: &Path, why: &Refusal) -> Error {
     }
 }
 
-/// The columns of `table`, which must be a table with real columns of these names.
+/// The columns of `table`; an error unless it is a table with real columns of these names.
 fn need(db: &Db, path: &Path, table: &str, names: &[&str]) -> Result<Vec<String>> {
     let columns = db.columns(table).map_err(|e| broken(path, &e))?;
     if has(&columns, names) {
@@ -148,7 +148,7 @@ fn need(db: &Db, path: &Path, table: &str, names: &[&str]) -> Result<Vec<String>
         path: path.to_owned(),
         offset: 0,
         expected: format!("a table `{table}` with the columns {}", names.join(", ")),
-        hint: "this database is no recording, or the recorder was stopped before it began"
+        hint: "this database is not a recording, or the recorder was stopped before it began"
             .to_owned(),
     })
 }
@@ -197,7 +197,7 @@ impl Sqlite3Bag {
         })
     }
 
-    /// The first stamp in this order that belongs to a topic.
+    /// The first stamp of a message with a known topic, in the order `order`.
     fn end(&self, db: &Db, order: &str) -> Result<Option<Stamp>, Refusal> {
         let sql = format!("SELECT timestamp, topic_id FROM messages ORDER BY timestamp {order}");
         let mut found = None;
@@ -243,7 +243,7 @@ fn definitions(db: &Db) -> Result<BTreeMap<Arc<str>, Arc<str>>, Refusal> {
     Ok(found)
 }
 
-/// What the database says of itself (schema 3 and later).
+/// The facts that the database holds about itself (schema 3 and later).
 fn facts(db: &Db) -> Vec<(String, String)> {
     let columns = db.columns("schema").unwrap_or_default();
     let names = ["schema_version", "ros_distro"];
@@ -264,9 +264,9 @@ fn is_packed(db: &Db) -> bool {
     first.ok().flatten() == Some(true)
 }
 
-/// Below this size in bytes one thread reads all rows.
+/// The size in bytes below which one thread reads all rows.
 const BIG: u64 = 128 << 20;
-/// Parts of a big bag.
+/// The number of parts of a big bag.
 const PARTS: i64 = 64;
 
 impl Sqlite3Bag {
@@ -291,7 +291,7 @@ impl Sqlite3Bag {
     }
 }
 
-/// Has SQLite look for damage in the whole file.
+/// Lets SQLite look for damage in the whole file.
 fn check(db: &Db, sink: &mut dyn Sink) {
     let found = db.first("PRAGMA quick_check(1)", &[], |row| row.text(0));
     let said = found.map_or_else(|e| e.to_string(), Option::unwrap_or_default);

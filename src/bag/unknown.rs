@@ -1,10 +1,10 @@
-//! What a file that is no bag of ours is instead, and what to do about it.
+//! Explanations for files that are not bags, and advice.
 
 use std::path::Path;
 
 use crate::base::error::Error;
 
-/// The error for `path`, which begins with `head` and is no bag.
+/// The error for `path`, which begins with `head` and is not a bag.
 pub(crate) fn explain(path: &Path, head: &[u8], folder: bool) -> Error {
     let (looks_like, hint) = if folder {
         (

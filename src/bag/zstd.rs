@@ -1,4 +1,4 @@
-//! Whole bags compressed by Zstandard (`.db3.zstd`, `.mcap.zstd`): streamed, or unpacked where nobody minds.
+//! Whole bags compressed by Zstandard (`.db3.zstd`, `.mcap.zstd`), streamed or unpacked into a temporary file.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -77,7 +77,7 @@ fn open(place: BagPlace, options: &OpenOptions) -> Result<Box<dyn Reader>> {
     }))
 }
 
-/// Writes what `stream` holds into a file of ours.
+/// Writes the content of `stream` into a temporary file.
 fn unpack(
     stream: &mut ByteStream<'_>,
     to: &Temporary,

@@ -9,7 +9,7 @@ use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, spa
 use super::words::visible;
 
 /// A table being written: the names of its columns, then a row a line. A list is written as JSON, with `NaN` and
-/// `Infinity` as Python's and JavaScript's readers take them; what is unknown is empty.
+/// `Infinity` as Python's and JavaScript's readers take them; an unknown value is empty.
 pub(crate) struct CsvRows<W: Write> {
     writer: csv::Writer<W>,
     field: Vec<u8>,
@@ -51,7 +51,7 @@ impl<W: Write> CsvRows<W> {
     }
 }
 
-/// The value at place `at` of a level: a list, or below all lists what stands in it.
+/// Writes the value at place `at` of a level: a list, or below all lists a single value.
 fn field(column: &TableColumn, level: usize, at: usize, to: &mut Vec<u8>) -> io::Result<()> {
     let in_list = level > 0;
     let Some(ends) = column.lists.get(level) else {
@@ -99,7 +99,7 @@ fn number(value: f64, to: &mut Vec<u8>) -> io::Result<()> {
     }
 }
 
-/// A number that is none.
+/// Writes an infinite number or NaN.
 fn odd(value: f64, in_list: bool, to: &mut Vec<u8>) -> io::Result<()> {
     match (in_list, value.is_nan(), value > 0.0) {
         (_, true, _) => write!(to, "NaN"),
@@ -170,10 +170,10 @@ pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
     }
 }
 
-/// A row with its line, 1...
+/// A row with its line, ≥ 1.
 pub(crate) type CsvRow = (usize, Vec<String>);
 
-/// Every row of a text with its line, 1.., the head among them; rows may differ in length, and empty lines are none.
+/// Every row of a text with its line, ≥ 1, the head among them; rows may differ in length, and empty lines are skipped.
 ///
 /// # Errors
 /// The line, and what is wrong there.
@@ -181,7 +181,7 @@ pub(crate) fn records(text: &str) -> Result<Vec<CsvRow>, (usize, String)> {
     each_record(text).collect()
 }
 
-/// The same, record by record.
+/// The rows of [`records`], one by one.
 pub(crate) fn each_record(
     text: &str,
 ) -> impl Iterator<Item = Result<CsvRow, (usize, String)>> + use<'_> {

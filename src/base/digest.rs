@@ -1,4 +1,4 @@
-//! Digests and base64, as a Content-Security-Policy and data inside a page want them.
+//! Digests and base64, in the forms that a Content-Security-Policy and data inside a page need.
 
 use sha2::{Digest as _, Sha256};
 

@@ -1,10 +1,11 @@
-//! The one error type: what stopped us, with the path, the value, and the way out.
+//! The error type of the crate: the cause, with the path, the value, and the way out.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What stopped us. `Display` is one sentence without a period; [`Error::hint`] is the way out, printed after it.
+/// The reason why a command failed. `Display` is one sentence without a period; [`Error::hint`] is the way out, printed
+/// after it.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
@@ -12,9 +13,9 @@ pub enum Error {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried, such as `read` or `write`.
+        /// The action that was tried, such as `read` or `write`.
         doing: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// A store or a server refused to give an object, or could not be reached: nothing is wrong with the bag, and what
@@ -22,96 +23,96 @@ pub enum Error {
     Remote {
         /// The object.
         url: String,
-        /// What the store said.
+        /// The store's answer.
         reason: String,
-        /// What to do.
+        /// The advice for the user.
         hint: String,
     },
-    /// `path` is no bag that we know.
+    /// `path` is not a bag of a known format.
     UnknownBag {
         /// The file or folder.
         path: PathBuf,
-        /// What it is instead, if that can be told: `empty`, `a git-LFS pointer`, …
+        /// The kind of file that it is instead, as far as known: `empty`, `a git-LFS pointer`, …
         looks_like: String,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
     /// A bag breaks its format in a way that leaves nothing to read.
     Malformed {
         /// The bag.
         path: PathBuf,
-        /// Where, in bytes from the file's start.
+        /// The place of the damage, in bytes from the file's start.
         offset: u64,
-        /// What should stand there.
+        /// The content that should be there.
         expected: String,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
-    /// A bag of a kind that we know and cannot read.
+    /// A bag of a known kind that cannot be read.
     Unsupported {
         /// The bag.
         path: PathBuf,
-        /// What about it.
+        /// The reason why it cannot be read.
         what: String,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
     /// A bag, or the part of it that was asked for, holds no message.
     NoMessages {
         /// The bag.
         path: PathBuf,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
-    /// A file of the user's (style, topology, expectation) that says something wrong.
+    /// A file of the user's (style, topology, expectation) with a mistake in it.
     BadFile {
         /// The file.
         path: PathBuf,
-        /// The line, 1..; 0 where none can be named.
+        /// The line, ≥ 1; 0 where none can be named.
         line: usize,
-        /// What is wrong.
+        /// The mistake.
         reason: String,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
-    /// An expectation that says something wrong.
+    /// An expectation with a mistake in it.
     BadExpectation {
         /// The file.
         path: PathBuf,
-        /// The line, 1..; 0 where none can be named.
+        /// The line, ≥ 1; 0 where none can be named.
         line: usize,
-        /// The character in it, 1...
+        /// The character in the line, ≥ 1.
         column: usize,
-        /// What is wrong.
+        /// The mistake.
         reason: String,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
-    /// A value that was asked for and makes no sense. Exit code 2.
+    /// A requested value that makes no sense. Exit code 2.
     Usage {
-        /// What is wrong, with the value.
+        /// The mistake, with the value.
         what: String,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
-    /// The user broke off.
+    /// The user interrupted the command.
     Interrupted,
     /// Something could not be drawn or written.
     Output {
-        /// The file that was to be written, or what was to be made.
+        /// The file that was to be written, or the thing that was to be made.
         path: PathBuf,
-        /// What is wrong.
+        /// The reason for the failure.
         reason: String,
-        /// What to do.
+        /// Advice for the user.
         hint: String,
     },
 }
 
-/// What every fallible function of this crate returns.
+/// The result of every fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
-    /// The system's refusal on `path`, for use in `map_err`.
+    /// An [`Error::Io`] on `path` by the system's error, for use in `map_err`.
     pub fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
         let path = path.to_owned();
         move |source| Self::Io {
@@ -121,7 +122,7 @@ impl Error {
         }
     }
 
-    /// A value that makes no sense.
+    /// An [`Error::Usage`] for a value that makes no sense.
     pub fn usage(what: impl Into<String>, hint: impl Into<String>) -> Self {
         Self::Usage {
             what: what.into(),
@@ -129,7 +130,7 @@ impl Error {
         }
     }
 
-    /// What the user can do; empty where nothing helps.
+    /// Advice for the user; empty where nothing helps.
     pub fn hint(&self) -> String {
         match self {
             Self::Io { source, .. } => io_hint(source).to_owned(),
@@ -172,7 +173,7 @@ impl fmt::Display for Error {
             Self::Remote { url, reason, .. } => write!(f, "cannot read `{url}`: {reason}"),
             Self::UnknownBag {
                 path, looks_like, ..
-            } => write!(f, "`{}` is no bag: it is {looks_like}", path.display()),
+            } => write!(f, "`{}` is not a bag: it is {looks_like}", path.display()),
             Self::Malformed {
                 path,
                 offset,

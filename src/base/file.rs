@@ -1,4 +1,4 @@
-//! Reads files of the user's within a limit: a device or a pipe tells no length and may never end.
+//! Reads files of the user's within a limit: a device or a pipe has no known length and may never end.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -29,9 +29,9 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
 /// The text of a file of at most `limit` bytes.
 ///
 /// # Errors
-/// As [`read`], and [`Error::Io`] where it is no UTF-8.
+/// As [`read`], and [`Error::Io`] where it is not UTF-8.
 pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String> {
-    let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is no UTF-8 text");
+    let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text");
     String::from_utf8(read(path, limit)?)
         .map_err(no_text)
         .map_err(Error::io("read", path))

@@ -16,7 +16,7 @@ impl Point {
     }
 }
 
-/// A width and a height, 0...
+/// A width and a height, both ≥ 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Size {
     /// Pixels from left to right.
@@ -39,9 +39,9 @@ pub struct Rect {
     pub x: f64,
     /// The top edge.
     pub y: f64,
-    /// The width, 0...
+    /// The width, ≥ 0.
     pub w: f64,
-    /// The height, 0...
+    /// The height, ≥ 0.
     pub h: f64,
 }
 
@@ -104,7 +104,7 @@ impl Rect {
         Self::new(x, y, right - x, bottom - y)
     }
 }
-/// The points of a way of cubic Bézier curves, each with its two controls and its end: the start, and then so many
+/// The points of a path of cubic Bézier curves, each with its two controls and its end: the start, and then `pieces`
 /// points along each curve, the last of them its end.
 pub(crate) fn polyline(start: Point, curves: &[[Point; 3]], pieces: u32) -> Vec<Point> {
     let mut points = vec![start];

@@ -1,4 +1,5 @@
-//! Files and folders with temporary names: should a signal end the process before their owners remove them, this does.
+//! The register of files and folders with temporary names, which are removed should a signal end the process before
+//! their owners do.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -6,12 +7,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// A set of paths is never half-changed, so that a panic elsewhere spoils nothing.
+/// The paths to remove, also after a panic elsewhere: a set of paths is never half-changed.
 fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     ALL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Something with a temporary name, from before it is made until its owner has removed or renamed it.
+/// A file or folder with a temporary name, registered from before it is made until its owner has removed or renamed it.
 #[derive(Debug)]
 pub(crate) struct Leftover(PathBuf);
 
@@ -30,10 +31,10 @@ impl Drop for Leftover {
 }
 
 #[cfg(feature = "cli")]
-/// Removes whatever is there, just before the process ends.
+/// Removes all that are registered, just before the process ends.
 pub(crate) fn remove() {
     for path in all().iter() {
-        // What is gone, or cannot be removed now, nobody could do more about.
+        // Nothing more can be done about a path that is gone or cannot be removed.
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }
 }

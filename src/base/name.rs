@@ -87,7 +87,7 @@ pub fn is_recorder(node: &str) -> bool {
         || last.starts_with("_ros2cli_")
 }
 
-/// Whether our default leaves out this node or topic: log, clock, parameters, statistics, recorder events.
+/// Whether a node or topic is left out by default: log, clock, parameters, statistics, recorder events.
 pub fn is_quiet(name: &str) -> bool {
     const EXACT: [&str; 5] = [
         "/rosout",

@@ -1,8 +1,8 @@
 //! The name that somebody may have meant: the nearest by letters inserted, left out or exchanged.
 
-/// Names that differ in more letters than this mean something else.
+/// The most letters in which two names may differ: names that differ in more mean something else.
 const MOST: usize = 2;
-/// Longer names are not compared.
+/// The most characters of a name that are compared.
 const LONGEST: usize = 200;
 
 /// The known name nearest to `name`, the first of several; `None` if it is known itself or none comes close.
@@ -14,7 +14,7 @@ pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> O
     (1..=most).contains(&distance).then_some(other)
 }
 
-/// Letters to insert, leave out or exchange (Levenshtein).
+/// The number of letters to insert, leave out or exchange (Levenshtein).
 fn distance(one: &str, other: &str) -> usize {
     let other: Vec<char> = other.chars().take(LONGEST).collect();
     let mut row: Vec<usize> = (0..=other.len()).collect();

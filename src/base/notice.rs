@@ -1,10 +1,10 @@
-//! What went wrong without stopping us, grouped by kind and counted.
+//! Notices: problems that did not stop the command, grouped by kind and counted.
 
 use std::collections::BTreeMap;
 
 use super::budget::NOTICES;
 
-/// What a notice is about. The word in JSON is [`NoticeKind::word`].
+/// The subject of a notice. The word in JSON is [`NoticeKind::word`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum NoticeKind {
@@ -12,7 +12,7 @@ pub enum NoticeKind {
     Damaged,
     /// The bag's end is missing. The command exits 3.
     Truncated,
-    /// Read another way than by its index, and why; nothing was lost.
+    /// The bag was read another way than by its index, for the reason given; nothing was lost.
     Downgraded,
     /// A bag that a tool rewrote, so that its headers name false publishers.
     Rewritten,
@@ -57,7 +57,7 @@ impl NoticeKind {
         Self::ALL.into_iter().find(|kind| kind.word() == word)
     }
 
-    /// Its word in JSON.
+    /// The word of a kind in JSON.
     pub fn word(self) -> &'static str {
         match self {
             Self::Damaged => "damaged",
@@ -75,12 +75,12 @@ impl NoticeKind {
     }
 }
 
-/// One thing worth saying.
+/// One message to the user about a bag or the output.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notice {
-    /// What it is about.
+    /// The subject.
     pub kind: NoticeKind,
-    /// How often it happened, 1...
+    /// The number of times that it happened, ≥ 1.
     pub count: u64,
     /// One sentence, lower case, no period; names in it are as recorded, so escape it where it is written.
     pub text: String,
@@ -102,7 +102,7 @@ impl Notice {
 pub struct Notices(BTreeMap<(NoticeKind, String), u64>);
 
 impl Notices {
-    /// None yet.
+    /// No notices.
     pub fn new() -> Self {
         Self::default()
     }
@@ -133,12 +133,12 @@ impl Notices {
         })
     }
 
-    /// Whether any of them says that data was skipped.
+    /// Whether any notice says that data was skipped.
     pub fn any_loss(&self) -> bool {
         self.0.keys().any(|(kind, _)| kind.is_loss())
     }
 
-    /// Whether there are none.
+    /// Whether there are no notices.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -1,9 +1,9 @@
-//! What an anonymous name holds: the role of a node, which is its name without the suffix that makes it unique, and the
-//! start in that suffix.
+//! The parts of an anonymous name: the role of a node, which is its name without the suffix that makes it unique, and
+//! the start time in that suffix.
 
 use crate::base::time::Stamp;
 
-/// The shortest number of nanoseconds or milliseconds since 1970 that somebody may append, in digits.
+/// The smallest number of digits in an appended time, in nanoseconds or milliseconds since 1970.
 const CLOCK_DIGITS: usize = 13;
 
 /// Nodes whose names end in a process number or an address.
@@ -38,12 +38,12 @@ fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
 }
 
-/// Whether a name is left.
+/// Whether the rest of a name, without its suffix, is a name by itself.
 fn ends_well(name: &str) -> bool {
     !name.is_empty() && !name.ends_with('/')
 }
 
-/// The moment in a name: `/x_PID_MILLISECONDS`, `/x_NANOSECONDS`.
+/// The time of the start in a name: `/x_PID_MILLISECONDS`, `/x_NANOSECONDS`.
 pub(crate) fn start(name: &str) -> Option<Stamp> {
     let (rest, number) = name.rsplit_once('_')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::time::Stamp;
 
-/// What a column holds.
+/// The type of the values in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ColumnKind {
     /// True or false.
@@ -27,22 +27,22 @@ pub(crate) enum ColumnKind {
     Time,
 }
 
-/// Texts, or strings of bytes, one behind the other.
+/// Texts, or strings of bytes, one after the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TextColumn {
     pub(crate) bytes: Vec<u8>,
-    /// Where each ends.
+    /// The place behind the last byte of each text.
     pub(crate) ends: Vec<i32>,
 }
 
 impl TextColumn {
-    /// Adds one. What is longer than 2 GB in all would not fit; a batch is written long before.
+    /// Adds a text. More than 2 GB in all would not fit; a batch is written long before.
     pub(crate) fn push(&mut self, text: &[u8]) {
         self.bytes.extend_from_slice(text);
         self.ends.push(length(self.bytes.len()));
     }
 
-    /// The one at place `at`.
+    /// The text at place `at`.
     pub(crate) fn get(&self, at: usize) -> &[u8] {
         &self.bytes[span(&self.ends, at)]
     }
@@ -107,7 +107,7 @@ impl ColumnValues {
         }
     }
 
-    /// Adds what stands for nothing.
+    /// Adds a placeholder for an unknown value.
     fn push_blank(&mut self) {
         match self {
             Self::Flag(v) => v.push(false),
@@ -126,16 +126,16 @@ impl ColumnValues {
     }
 }
 
-/// One column.
+/// A column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TableColumn {
     pub(crate) name: Cow<'static, str>,
     pub(crate) kind: ColumnKind,
     pub(crate) values: ColumnValues,
-    /// Where each list ends among the lists of the next level, or among the values; the rows' own lists first. None
+    /// The end of each list among the lists of the next level, or among the values; the rows' own lists first. Empty
     /// for a column of single values.
     pub(crate) lists: Vec<Vec<i32>>,
-    /// Whether each row has a value; none for a column in which all rows have.
+    /// Whether each row has a value; `None` for a column in which all rows have one.
     pub(crate) valid: Option<Vec<bool>>,
 }
 
@@ -230,12 +230,12 @@ impl<'a> TableCell<'a> {
         Self::Text(text.into())
     }
 
-    /// A number of things; what is past `i64` stays at its end.
+    /// A number of things; `i64::MAX` if it is larger.
     pub(crate) fn count(count: impl TryInto<i64>) -> Self {
         Self::Int(count.try_into().unwrap_or(i64::MAX))
     }
 
-    /// What is known, as `cell` makes a value of it.
+    /// The cell that `cell` makes of a value, or an unknown cell.
     pub(crate) fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Self) -> Self {
         value.map_or(Self::Null, cell)
     }
@@ -249,7 +249,7 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// No rows yet, of columns of these names and kinds.
+    /// A batch without rows, with columns of these names and kinds.
     pub(crate) fn new(columns: &[(&'static str, ColumnKind)]) -> Self {
         Self::of(
             columns
@@ -258,7 +258,7 @@ impl Batch {
         )
     }
 
-    /// No rows yet, of these columns.
+    /// A batch without rows, with these columns.
     pub(crate) fn of(columns: impl IntoIterator<Item = TableColumn>) -> Self {
         Self {
             columns: columns.into_iter().collect(),
@@ -274,20 +274,20 @@ impl Batch {
         self.rows += 1;
     }
 
-    /// Forgets what has been added behind the last whole row.
+    /// Removes the cells of an incomplete last row.
     pub(crate) fn take_back(&mut self) {
         let rows = self.rows;
         self.columns.iter_mut().for_each(|c| c.truncate(rows));
     }
 
-    /// Forgets all rows.
+    /// Removes all rows.
     pub(crate) fn clear(&mut self) {
         self.rows = 0;
         self.take_back();
     }
 }
 
-/// The places of list `at` among what lies below it.
+/// The places of the elements of list `at` in the level below.
 pub(crate) fn span(ends: &[i32], at: usize) -> std::ops::Range<usize> {
     let start = at.checked_sub(1).map_or(0, |before| place(ends[before]));
     start..place(ends[at])

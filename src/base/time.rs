@@ -21,7 +21,7 @@ impl Stamp {
     /// The latest stamp of a message: a half-open interval can still end behind it.
     pub const LAST: Self = Self(i64::MAX - 1);
 
-    /// The stamp of a ROS time, `secs` since 1970 and `nanos` on top (0.. ; values of a second or more carry over).
+    /// The stamp of a ROS time, `secs` since 1970 and `nanos` on top (≥ 0; values of a second or more carry over).
     pub const fn from_ros(secs: u32, nanos: u32) -> Self {
         Self(secs as i64 * SECOND + nanos as i64)
     }
@@ -69,7 +69,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// Its length in nanoseconds, 0...
+    /// The length in nanoseconds, ≥ 0.
     pub const fn nanos(&self) -> i64 {
         self.end.since(self.start)
     }
@@ -93,7 +93,7 @@ impl Period {
         }
     }
 
-    /// Its length in nanoseconds, 1...
+    /// The length in nanoseconds, ≥ 1.
     pub const fn nanos(self) -> i64 {
         self.0.get()
     }
@@ -111,7 +111,7 @@ impl fmt::Display for Period {
     }
 }
 
-/// Reads a length in nanoseconds, 0 included: `90`, `1:30`, `1:02:03`, `2m`, `500ms`. `None` if it is none.
+/// Reads a length in nanoseconds, 0 included: `90`, `1:30`, `1:02:03`, `2m`, `500ms`. `None` if it is not a length.
 pub fn parse_nanos(text: &str) -> Option<i64> {
     let text = text.trim();
     if text.contains(':') {
@@ -176,7 +176,7 @@ impl Moment {
         }
     }
 
-    /// Where it lies for a bag that covers `bag`.
+    /// The point in time that it means in a bag that covers `bag`.
     pub fn on(self, bag: Span) -> Stamp {
         match self {
             Self::AfterStart(n) => bag.start.plus(n),

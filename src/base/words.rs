@@ -1,4 +1,4 @@
-//! How numbers, times and names are spelled for people: everything that formats for a reader goes through here.
+//! Spelling of numbers, times and names for people: everything that formats for a reader goes through here.
 //!
 //! Data files (JSON, CSV, Parquet) hold plain numbers instead.
 
@@ -6,7 +6,8 @@ use std::borrow::Cow;
 
 const SECOND: i64 = 1_000_000_000;
 
-/// A rate in messages per second: `50 Hz`, `12.5 Hz`, `0.25 Hz`, `1.2 kHz`; `0 Hz` for what is no rate.
+/// A rate in messages per second: `50 Hz`, `12.5 Hz`, `0.25 Hz`, `1.2 kHz`; `0 Hz` for an infinite one, NaN and below
+/// 0.
 pub fn rate(hz: f64) -> String {
     let (value, unit) = split_rate(hz);
     format!("{value} {unit}")
@@ -45,7 +46,7 @@ pub fn rate_of(count: u64, seconds: f64) -> String {
     }
 }
 
-/// `value` rounded to so many significant digits; as it is where that makes no sense.
+/// `value` rounded to `digits` significant digits; unchanged if it is 0, infinite or NaN.
 pub fn significant(value: f64, digits: u8) -> f64 {
     if !value.is_finite() || value == 0.0 {
         return value;
@@ -68,7 +69,7 @@ fn split_rate(hz: f64) -> (String, &'static str) {
     }
 }
 
-/// A number, 0 or more, in few digits: whole from 100 on, a tenth from 1 on, two significant digits below, `<0.001`.
+/// A number ≥ 0 in few digits: whole from 100 on, a tenth from 1 on, two significant digits below, `<0.001`.
 pub fn number(value: f64) -> String {
     let digits = match value {
         0.0 => return "0".to_owned(),
@@ -161,12 +162,13 @@ pub fn offset(nanos: i64) -> String {
     }
 }
 
-/// The same in whole seconds, rounded down: `07:10`.
+/// A moment as [`offset`] writes it, in whole seconds, rounded down: `07:10`.
 pub fn offset_seconds(nanos: i64) -> String {
     offset(nanos.div_euclid(SECOND).saturating_mul(SECOND))
 }
 
-/// The same to a tenth of a second, rounded down, always with its tenth: `07:10.2`. For logs, where columns align.
+/// A moment as [`offset`] writes it, to a tenth of a second, rounded down, always with its tenth: `07:10.2`. For logs,
+/// where columns align.
 pub fn offset_tenths(nanos: i64) -> String {
     let tenth = nanos.div_euclid(SECOND / 10).rem_euclid(10);
     format!("{}.{tenth}", offset_seconds(nanos))
@@ -209,7 +211,7 @@ pub fn shorten(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(kept + "…")
 }
 
-/// Some of many names: `a, b and c`, or `a, b, c and 4 more`. At most `most` are named, at least one.
+/// Some of many names: `a, b and c`, or `a, b, c and 4 more`. At least one and at most `most` are named.
 pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
     let told: Vec<&str> = names.iter().take(most.max(1)).map(AsRef::as_ref).collect();
     match (told.as_slice(), names.len() - told.len()) {
@@ -221,7 +223,7 @@ pub fn some_of<S: AsRef<str>>(names: &[S], most: usize) -> String {
 }
 
 /// `text` with line ends, other control characters, invisible and direction marks written as `\u{…}`, so that it can
-/// neither steer a terminal nor hide or turn round what stands beside it.
+/// neither steer a terminal nor hide or reverse the text beside it.
 pub fn visible(text: &str) -> Cow<'_, str> {
     if !text.contains(is_invisible) {
         return Cow::Borrowed(text);
@@ -237,7 +239,8 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// JSON with the invisible characters of its texts as `\uXXXX`, for printing: all that JSON leaves raw stand in texts.
+/// JSON with the invisible characters of its texts as `\uXXXX`, for printing; JSON has such characters only inside
+/// texts.
 pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
     if !json.contains(|c: char| c != '\n' && is_invisible(c)) {
         return Cow::Borrowed(json);
@@ -255,7 +258,8 @@ pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Control characters, spaces other than the plain one, and marks that change the direction or join what stands around.
+/// Control characters, spaces other than the plain one, and marks that change the text direction or join the characters
+/// around them.
 pub fn is_invisible(c: char) -> bool {
     if (' '..='~').contains(&c) {
         return false;

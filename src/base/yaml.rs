@@ -1,4 +1,4 @@
-//! YAML text as plain data, bounded against documents that unfold to more than they are.
+//! YAML text as plain data, bounded against documents whose aliases unfold to far more than their size.
 
 #[cfg(feature = "cli")]
 mod placed;
@@ -12,14 +12,14 @@ use super::budget::{YAML, YAML_VALUES};
 pub(crate) use placed::{YamlData, YamlPart, parse_placed};
 pub(crate) use serde_json::Value;
 
-/// What is wrong with a YAML document.
+/// A mistake in a YAML document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct BadYaml {
-    /// The line, 1..; 0 where none can be named.
+    /// The line, ≥ 1; 0 where none can be named.
     pub(crate) line: usize,
-    /// The character in it, 1..; 0 where none can be named.
+    /// The character in the line, ≥ 1; 0 where none can be named.
     pub(crate) column: usize,
-    /// What is wrong, in the parser's words, one line.
+    /// The mistake, in the parser's words, one line.
     pub(crate) reason: String,
 }
 
@@ -58,12 +58,12 @@ fn read<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, BadYaml> {
     })
 }
 
-/// Where something stands in a document.
+/// A place in a document.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct YamlPlace {
-    /// The line, 1..; 0 where none can be named.
+    /// The line, ≥ 1; 0 where none can be named.
     pub(crate) line: usize,
-    /// The character in it, 1...
+    /// The character in the line, ≥ 1; 0 where no line can be named.
     pub(crate) column: usize,
 }
 
@@ -76,7 +76,7 @@ impl From<Location> for YamlPlace {
     }
 }
 
-/// The parser's words, but for its own limits, whose names mean nothing to anybody else.
+/// The parser's words, except for its own limits, whose names mean nothing to users.
 fn reason(error: &serde_saphyr::Error) -> String {
     let text = error.to_string();
     let first = text.lines().next().unwrap_or_default();

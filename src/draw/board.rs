@@ -1,5 +1,5 @@
-//! The topic board: the picture of a mission of which hardly anybody knows who sends what. Rows are topics over the
-//! whole time, with types and the rate now; a head says which window a frame is of; nodes stand below as pills.
+//! The topic board: the picture of a mission with few known publishers. Rows are topics over the whole time, with types
+//! and the rate now; a head marks the window of a frame; nodes stand below as pills.
 
 use std::collections::BTreeSet;
 
@@ -20,17 +20,18 @@ use crate::draw::text::Fonts;
 use crate::graph::{Element, NodeId};
 use crate::view::View;
 
-/// Pixels per millimetre of the drawing: small text of 9 pixels at least, and not larger than titles.
+/// The least and the largest number of pixels per millimetre of the drawing: for small text of at least 9 pixels, and
+/// for text not larger than titles.
 const SCALE: (f64, f64) = (4.26, 5.6);
-/// The page that a board grows to where nobody chose one.
+/// The largest page that a board grows to where the user chose none.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
 /// The widths of types and of rates, in millimetres, and the room between columns.
 const TYPES: f64 = 58.0;
 const RATES: f64 = 15.0;
 const BETWEEN: f64 = 2.4;
-/// What stands below the rows: nodes and the line that says why, in millimetres.
+/// The height below the rows in millimetres, for nodes and for the line that says why this is not a graph.
 const BELOW: f64 = 9.0;
-/// The height of a node.
+/// The height of a node in millimetres.
 const PILL: f64 = 3.5;
 
 /// A board ready to be drawn, one scene per window.
@@ -48,25 +49,25 @@ pub(crate) struct Board<'a> {
     /// The window of the mission that each frame shows.
     windows: Vec<usize>,
     ground: Vec<Group>,
-    /// How many topics found no row.
+    /// The number of topics without room for a row.
     left_out: usize,
 }
 
-/// The whole board in one drawing, and where the head stands in each window.
+/// The whole board in one drawing, and the place of the head in each window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
-    /// The board with everything that was sent; no head.
+    /// The board with all messages sent, without a head.
     pub scene: Scene,
     /// The head in pixels, per window.
     pub heads: Vec<Rect>,
-    /// Its colour.
+    /// The colour of the head.
     pub color: Color,
     /// The title of the picture.
     pub title: String,
 }
 
 impl Overview {
-    /// One measure of the head in every window, in tenths of a pixel, with this between two.
+    /// One measure of the head in every window, to a tenth of a pixel, joined by `between`.
     pub(crate) fn heads_list(&self, of: fn(&Rect) -> f64, between: &str) -> String {
         let all: Vec<String> = self.heads.iter().map(|h| format!("{:.1}", of(h))).collect();
         all.join(between)
@@ -74,8 +75,8 @@ impl Overview {
 }
 
 impl<'a> Board<'a> {
-    /// The board of what passes the filters of `source`. Where `is_sized` is false the page grows until all topics can
-    /// be read; what then finds no room is counted.
+    /// The board of the nodes and topics that pass the filters of `source`. Where `is_sized` is false the page grows
+    /// until all topics can be read; topics that then find no room are counted.
     pub(crate) fn new(
         source: &'a FigureSource<'a>,
         view: &'a View,
@@ -124,7 +125,7 @@ impl<'a> Board<'a> {
         board
     }
 
-    /// What the user should know; lower case, no period.
+    /// Remarks for the user; lower case, no period.
     pub(crate) fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.left_out > 0 {
@@ -136,7 +137,8 @@ impl<'a> Board<'a> {
         remarks
     }
 
-    /// The board in the window at place `k` of the view; `phase`, above 0 to 1, is how far its head has come there.
+    /// The board in the window at place `k` of the view; `phase`, above 0 to 1, is the part of the way that its head
+    /// has moved there.
     pub(crate) fn scene(&self, k: usize, phase: f64) -> Scene {
         let mut scene = self.empty();
         let Some(frame) = self.view.frames.get(k) else {
@@ -207,7 +209,8 @@ impl<'a> Board<'a> {
         PaperCanvas::new(self.fonts, self.sizes, self.scale)
     }
 
-    /// What stands still: band, pale bars, starts and ends, types, axis, and why this is no graph.
+    /// The parts that are the same in every frame: band, pale bars, starts and ends, types, axis, and the reason why
+    /// this is not a graph.
     fn ground(&self) -> Vec<Group> {
         let mut canvas = self.canvas();
         let end = self.lives.draw(&mut canvas, &self.place);
@@ -224,7 +227,7 @@ impl<'a> Board<'a> {
         groups
     }
 
-    /// Why this is no graph, and what would tell more.
+    /// The reason why this is not a graph, and the way to learn more.
     fn why(&self) -> String {
         let elements = &self.source.mission.elements;
         let why = if self.source.knows_publishers() {
@@ -241,7 +244,7 @@ impl<'a> Board<'a> {
         format!("{left_out}{why}. Tick: first message; cross: last; frame: this window.")
     }
 
-    /// What changes from frame to frame.
+    /// The parts that change from frame to frame.
     fn now(&self, window: usize, span: Span) -> Vec<Group> {
         let mission = self.source.mission;
         let graph = mission.graphs.get(window);
@@ -295,7 +298,7 @@ impl<'a> Board<'a> {
         }
     }
 
-    /// The nodes that are known, as pills in a row as far as there is room: those that are there stand out.
+    /// Draws the known nodes as pills in a row as far as there is room; those for which `is_there` holds stand out.
     fn nodes(&self, canvas: &mut PaperCanvas<'_>, is_there: &dyn Fn(&[NodeId]) -> bool) {
         let elements = &self.source.mission.elements;
         let is_known = |id: &NodeId| {
@@ -340,7 +343,7 @@ impl<'a> Board<'a> {
         Rect::new(left, top, (right - left).max(0.3), bottom - top)
     }
 
-    /// What a canvas holds, in the colours of the style.
+    /// The groups of a canvas in the colours of the style.
     fn painted(&self, canvas: PaperCanvas<'_>) -> Vec<Group> {
         let mut groups = canvas.into_groups();
         for piece in groups.iter_mut().flat_map(|g| &mut g.pieces) {
@@ -355,7 +358,7 @@ impl<'a> Board<'a> {
         groups
     }
 
-    /// The style's colour for one of a figure's, which is on white paper.
+    /// The style's colour in place of a colour of figures, which are on white paper.
     fn color(&self, of: Color) -> Color {
         let style = self.style;
         let table = [
@@ -392,14 +395,14 @@ fn scaled(r: Rect, by: f64) -> Rect {
     Rect::new(r.x * by, r.y * by, r.w * by, r.h * by)
 }
 
-/// How many messages a topic carried.
+/// The number of messages that the topic of a row carried.
 fn messages(source: &FigureSource<'_>, track: &Track) -> u64 {
     let Some(topic) = track.topic else { return 0 };
     let rows = source.mission.graphs.rows(Element::Topic(topic));
     rows.map(|(_, row)| row.count.unwrap_or(0)).sum()
 }
 
-/// The part of the page that a board has.
+/// The part of the page for the board.
 fn room(page: &PageFrame, options: &PageOptions) -> Rect {
     let margin = page.graph.x;
     let top = page.caption.bottom().max(margin / 2.0) + margin / 4.0;
@@ -412,7 +415,7 @@ fn room(page: &PageFrame, options: &PageOptions) -> Rect {
     )
 }
 
-/// How many rows can be read on this page.
+/// The number of rows that can be read on this page.
 fn most_rows(
     lives: &LivesFigure<'_>,
     style: &Style,
@@ -433,7 +436,7 @@ fn most_rows(
     most
 }
 
-/// Where everything stands, in millimetres, and how many pixels these are.
+/// The places of everything in millimetres, and the number of pixels per millimetre.
 fn placed(
     lives: &LivesFigure<'_>,
     page: &PageFrame,

@@ -1,7 +1,7 @@
 //! Figures for papers, exact in width and never with text below 6 pt: lives, map and steps.
 //!
-//! What does not fit steps down a ladder (nodes, groups) and is refused at its end with what would fit; text is never
-//! scaled.
+//! A figure that does not fit with nodes is tried with groups, and else refused with a filter that would fit; text is
+//! never scaled.
 
 pub(crate) mod band;
 pub(crate) mod canvas;
@@ -36,15 +36,15 @@ use canvas::Sizes;
 pub(crate) use course::Course;
 use source::FigureSource;
 
-/// Which figure.
+/// The kind of figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FigureKind {
-    /// What is alive when, how busy, what changed.
+    /// Life lines: when each row was alive, how busy it was, and what changed.
     #[default]
     Lives,
-    /// Who talks to whom, and in which phases.
+    /// The graph of nodes over the whole mission, with the phases in which each lives.
     Map,
-    /// One reconfiguration after the other, as differences.
+    /// A panel per change of phase, with only the differences.
     Steps,
 }
 
@@ -79,7 +79,7 @@ impl FigureKind {
     }
 }
 
-/// What rows and boxes stand for.
+/// The kind of thing that rows and boxes stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RowKind {
     /// Nodes, by role.
@@ -108,22 +108,22 @@ impl RowKind {
     }
 }
 
-/// A figure as it was asked for.
+/// The options of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureOptions {
-    /// Which one.
+    /// The kind of figure.
     pub kind: FigureKind,
     /// Its width in millimetres, exactly.
     pub width_mm: f64,
     /// The size of names in points, 7 to 12; all other text is 1 pt smaller.
     pub text_pt: f64,
-    /// What rows and boxes stand for; as much as fits if `None`.
+    /// The kind of thing that rows and boxes stand for; `None` for the most detailed that fits.
     pub rows: Option<RowKind>,
-    /// The boundaries that `Kind::Steps` shows, by the number of the phase that begins, 2..; the largest if empty.
+    /// The boundaries that `Kind::Steps` shows, by the number of the phase that begins, ≥ 2; the largest if empty.
     pub steps: Vec<usize>,
     /// Whether legend and notes are left to the caption.
     pub is_bare: bool,
-    /// Whether phases are the user's, so that their names are worth telling.
+    /// Whether phases are the user's, so that their names are shown.
     pub is_named: bool,
 }
 
@@ -141,24 +141,25 @@ impl Default for FigureOptions {
     }
 }
 
-/// A figure that was drawn.
+/// A finished figure.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Figure {
     /// The drawing; its size is that on paper.
     pub scene: Scene,
     /// A caption for `LaTeX`, escaped: what is drawn, the phases with their times, bag and length, the legend in words.
     pub caption: String,
-    /// What the user should know; lower case, no period.
+    /// Remarks for the user; lower case, no period.
     pub remarks: Vec<String>,
 }
 
 /// The largest height of a figure in millimetres: the text block of a page.
 pub(crate) const MOST_HEIGHT: f64 = 225.0;
 
-/// Draws a figure of what passes the filters of nodes and topics.
+/// Draws a figure of the nodes and topics that pass the filters.
 ///
 /// # Errors
-/// [`Error::Usage`] where nothing is left, or it does not fit whatever is put together: with a filter that would do.
+/// [`Error::Usage`] where nothing is left, or where it does not fit even as groups; the hint names a filter that would
+/// do.
 pub(crate) fn figure(
     mission: &Mission,
     filters: (&NameFilter, &NameFilter),

@@ -1,4 +1,5 @@
-//! Painters of one shape: each turns a [`scene`](crate::draw::scene) into what can be written, and decides nothing.
+//! Painters, all alike: each turns a [`scene`](crate::draw::scene) into a form that can be written, and decides
+//! nothing.
 
 pub(crate) mod animated;
 pub(crate) mod classes;

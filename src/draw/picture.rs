@@ -37,7 +37,7 @@ use crate::draw::text::Fonts;
 use crate::layout::{self, Engine, Layout, Orientation, Plan};
 use crate::view::{Arrow, ArrowKind, Frame, Item, ItemKind, SeenWindow, View};
 
-/// What the user wishes of the picture.
+/// The user's options of the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PageOptions {
     /// The page in pixels.
@@ -48,17 +48,17 @@ pub struct PageOptions {
     pub bare: bool,
     /// The title, if not the names of the bags.
     pub title: Option<String>,
-    /// Which way the edges run; `None` takes what fits better.
+    /// The direction in which the edges run; `None` for the one that fits better.
     pub orientation: Option<Orientation>,
     /// The mission's phase in each window, by place among the view's frames; empty for none.
     pub phases: Vec<String>,
     /// The scale of furniture; by the size of the page if `None`.
     pub unit: Option<f64>,
-    /// Whether the signs are explained.
+    /// Whether there is a legend of the signs.
     pub has_legend: bool,
-    /// Who lived when, for the strip at the bottom; without it the strip shows messages per second.
+    /// The life lines for the strip at the bottom; without them the strip shows messages per second.
     pub course: Option<Course>,
-    /// From which relative change of a rate on it is told, for the legend.
+    /// The least relative change of a rate that is told, for the legend.
     pub rate_change: f64,
 }
 
@@ -80,13 +80,13 @@ impl Default for PageOptions {
 }
 
 impl PageOptions {
-    /// What stands on top.
+    /// The title of the page; empty if none is given.
     pub(crate) fn title(&self) -> &str {
         self.title.as_deref().unwrap_or_default()
     }
 }
 
-/// What there is to lay out, with the page it is for: the stage before [`Picture`].
+/// The labels and sizes of a view, measured for layout, with the page: the stage before [`Picture`].
 pub struct Measured<'a> {
     view: &'a View,
     style: &'a Style,
@@ -120,12 +120,12 @@ impl<'a> Measured<'a> {
         }
     }
 
-    /// What to lay out: a vertex per item, a link per arrow, a cluster per namespace with a box.
+    /// The plan to lay out: a vertex per item, a link per arrow, a cluster per namespace with a box.
     pub fn plan(&self) -> &Plan {
         &self.graph.plan
     }
 
-    /// What to tell the layout engine of the page.
+    /// The wishes for the layout engine that follow from the page.
     pub fn layout_options(&self) -> layout::LayoutOptions {
         layout::LayoutOptions {
             page: Size::new(self.page.graph.w, self.page.graph.h),
@@ -163,14 +163,14 @@ pub struct Picture<'a> {
     measured: Measured<'a>,
     layout: Layout,
     fit: GraphFit,
-    /// What never changes of each item and each arrow.
+    /// The parts of each item that never change, then those of each arrow.
     cards: Vec<ItemBox>,
     tracks: Vec<ArrowPath>,
     /// The arrows in the order they are painted: longer ones first, so that rates on short ones stay readable.
     order: Vec<usize>,
     title: Title<'a>,
     timeline: Timeline<'a>,
-    /// What is the same in every frame, behind the graph and before what moves.
+    /// The groups that are the same in every frame, behind the graph and the moving parts.
     ground: Vec<Group>,
 }
 
@@ -209,7 +209,7 @@ impl<'a> Picture<'a> {
         picture
     }
 
-    /// How many frames there are: one per window.
+    /// The number of frames: one per window.
     pub fn len(&self) -> usize {
         self.measured.view.frames.len()
     }
@@ -219,7 +219,7 @@ impl<'a> Picture<'a> {
         self.len() == 0
     }
 
-    /// Where everything is, in the layout's own pixels.
+    /// The places of everything, in the layout's own pixels.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -229,7 +229,7 @@ impl<'a> Picture<'a> {
         self.measured.text_px(&self.layout)
     }
 
-    /// The window at place `k` of the view, settled. An empty page past the last one.
+    /// The scene of the window at place `k` of the view, settled. An empty page past the last one.
     pub fn scene(&self, k: usize) -> Scene {
         let measured = &self.measured;
         let mut scene = Scene {
@@ -257,8 +257,8 @@ impl<'a> Picture<'a> {
         scene
     }
 
-    /// The way from window `k - 1` to window `k`, `phase` (0..=1) of it done: first what goes fades, then what changes
-    /// cross-fades in place, then what comes appears. Nothing moves. At 1 it is [`Picture::scene`].
+    /// The scene on the way from window `k - 1` to window `k`, `phase` (0..=1) of it done: first ending elements fade,
+    /// then changed ones cross-fade in place, then new ones appear. Nothing moves. At 1 it is [`Picture::scene`].
     pub fn between(&self, k: usize, phase: f64) -> Scene {
         let after = self.scene(k);
         if k == 0 || phase >= 1.0 {
@@ -379,7 +379,7 @@ impl<'a> Picture<'a> {
     }
 }
 
-/// What never changes of items and arrows, with badges where there is room for them.
+/// The parts of items and arrows that never change, with badges where there is room for them.
 fn places(
     measured: &Measured<'_>,
     layout: &Layout,
@@ -428,7 +428,7 @@ fn tracks(measured: &Measured<'_>, layout: &Layout, fit: GraphFit) -> Vec<ArrowP
         .collect()
 }
 
-/// What to say of names with characters that no font has; `None` if there are none.
+/// The notice about names with characters that no font has; `None` if there are none.
 pub fn unshown(view: &View, fonts: &Fonts) -> Option<Notice> {
     let names = view.items.iter().map(|item| &*item.name);
     let missing: BTreeSet<char> = names.flat_map(|name| fonts.missing(name)).collect();

@@ -13,11 +13,11 @@ pub struct Scene {
     pub size: Size,
     /// The width of the page on paper in millimetres, for vector output; else a pixel is a pixel.
     pub width_mm: Option<f64>,
-    /// What is behind everything.
+    /// The colour behind everything.
     pub background: Color,
-    /// What the page shows, for readers that cannot see.
+    /// The content of the page in words, for readers that cannot see it.
     pub title: String,
-    /// What is painted, from back to front. Each id occurs once.
+    /// The groups, from back to front. Each id occurs once.
     pub groups: Vec<Group>,
 }
 
@@ -30,11 +30,11 @@ pub struct Group {
     pub class: String,
     /// More attributes, `data-` left out: `("name", "/planner")`.
     pub data: Vec<(&'static str, String)>,
-    /// What it is in words; empty for none.
+    /// Its content in words; empty for none.
     pub title: String,
-    /// How transparent it is: 0 (nothing is seen) to 1 (opaque, as in every settled frame).
+    /// Its opacity: 0 (nothing is seen) to 1 (opaque, as in every settled frame).
     pub fade: Fade,
-    /// What is painted, from back to front.
+    /// The shapes and texts, from back to front.
     pub pieces: Vec<Piece>,
 }
 
@@ -82,13 +82,13 @@ pub enum Form {
 /// One step of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// Begin anew here.
+    /// The beginning of a new part at this point.
     Move(Point),
-    /// A straight line to here.
+    /// A straight line to this point.
     Line(Point),
     /// A cubic curve: two controls and its end.
     Curve([Point; 3]),
-    /// Back to where this part began.
+    /// A straight line back to the beginning of this part.
     Close,
 }
 
@@ -97,20 +97,21 @@ pub enum Step {
 pub struct Stroke {
     /// Its colour.
     pub color: Color,
-    /// Its width.
+    /// Its width in pixels.
     pub width: f64,
-    /// Line, gap, line, gap, …; empty for a solid line. Drawn with round ends if its lines are shorter than its width.
+    /// The lengths of line, gap, line, gap, …; empty for a solid line. Drawn with round ends if its lines are shorter
+    /// than its width.
     pub dash: Vec<f64>,
 }
 
-/// Where a text stands against its place.
+/// The part of a text that stands at its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// It begins there.
+    /// Its beginning.
     Start,
-    /// Its middle is there.
+    /// Its middle.
     Middle,
-    /// It ends there.
+    /// Its end.
     End,
 }
 
@@ -119,11 +120,11 @@ pub enum Anchor {
 pub struct Text {
     /// A point on its baseline.
     pub at: Point,
-    /// Which point.
+    /// The part of the text that stands at that point.
     pub anchor: Anchor,
     /// The font size in pixels.
     pub size: f64,
-    /// How bold.
+    /// The weight of the font.
     pub weight: Weight,
     /// Its colour.
     pub color: Color,

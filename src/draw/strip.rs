@@ -29,32 +29,32 @@ const CAPTION: (f64, f64) = (9.0, 14.0);
 const GAP: f64 = 10.0;
 /// Shapes of panels that are tried on paper: height over width.
 const SHAPES: [f64; 4] = [0.4, 0.6, 1.0, 1.6];
-/// How many times as high as wide a strip becomes at most, if there is a choice.
+/// The largest height of a strip over its width, if there is a choice.
 const HIGHEST: f64 = 1.3;
 
-/// A strip and what the user should know about it.
+/// A strip and remarks for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Strip {
     /// The page.
     pub scene: Scene,
-    /// What would make it more readable; lower case, no period.
+    /// Remarks on how to make it more readable; lower case, no period.
     pub remarks: Vec<String>,
 }
 
-/// What a strip is made from.
+/// The source of a strip.
 #[derive(Clone, Copy)]
 pub struct StripSource<'a> {
-    /// For the mission's start.
+    /// The mission, for its start.
     pub mission: &'a Mission,
-    /// What is shown.
+    /// The view of the mission.
     pub view: &'a View,
-    /// Where everything stands.
+    /// The picture of the view, with the places of everything.
     pub picture: &'a Picture<'a>,
-    /// How it looks.
+    /// The style of the picture.
     pub style: &'a Style,
-    /// What is written with.
+    /// The fonts for all text.
     pub fonts: &'a Fonts,
-    /// What lays out anew where room is scarce.
+    /// The engine for new layouts where room is scarce.
     pub engine: &'a dyn Engine,
 }
 
@@ -105,7 +105,7 @@ pub fn strip(
     })
 }
 
-/// What to say about the smallest text on paper, in pixels.
+/// The remark about a smallest text of `text_px` pixels on paper; `None` where it can be read.
 fn remark(text_px: f64, mm: f64) -> Option<String> {
     let points = text_px * PT_PER_PX;
     (points < SMALLEST_PT).then(|| {
@@ -117,7 +117,7 @@ fn remark(text_px: f64, mm: f64) -> Option<String> {
     })
 }
 
-/// How many panels stand side by side: as given, else as few as keep the page from being too high.
+/// The number of panels side by side: as given, else the fewest that keep the page from being too high.
 fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
     if let Choice::Grid(columns, _) = choice {
         return (*columns).min(panels).max(1);
@@ -129,7 +129,7 @@ fn columns(choice: &Choice, panels: usize, natural: Size) -> usize {
     (1..=panels).find(|c| high(*c) <= HIGHEST).unwrap_or(1)
 }
 
-/// How many square pixels of panels a strip on a screen may take for the sake of its text.
+/// The largest area of panels in square pixels that a strip on a screen may take for the sake of its text.
 const LARGEST_STRIP: f64 = 24e6;
 
 /// The grid of panels.
@@ -138,7 +138,7 @@ struct PanelGrid {
     width: f64,
     /// The size of a graph on it.
     panel: Size,
-    /// The font size of what is not graph.
+    /// The font size of text outside the graphs.
     caption: f64,
     /// The smallest font size in the graphs.
     text: f64,
@@ -212,7 +212,7 @@ impl<'a> StripSource<'a> {
         Measured::new(self.view, self.style, self.fonts, options).with(layout.clone())
     }
 
-    /// One window with its frame, its time and what changed.
+    /// Draws one window with its frame, its time and its changes.
     fn panel(
         &self,
         scene: &Scene,
@@ -275,7 +275,7 @@ impl<'a> StripSource<'a> {
         fitting.next().unwrap_or_else(|| frame.words(1))
     }
 
-    /// The shared legend from `y` on; returns its height.
+    /// Draws the shared legend from `y` on; returns its height.
     fn legend(&self, page: &PanelGrid, y: f64, groups: &mut Vec<Group>) -> f64 {
         // A page so small that its legend has the smallest type, then enlarged to that of captions.
         let small = Size::new(page.width, 300.0);
@@ -312,7 +312,7 @@ impl<'a> StripSource<'a> {
     }
 }
 
-/// The upright box around a piece; of a text only its height and beginning.
+/// The upright box around a piece; for a text only its height and beginning.
 fn piece_bounds(piece: &Piece) -> Option<Rect> {
     match piece {
         Piece::Shape(shape) => match &shape.form {

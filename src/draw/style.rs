@@ -1,4 +1,4 @@
-//! How it looks: every colour, stroke and font size, read from `styles/*.toml`; no colour literal stands anywhere else.
+//! Styles: every colour, stroke and font size, read from `styles/*.toml`; no colour literal stands anywhere else.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -24,10 +24,10 @@ pub const BUILTIN: &[(&str, &str)] = &[
 pub struct Color(Option<[u8; 3]>);
 
 impl Color {
-    /// Nothing is painted.
+    /// The colour that paints nothing.
     pub const NONE: Self = Self(None);
 
-    /// Red, green and blue.
+    /// The colour of red, green and blue.
     pub const fn of(rgb: [u8; 3]) -> Self {
         Self(Some(rgb))
     }
@@ -121,7 +121,7 @@ sections! {
     }
 }
 
-/// How it looks; a section of the file per field, explained in `styles/light.toml`.
+/// The look of pictures; a section of the file per field, explained in `styles/light.toml`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Style {
     pub(crate) page: Page,
@@ -172,7 +172,8 @@ impl Style {
     /// `base` (default `light`).
     ///
     /// # Errors
-    /// [`Error::BadFile`] with the line, for what is no TOML, an unknown section or key, or a value of the wrong kind.
+    /// [`Error::BadFile`] with the line, for a text that is not TOML, an unknown section or key, or a value of the
+    /// wrong kind.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
         let file = StyleFile::read(text, path)?;
         let mut keys = match file.values.get("base") {
@@ -180,7 +181,7 @@ impl Style {
             Some(Value::String(base)) => builtin_text(base)
                 .and_then(|text| complete(text, path))
                 .map_err(|e| file.bad(&["base"], e.to_string()))?,
-            Some(_) => return Err(file.bad(&["base"], "`base` is no name of a style".to_owned())),
+            Some(_) => return Err(file.bad(&["base"], "`base` is not the name of a style".to_owned())),
         };
         file.overlay(&mut keys)?;
         Self::from_keys(keys, path)
@@ -272,7 +273,7 @@ impl<'a> StyleFile<'a> {
         })
     }
 
-    /// What is wrong with the value at `[section]` or `[section, key]`.
+    /// The error for the value at `[section]` or `[section, key]`.
     fn bad(&self, at: &[&str], reason: String) -> Error {
         let mut table = Some(self.places.get_ref());
         let mut line = 0;
@@ -297,7 +298,7 @@ impl<'a> StyleFile<'a> {
                 .ok_or_else(|| self.bad(&[section], format!("unknown section `{section}`")))?;
             let table = value.as_table();
             let table =
-                table.ok_or_else(|| self.bad(&[section], format!("`{section}` is no section")))?;
+                table.ok_or_else(|| self.bad(&[section], format!("`{section}` is not a section")))?;
             for (key, value) in table {
                 let at = [section.as_str(), key.as_str()];
                 let old = known.get_mut(key);
@@ -314,7 +315,7 @@ impl<'a> StyleFile<'a> {
     }
 }
 
-/// What `new` should be to stand for `old`; `None` if it can.
+/// The kind of value that `new` should be to stand for `old`; `None` if it is one.
 fn misfit(old: &Value, new: &Value) -> Option<&'static str> {
     let length = |v: &Value| {
         #[expect(clippy::cast_precision_loss, reason = "only its range matters")]
@@ -337,7 +338,7 @@ fn misfit(old: &Value, new: &Value) -> Option<&'static str> {
     (!fits).then_some(kind)
 }
 
-/// The line, 1.., of a byte.
+/// The line of a byte, counted from 1.
 fn line_at(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
 }
@@ -391,7 +392,7 @@ mod tests {
         assert!(refusal("[node]\nfill = \"blue\"").contains("line 2: `fill` must be a colour"));
         assert!(refusal("[node]\n\nsize = -1").contains("line 3: `size` must be a length"));
         assert!(refusal("[node]\nsize = nan").contains("a length"));
-        assert!(refusal("node = 3").contains("line 1: `node` is no section"));
+        assert!(refusal("node = 3").contains("line 1: `node` is not a section"));
         assert!(refusal("base = \"neon\"").contains("line 1: unknown style `neon`"));
         assert!(refusal("[node\nfill").contains("line 1"));
     }

@@ -1,4 +1,4 @@
-//! How wide a label is in the bundled font, and how to show what the font lacks.
+//! The fonts: the width of a label in the bundled font, and the way to show characters that it lacks.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -15,13 +15,13 @@ pub const REGULAR: &[u8] = include_bytes!("../../styles/fonts/Inter-Regular.ttf"
 /// The bundled font's `SemiBold`.
 pub const SEMIBOLD: &[u8] = include_bytes!("../../styles/fonts/Inter-SemiBold.ttf");
 
-/// How bold a text is.
+/// The weight of a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
-    /// 400.
+    /// Weight 400.
     #[default]
     Regular,
-    /// 600.
+    /// Weight 600.
     SemiBold,
 }
 
@@ -29,12 +29,12 @@ pub enum Weight {
 #[derive(Debug)]
 struct Face {
     data: Cow<'static, [u8]>,
-    /// Sorted by character.
+    /// Each character with its width in em, sorted by character.
     advances: Vec<(u32, f32)>,
 }
 
 impl Face {
-    /// `None` if the bytes are no font, or one without characters.
+    /// The font of these bytes; `None` if they are not a font, or one without characters.
     fn read(data: Cow<'static, [u8]>) -> Option<Self> {
         let font = FontRef::from_index(&data, 0).ok()?;
         let em = font
@@ -94,10 +94,10 @@ impl Fonts {
         }
     }
 
-    /// With one more font for characters that the ones before lack.
+    /// The fonts with one more for characters that the ones before lack.
     ///
     /// # Errors
-    /// [`Error::BadFile`] where `data`, read from `path`, is no TrueType or OpenType font.
+    /// [`Error::BadFile`] where `data`, read from `path`, is not a TrueType or OpenType font.
     pub fn with(mut self, data: Vec<u8>, path: &Path) -> Result<Self> {
         // Whoever shapes text for a PDF takes it for granted that this reader takes the font too.
         let sound = ttf_parser::Face::parse(&data, 0).is_ok();

@@ -1,4 +1,4 @@
-//! What the messages of a mission claim about its graph: who says what, how strongly, and when.
+//! Claims that the messages of a mission make about its graph, with their source, strength and times.
 //!
 //! A claim is kept once per source with the times at which it was made, so that millions of messages that repeat
 //! themselves take no more room than their (compressed) times.
@@ -12,24 +12,24 @@ use crate::base::time::Stamp;
 use crate::evidence::texts::LoggedTexts;
 use crate::evidence::times::{SeriesId, Stamps};
 
-/// How well something is known. Ordered: the stronger is the smaller.
+/// The strength of the evidence for something. Ordered: the stronger is the smaller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Degree {
     /// Messages of this very connection, or the middleware's own statistics.
     Measured,
-    /// Somebody says so: a log record's topic list, a graph snapshot, the user's own file.
+    /// A statement: a log record's topic list, a graph snapshot, the user's own file.
     Stated,
-    /// A convention says so: an action, a bond, every node publishes `/rosout`.
+    /// A convention: an action, a bond, every node publishes `/rosout`.
     Inferred,
     /// Known from a header or metadata only.
     Declared,
 }
 
 impl Degree {
-    /// All of them, strongest first.
+    /// All degrees, strongest first.
     pub const ALL: [Self; 4] = [Self::Measured, Self::Stated, Self::Inferred, Self::Declared];
 
-    /// Its word in JSON and in class names.
+    /// The degree's word in JSON and in class names.
     pub fn word(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -40,11 +40,11 @@ impl Degree {
     }
 }
 
-/// A text seen in the mission: the name of a node or topic, a type, a state.
+/// The number of a text seen in the mission: the name of a node or topic, a type, a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Name(pub(crate) u32);
 
-/// What a source can claim. The number of a name says nothing: order by its text.
+/// A claim of a source. The number of a name has no meaning: order by its text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Claim {
     /// This node is alive.
@@ -89,12 +89,13 @@ pub(crate) enum Claim {
     SaysSubscribe(Name, Name),
     /// This logger logs from this source file (its own name, no folder).
     LogsFrom(Name, Name),
-    /// A snapshot was taken: what the source claims in it but not in a later one of the same name is gone.
+    /// A snapshot was taken: claims that the source made in an earlier snapshot of the same name and not in this one
+    /// have ended.
     Snapshot(Name),
 }
 
 impl Claim {
-    /// The names in it.
+    /// The names in the claim.
     pub(crate) fn names(self) -> [Option<Name>; 2] {
         match self {
             Self::Node(a)
@@ -151,7 +152,7 @@ impl Claim {
     }
 }
 
-/// The place of a row in the table of sources.
+/// The place of a source in the table of sources.
 pub(crate) type SourceId = usize;
 
 /// A claim by one source.
@@ -160,29 +161,29 @@ pub(crate) struct ClaimRecord {
     pub(crate) claim: Claim,
     pub(crate) source: SourceId,
     pub(crate) degree: Degree,
-    /// The snapshots that this claim stands and falls with.
+    /// The snapshots that this claim belongs to, which end it when it is missing.
     pub(crate) snapshot: Option<Name>,
-    /// When it was made.
+    /// The times at which it was made.
     pub(crate) times: SeriesId,
 }
 
-/// One piece of evidence, kept because somebody asked why.
+/// A piece of evidence, kept for `why`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct EvidenceLine {
-    /// When; `None` for what holds for the whole mission.
+    /// The time; `None` for evidence that holds for the whole mission.
     pub time: Option<Stamp>,
-    /// The word of its source.
+    /// The word of the source.
     pub source: &'static str,
-    /// How strong it is.
+    /// The strength.
     pub degree: Degree,
-    /// What it says, in one line; may hold anything, so escape it where it is written.
+    /// The statement, in one line; may hold anything, so escape it where it is written.
     pub text: String,
 }
 
 /// All claims of a mission.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Claims {
-    /// The names somebody asks about ([`EvidenceLine`]); none: no pieces are kept.
+    /// The names that [`EvidenceLine`]s are kept for; if empty, none are kept.
     pub(crate) watched: Vec<String>,
     pub(crate) pieces: Vec<EvidenceLine>,
     /// The sequence numbers of streams, by the streams' places; kept as if they were sizes.
@@ -191,26 +192,26 @@ pub(crate) struct Claims {
     pub(crate) headers: BTreeMap<usize, SeriesId>,
     /// The hashes of payloads, by the streams' places; kept as if they were sizes.
     pub(crate) payloads: BTreeMap<usize, SeriesId>,
-    /// How many publishers each stream was offered by, by the streams' places.
+    /// The number of publishers that each stream was offered by, by the streams' places.
     pub(crate) offers: BTreeMap<usize, u32>,
-    /// What nodes log and what messages hold, as text.
+    /// Texts that nodes log, and texts in messages.
     pub(crate) spoken: LoggedTexts,
     ids: HashMap<Arc<str>, Name>,
     texts: Vec<Arc<str>>,
-    /// The bytes of all texts.
+    /// The number of bytes of all texts.
     bytes: usize,
     places: HashMap<(Claim, SourceId, Option<Name>), usize>,
     pub(crate) list: Vec<ClaimRecord>,
-    /// Taken in until they are shared.
+    /// All times, which are added until this is shared.
     pub(crate) times: Arc<Stamps>,
-    /// What stands for the texts that found no room.
+    /// The name that stands for all texts that found no room.
     overflow: Option<Name>,
-    /// Claims that found no room.
+    /// The number of claims that found no room.
     pub(crate) dropped: u64,
 }
 
 impl Claims {
-    /// The handle on a text; the handle on nothing for one that finds no room.
+    /// The name of a text; the overflow name if there is no room.
     pub(crate) fn name(&mut self, text: &str) -> Name {
         if let Some(name) = self.ids.get(text) {
             return *name;
@@ -230,7 +231,7 @@ impl Claims {
         name
     }
 
-    /// The handle on all texts that find no room; nothing claimed about it is kept.
+    /// The name that stands for all texts that find no room; no claim about it is kept.
     fn overflow(&mut self) -> Name {
         let name = Name(u32::try_from(self.texts.len()).unwrap_or(u32::MAX));
         let texts = &mut self.texts;
@@ -240,19 +241,19 @@ impl Claims {
         })
     }
 
-    /// The handle on a text that was seen already.
+    /// The name of a text that was seen already.
     pub(crate) fn known(&self, text: &str) -> Option<Name> {
         self.ids.get(text).copied()
     }
 
-    /// The text of a handle.
+    /// The text of a name.
     pub(crate) fn text(&self, name: Name) -> Arc<str> {
         self.texts
             .get(name.0 as usize)
             .map_or_else(|| "".into(), Arc::clone)
     }
 
-    /// Keeps the words of a claim, if it is about what somebody asked for.
+    /// Keeps the words of a claim if `why` asks about its names.
     pub(crate) fn explain(
         &mut self,
         said: Statement,
@@ -273,28 +274,28 @@ impl Claims {
         }
     }
 
-    /// Whether somebody asked about something with these names.
+    /// Whether `why` asks about something with these names.
     pub(crate) fn is_watched(&self, names: [Option<Name>; 2]) -> bool {
         let about = |text: &String| names.iter().flatten().any(|n| *self.text(*n) == **text);
         !self.watched.is_empty() && self.watched.iter().all(about)
     }
 
-    /// Takes in a sequence number of the stream at `place`.
+    /// Adds a sequence number of the stream at `place`.
     pub(crate) fn sequence(&mut self, place: usize, time: Stamp, number: u32) {
         note(&mut self.times, &mut self.sequences, place, (time, number));
     }
 
-    /// Takes in a header stamp of the stream at `place`.
+    /// Adds a header stamp of the stream at `place`.
     pub(crate) fn header(&mut self, place: usize, stamp: Stamp, log_time: u32) {
         note(&mut self.times, &mut self.headers, place, (stamp, log_time));
     }
 
-    /// Takes in the hash of a payload of the stream at `place`.
+    /// Adds the hash of a payload of the stream at `place`.
     pub(crate) fn payload(&mut self, place: usize, time: Stamp, hash: u32) {
         note(&mut self.times, &mut self.payloads, place, (time, hash));
     }
 
-    /// Ends the taking in of times.
+    /// Ends the adding of times.
     ///
     /// # Errors
     /// As [`Stamps::finish`].
@@ -302,7 +303,7 @@ impl Claims {
         Arc::get_mut(&mut self.times).map_or(Ok(()), Stamps::finish)
     }
 
-    /// Takes in that `source` claims something, at `time` if it is a matter of time.
+    /// Adds a claim by `source`, at `time` if it has one.
     pub(crate) fn add(&mut self, source: SourceId, said: Statement, time: Option<Stamp>) {
         if self.overflow.is_some() && said.claim.names().contains(&self.overflow) {
             self.dropped += 1;
@@ -337,7 +338,7 @@ impl Claims {
         }
     }
 
-    /// Numbers all names in the order of their texts; tells the new number of each old one.
+    /// Numbers all names in the order of their texts; returns the new number of each old one.
     pub(crate) fn renumber(&mut self) -> Vec<Name> {
         let mut order: Vec<usize> = (0..self.texts.len()).collect();
         order.sort_by(|a, b| self.texts[*a].cmp(&self.texts[*b]));
@@ -367,7 +368,7 @@ impl Claims {
         self.texts
     }
 
-    /// When a fact was claimed, sorted.
+    /// The times at which a fact was claimed, sorted.
     pub(crate) fn times(&self, fact: &ClaimRecord) -> io::Result<Vec<Stamp>> {
         self.times.times(fact.times)
     }
@@ -386,7 +387,7 @@ fn note(
     }
 }
 
-/// A claim with all that belongs to it but its source and time.
+/// A claim with everything that belongs to it except its source and time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Statement {
     pub(crate) claim: Claim,

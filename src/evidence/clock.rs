@@ -1,4 +1,4 @@
-//! Which times to believe: a few messages far from all others were recorded with a clock that was not set.
+//! Credible times: a few messages far from all others were recorded with a clock that was not set.
 
 use std::collections::BTreeMap;
 
@@ -6,11 +6,12 @@ use crate::base::budget;
 use crate::base::time::{Span, Stamp};
 
 const DAY: i64 = 86_400_000_000_000;
-/// Times further than this from all others are strangers.
+/// The distance in days beyond which times count as far from all others.
 const FAR_DAYS: i64 = 365;
-/// Of so many messages at most one may be a stranger that is set aside.
+/// The most far messages that are set aside, as one in so many messages.
 const RARE: u64 = 10;
-/// Ten years after 1970: a clock without a battery begins there until it is set, and no robot recorded then.
+/// The days after 1970, ten years, that count as an unset clock: without a battery it begins there, and no robot
+/// recorded then.
 const UNSET_DAYS: i64 = 3652;
 
 /// Days without a gap of more than [`FAR_DAYS`] between them.
@@ -21,16 +22,17 @@ struct DayCluster {
     messages: u64,
 }
 
-/// What to make of the times of a mission.
+/// The judgement on the times of a mission.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Belief {
     /// The times to believe, if some messages lie far from the bulk; `None` to believe all.
     pub(crate) span: Option<Span>,
-    /// That the clock jumps, where messages too many to be an accident lie far apart and stay on one axis.
+    /// A sentence about jumps of the clock, where messages too many to be an accident lie far apart and stay on one
+    /// axis.
     pub(crate) jump: Option<String>,
 }
 
-/// Judges the times of a mission by how many messages each day has.
+/// Judges the times of a mission by the number of messages of each day.
 pub(crate) fn believed(days: &BTreeMap<i64, u64>) -> Belief {
     let clusters = clusters(days);
     let Some(bulk) = clusters.iter().max_by_key(|c| c.messages) else {
@@ -77,7 +79,7 @@ fn clusters(days: &BTreeMap<i64, u64>) -> Vec<DayCluster> {
     clusters
 }
 
-/// How many clusters are named.
+/// The number of clusters that are named.
 const NAMED: usize = 3;
 
 fn told(clusters: &[DayCluster]) -> String {

@@ -1,8 +1,8 @@
-//! What the source code of the robot declares: names come from the bag, edges from the code. Nothing is run.
+//! Declarations in the source code of the robot: names come from the bag, edges from the code. Nothing is run.
 //!
-//! What a node does stands in its code almost always in plain sight; what the code does not say is which nodes ran. So a
-//! node that the bag names gets the publishers and subscribers that its code declares, where topic and type are recorded
-//! under exactly these names. Tried on 182 public repositories and 242 bags; `matching` says how right that is.
+//! The topics of a node almost always stand in its code in plain sight; the code does not say which nodes ran. So a
+//! node that the bag names gets the publishers and subscribers that its code declares, where topic and type are
+//! recorded under exactly these names. Tried on 182 public repositories and 242 bags; `matching` states the precision.
 
 mod cpp;
 mod declaration;
@@ -27,18 +27,18 @@ use declaration::FileCode;
 use files::{FileKind, Files, SourceFile};
 use workspace::{FileDeclaration, Instance, Workspace};
 
-/// Which code to read.
+/// The source code to read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceCode {
     /// A workspace or repository.
     pub folder: PathBuf,
-    /// As of when.
+    /// The version to read.
     pub version: Version,
     /// Whether the only place in the code that can be meant counts too, though the bag does not name its node.
     pub infers: bool,
 }
 
-/// As of when code is read.
+/// The version of the code to read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Version {
     /// The last commit before the recording's end, where the folder is in a git repository; else the files as they lie.
@@ -50,15 +50,15 @@ pub enum Version {
     Worktree,
 }
 
-/// What was read of the source code.
+/// The source code after reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Code {
     instances: Vec<Instance>,
-    /// Every place in the code that declares something.
+    /// Every place in the code with a declaration.
     places: Vec<FileDeclaration>,
     files: usize,
     packages: usize,
-    /// Which commit was read, in words.
+    /// The commit that was read, in words.
     version: Option<String>,
     infers: bool,
     notices: Vec<Notice>,
@@ -114,7 +114,7 @@ fn workspace(files: &Files) -> Workspace {
     Workspace::new(packages, code, launches)
 }
 
-/// What one file tells.
+/// The result of reading one file.
 enum FileRead {
     Code(FileCode),
     Launch(Vec<launch::LaunchedNode>),
@@ -137,7 +137,7 @@ fn read_file(file: &SourceFile) -> FileRead {
     }
 }
 
-/// How many files are read at once: more do not help, for the largest file decides.
+/// The number of files read at once: more do not help, for the largest file decides.
 const READERS: usize = 4;
 
 /// Reads all files, in their order.

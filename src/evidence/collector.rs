@@ -1,4 +1,4 @@
-//! Takes in any number of bags: where every message lies in time, and what their contents claim.
+//! A collector that takes in any number of bags: the times of all messages, and the claims of their contents.
 
 mod services;
 
@@ -20,17 +20,18 @@ use crate::evidence::publishers;
 use crate::evidence::source::{self, Read, SourceContext, echo, equal_stamps, payload};
 use crate::evidence::times::Stamps;
 
-/// What to look at while reading.
+/// Options for reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CollectOptions {
-    /// Know every payload's size, even if that means reading more than the index.
+    /// Whether to learn every payload's size, even if that means reading more than the index.
     pub sizes: bool,
-    /// Keep every piece of evidence on the elements with all of these names (one: a node or topic; two: an edge).
+    /// The names to keep every piece of evidence for: elements with all of these names (one: a node or topic; two: an
+    /// edge).
     pub why: Vec<String>,
-    /// Infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
+    /// Whether to infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
     pub infer_stamps: bool,
-    /// The beginnings of payloads are compared with each other and with log texts, up to this many bytes of them; 0: none,
-    /// and none is read for it.
+    /// The number of payload bytes to compare with each other and with log texts, from the beginnings of payloads; 0:
+    /// none, and none is read for it.
     pub payload_bytes: u64,
     /// The topic of strings whose texts are kept ([`Recorded::texts`]).
     pub texts_of: Option<String>,
@@ -48,28 +49,28 @@ impl Default for CollectOptions {
     }
 }
 
-/// Bytes of payload that are compared unless asked otherwise: a tenth of a second of work, and enough for an hour of a
+/// The default number of payload bytes that are compared: a tenth of a second of work, and enough for an hour of a
 /// small robot without cameras.
 pub const PAYLOAD_BYTES: u64 = 64 << 20;
 /// The most texts that are kept of a topic.
 const MOST_TEXTS: usize = 10_000;
-/// How many characters of each.
+/// The most characters kept of each text.
 const LONGEST_TEXT: usize = 200;
-/// What a payload costs besides its bytes: its hash is kept.
+/// The cost of a payload besides its bytes, in bytes: its hash is kept.
 const PAYLOAD_ENTRY: u64 = 64;
 
-/// Takes in bags, one after another.
+/// A collector of bags, one after another.
 #[derive(Debug, Default)]
 pub struct Collector {
     options: CollectOptions,
     streams: Vec<Stream>,
-    /// Who reads the messages of each stream.
+    /// The sources that read the messages of each stream.
     readers: Vec<Vec<(SourceId, Read)>>,
     /// Whether the header stamps of each stream are wanted.
     stamped: Vec<bool>,
-    /// How to take the messages of each stream apart for words and numbers, where they hold any.
+    /// The schema for taking the messages of each stream apart, where they hold words or numbers.
     schemas: Vec<Option<MessageSchema>>,
-    /// Bytes of payload compared so far.
+    /// The number of payload bytes compared so far.
     compared: u64,
     /// Whether the messages of each stream are texts that are kept.
     told: Vec<bool>,
@@ -81,7 +82,7 @@ pub struct Collector {
 }
 
 impl Collector {
-    /// A collector of nothing yet.
+    /// An empty collector.
     pub fn new(options: CollectOptions) -> Self {
         let mut all = Self::default();
         all.facts.watched.clone_from(&options.why);
@@ -89,7 +90,7 @@ impl Collector {
         all
     }
 
-    /// The sink for the next bag; `progress` hears how far its reader is (bytes done, bytes in all).
+    /// The sink for the next bag; `progress` gets the reader's progress (bytes done, bytes in all).
     pub fn bag<'a>(&'a mut self, progress: &'a mut dyn FnMut(u64, u64)) -> BagSink<'a> {
         self.bags += 1;
         BagSink {
@@ -100,7 +101,7 @@ impl Collector {
         }
     }
 
-    /// Lets every source look at the newest stream.
+    /// Lets every source read the announcement of the newest stream.
     fn announced(&mut self) {
         let Some((place, stream)) = self.streams.iter().enumerate().next_back() else {
             return;
@@ -151,7 +152,7 @@ impl Collector {
         }
     }
 
-    /// Keeps the text of a message, if somebody asked for those of its topic.
+    /// Keeps the text of a message, if those of its topic were asked for.
     fn keep_text(&mut self, place: usize, message: &Message<'_>) {
         if !self.told[place] || self.texts.len() >= MOST_TEXTS {
             return;
@@ -164,7 +165,7 @@ impl Collector {
         }
     }
 
-    /// Keeps what a payload has in common with others, as long as the budget lasts.
+    /// Keeps the content of a payload for comparisons, as long as the budget lasts.
     fn compare(&mut self, place: usize, message: &Message<'_>) {
         let beginning = message.data.get(..payload::HEAD).unwrap_or(message.data);
         self.compared = self
@@ -188,7 +189,7 @@ impl Collector {
         }
     }
 
-    /// Ends the taking in.
+    /// Ends the collecting.
     ///
     /// # Errors
     /// If times had to be put into a temporary file and that failed.
@@ -224,15 +225,15 @@ impl Collector {
     }
 }
 
-/// Whether the last message stands for its publisher after its moment. rospy latches its log and ROS 2 keeps its
-/// own, and yet the last record says nothing about its node's life.
+/// Whether the last message keeps its meaning after its time (latched). The logs of rospy and ROS 2 are latched too,
+/// and yet their last record says nothing about the life of the node.
 fn is_held(connection: &Connection) -> bool {
     let qos = connection.qos.as_deref().unwrap_or_default();
     let kept = connection.latching || source::qos::is_transient_local(qos);
     kept && connection.topic.as_str() != "/rosout"
 }
 
-/// Says that a stream, or a message of it, has another layout than its type promises.
+/// A notice that a stream, or a message of it, has another layout than its type promises.
 fn undecodable(stream: &Stream, why: &str) -> Notice {
     let (topic, kind) = (&stream.connection.topic, &stream.connection.type_name);
     Notice::new(
@@ -241,7 +242,7 @@ fn undecodable(stream: &Stream, why: &str) -> Notice {
     )
 }
 
-/// The temporary file of times could not be written or read.
+/// The error for the temporary file of times, which could not be written or read.
 pub(crate) fn spool_error(source: io::Error) -> Error {
     Error::Io {
         path: "a temporary file".into(),
@@ -250,7 +251,7 @@ pub(crate) fn spool_error(source: io::Error) -> Error {
     }
 }
 
-/// Feeds one bag into a [`Collector`].
+/// A sink that feeds one bag into a [`Collector`].
 pub struct BagSink<'a> {
     collector: &'a mut Collector,
     progress: &'a mut dyn FnMut(u64, u64),
@@ -333,7 +334,7 @@ impl Sink for BagSink<'_> {
     }
 }
 
-/// Everything that the bags of a mission hold about its graph.
+/// Everything that the bags of a mission contain about its graph.
 #[derive(Debug)]
 pub struct Recorded {
     pub(crate) streams: Vec<Stream>,
@@ -341,9 +342,9 @@ pub struct Recorded {
     pub(crate) facts: Claims,
     /// The texts of the topic that was asked for, sorted by time.
     pub texts: Vec<(Stamp, String)>,
-    /// What went wrong without stopping us.
+    /// Problems that did not stop the reading.
     pub notices: Notices,
-    /// The times that are no accident; `None` if all of them may be believed.
+    /// The credible times; `None` if all of them are.
     pub(crate) believed: Option<Span>,
     /// From the first log time to the last plus 1 ns, without messages at impossible times; `None` if there is no
     /// message.
@@ -351,12 +352,12 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Whether a time may be believed.
+    /// Whether a time is credible.
     pub(crate) fn believes(&self, time: Stamp) -> bool {
         self.believed.is_none_or(|span| span.contains(time))
     }
 
-    /// Finds the span of all believable messages, and counts the others.
+    /// Finds the span of all messages at credible times, and counts the others.
     fn measure(&mut self) -> io::Result<Option<Span>> {
         let mut span: Option<Span> = None;
         let mut aside = 0;

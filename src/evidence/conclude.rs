@@ -1,5 +1,5 @@
-//! From everything recorded to what follows from it: the proofs of all sources and of the user's files, values that
-//! somebody states, restarts. Made once, for whatever windows.
+//! Conclusions from everything recorded: the proofs of all sources and of the user's files, stated values, restarts.
+//! Made once, for any windows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -20,39 +20,39 @@ use crate::evidence::times::Stamps;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
 
-/// What is added to what the bags tell.
+/// Additions to the contents of the bags.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConcludeOptions {
     /// Whether nodes whose names differ only in an anonymous suffix are one, under the name of their role.
     pub roles: bool,
-    /// Nodes and edges that the user knows of.
+    /// Nodes and edges given by the user.
     pub topology: Topology,
-    /// What source code declares.
+    /// Declarations in source code.
     pub code: Option<Arc<Code>>,
 }
 
-/// What follows from everything recorded, under names that are numbered in the order of their texts.
+/// The conclusions from everything recorded, with names numbered in the order of their texts.
 #[derive(Debug)]
 pub struct Findings {
     /// The mission's first and last moment.
     pub(crate) mission: (Stamp, Stamp),
-    /// The connections, as in [`Recorded`] but for the numbers of names.
+    /// The connections, as in [`Recorded`] except for the numbers of names.
     pub(crate) streams: Vec<Stream>,
-    /// Every reason to believe in an element.
+    /// Every proof of an element.
     pub(crate) proofs: Vec<Proof>,
-    /// When nodes began anew under the same name.
+    /// The restarts of nodes under the same name.
     pub(crate) restarts: Restarts,
-    /// What somebody states of elements besides their being there.
+    /// Stated values of elements: types, states, quality of service.
     pub(crate) values: StatedValues,
-    /// How many publishers the bags count on each topic.
+    /// The number of publishers that the bags count on each topic.
     pub(crate) offers: BTreeMap<Name, u32>,
     /// The texts of all names.
     names: Vec<Arc<str>>,
-    /// Every piece of evidence on what [`super::collector::CollectOptions::why`] asks for, in order of time, source and text.
+    /// Every piece of evidence for [`super::collector::CollectOptions::why`], in order of time, source and text.
     pub lines: Vec<EvidenceLine>,
-    /// What is worth saying about what the user gave.
+    /// Notices about the user's files.
     pub notices: Notices,
-    /// What source code offers and was not drawn, a line each.
+    /// Edges that source code offers and that were not drawn, a line each.
     pub undrawn: Vec<String>,
 }
 
@@ -141,7 +141,8 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     })
 }
 
-/// Names of the user's that nothing in the bags bears: topics, and nodes that come close to one that is known.
+/// Notices about names in the user's files that are not in the bags: topics, and nodes whose name is close to a known
+/// one.
 fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> {
     let texts = |names: &mut dyn Iterator<Item = Name>| -> BTreeSet<Arc<str>> {
         names.map(|name| known.text(name)).collect()
@@ -178,7 +179,7 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
     told.into_iter().map(notice).collect()
 }
 
-/// Puts into words what rests on no single message, for elements that somebody asked about.
+/// Explains proofs that rest on no single message, for elements that `why` asks about.
 fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     let name = |name: Name| known.facts.text(name);
     let told = |what| match what {
@@ -235,7 +236,7 @@ fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
     known.facts.pieces.extend(pieces);
 }
 
-/// Adds what the user's file says to what is known.
+/// Adds an entry of the user's file.
 fn told(known: &mut Conclusions<'_>, entry: &TopologyEntry, mission: (Stamp, Stamp)) {
     let mut name = |text: &String| known.facts.name(text);
     let what = match &entry.element {
@@ -279,7 +280,7 @@ fn told(known: &mut Conclusions<'_>, entry: &TopologyEntry, mission: (Stamp, Sta
     });
 }
 
-/// Puts every node under the name of its role; tells which names changed.
+/// Puts every node under the name of its role; returns the names that changed.
 fn fold(proofs: &mut [Proof], facts: &mut Claims) -> BTreeMap<Name, Name> {
     let mut roles = BTreeMap::new();
     let mut to = |node: Name| {

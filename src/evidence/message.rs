@@ -1,4 +1,4 @@
-//! Payloads as values: a cursor over ROS 1 and CDR bytes, and the message definitions that say what they hold.
+//! Payloads as values: a cursor over ROS 1 and CDR bytes, and the message definitions that describe them.
 
 pub(crate) mod cursor;
 pub(crate) mod definition;

@@ -1,4 +1,4 @@
-//! What the claims of a mission amount to: every reason to believe in a node, a topic or an edge.
+//! Proofs from the claims of a mission: every reason to believe in a node, a topic or an edge.
 
 mod at_word;
 mod closed;
@@ -17,30 +17,30 @@ use crate::evidence::times::SeriesId;
 /// A connection of one of the bags.
 #[derive(Clone, Debug)]
 pub(crate) struct Stream {
-    /// The place of its bag among the inputs.
+    /// The place of the bag among the inputs.
     pub(crate) bag: usize,
-    /// As the reader announced it.
+    /// The connection as the reader announced it.
     pub(crate) connection: Connection,
     pub(crate) topic: Name,
     pub(crate) publisher: Option<Name>,
     /// The node that counts as its publisher when graphs are built: by its name or by its role.
     pub(crate) speaker: Option<Name>,
-    /// Whether a message outlives its moment: latched (ROS 1) or transient local (ROS 2).
+    /// Whether the last message stays valid after its time: latched (ROS 1) or transient local (ROS 2).
     pub(crate) latched: bool,
-    /// How far its publisher's name is believed.
+    /// The reliability of its publisher's name.
     pub(crate) trust: Reliability,
     /// The log times of its messages.
     pub(crate) times: SeriesId,
 }
 
-/// How far the publisher that a header names is believed.
+/// The reliability of the publisher that a header names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reliability {
-    /// It publishes every message.
+    /// It published every message.
     Whole,
-    /// It publishes the first message; the others are anybody's.
+    /// It published the first message; the others may be from any node.
     First,
-    /// It plays back what others published once.
+    /// It played back messages that others published earlier.
     Player,
 }
 
@@ -49,14 +49,14 @@ pub(crate) enum Reliability {
 pub(crate) enum ElementKey {
     Node(Name),
     Topic(Name),
-    /// Node, topic.
+    /// A node and a topic that it publishes.
     Publish(Name, Name),
-    /// Topic, node.
+    /// A topic and a node that subscribes it.
     Subscribe(Name, Name),
 }
 
 impl ElementKey {
-    /// The names in it.
+    /// The names in the key.
     pub(crate) fn names(self) -> [Option<Name>; 2] {
         match self {
             Self::Node(a) | Self::Topic(a) => [Some(a), None],
@@ -74,7 +74,7 @@ impl ElementKey {
         }
     }
 
-    /// The same element by new names.
+    /// The same element with its names renumbered.
     fn renamed(self, to: &impl Fn(Name) -> Name) -> Self {
         match self {
             Self::Node(a) => Self::Node(to(a)),
@@ -85,10 +85,10 @@ impl ElementKey {
     }
 }
 
-/// When a reason holds.
+/// The times during which a proof holds.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Validity {
-    /// While the messages of this stream come.
+    /// While there are messages of this stream.
     Messages(usize),
     /// At the first message of this stream.
     First(usize),
@@ -96,19 +96,19 @@ pub(crate) enum Validity {
     Signs { signs: Vec<Stamp>, ends: Vec<Stamp> },
     /// From a beginning to the next end.
     Begins { signs: Vec<Stamp>, ends: Vec<Stamp> },
-    /// At these moments; what holds only then is not known to last.
+    /// At these moments; without other proofs, it is not known to last.
     Moments(Vec<Stamp>),
     /// As long as this other element lives.
     Like(ElementKey),
-    /// For the whole mission, unless signs tell when.
+    /// For the whole mission, unless signs give times.
     Whole,
-    /// From the first sign to the mission's end: it writes the bag.
+    /// From the first sign to the mission's end, for the recorder, which writes the bag.
     Unending,
-    /// For the whole mission, whatever signs there are.
+    /// For the whole mission, regardless of signs.
     Always,
 }
 
-/// One reason to believe in an element.
+/// A reason to believe in an element.
 #[derive(Clone, Debug)]
 pub(crate) struct Proof {
     pub(crate) what: ElementKey,
@@ -118,7 +118,7 @@ pub(crate) struct Proof {
 }
 
 impl Proof {
-    /// The same proof by new names.
+    /// Renumbers the names.
     pub(crate) fn rename(&mut self, to: &impl Fn(Name) -> Name) {
         self.what = self.what.renamed(to);
         if let Validity::Like(other) = &mut self.when {
@@ -127,23 +127,23 @@ impl Proof {
     }
 }
 
-/// Everything known about a mission once all bags are read, and what follows from it so far.
+/// Everything known about a mission once all bags are read, and the conclusions so far.
 #[derive(Debug)]
 pub(crate) struct Conclusions<'a> {
     pub(crate) streams: &'a [Stream],
     pub(crate) facts: Claims,
     pub(crate) proofs: Vec<Proof>,
-    /// Reasons that were put into words by who gave them, while somebody asks why.
+    /// Proofs that were explained by their source, while `why` asks for them.
     pub(crate) worded: BTreeSet<(ElementKey, SourceId)>,
-    /// Publications whose messages are those of another topic, byte by byte.
+    /// Publications whose messages are byte-for-byte copies of another topic's.
     pub(crate) copies: BTreeSet<(Name, Name)>,
     /// The mission's first and last moment.
     pub(crate) mission: (Stamp, Stamp),
     /// The streams of each topic.
     recorded: BTreeMap<Name, Vec<usize>>,
-    /// How many publishers each topic had when its recording began.
+    /// The number of publishers of each topic when its recording began.
     offers: BTreeMap<Name, u32>,
-    /// Why times could not be read, if so.
+    /// The error of reading times, if any.
     pub(crate) failed: Option<io::Error>,
     publishers: BTreeMap<Name, BTreeSet<Name>>,
     subscribers: BTreeMap<Name, BTreeSet<Name>>,
@@ -174,7 +174,7 @@ impl<'a> Conclusions<'a> {
         }
     }
 
-    /// Adds a reason.
+    /// Adds a proof.
     pub(crate) fn prove(&mut self, proof: Proof) {
         match proof.what {
             ElementKey::Node(node) => {
@@ -193,7 +193,7 @@ impl<'a> Conclusions<'a> {
         self.proofs.push(proof);
     }
 
-    /// Adds a reason, with the words it rests on for those who ask why; `time` if it is a matter of one.
+    /// Adds a proof, with its explanation for `why`; `time` if it belongs to one.
     pub(crate) fn because(
         &mut self,
         proof: Proof,
@@ -213,8 +213,8 @@ impl<'a> Conclusions<'a> {
         self.prove(proof);
     }
 
-    /// Adds what a rule infers, alive as long as `basis`, unless it is known already or something stronger is known
-    /// against it.
+    /// Adds the inference of a rule, alive as long as `basis`, unless the element is known already or stronger evidence
+    /// denies it.
     pub(crate) fn infer(
         &mut self,
         source: SourceId,
@@ -233,7 +233,8 @@ impl<'a> Conclusions<'a> {
         }
     }
 
-    /// The same for a topic whose messages name no publisher: the node publishes it whenever there are messages.
+    /// As [`Self::infer`] for a topic whose messages name no publisher: the node publishes it whenever there are
+    /// messages.
     pub(crate) fn infer_publisher(
         &mut self,
         source: SourceId,
@@ -258,7 +259,7 @@ impl<'a> Conclusions<'a> {
         }
     }
 
-    /// Whether somebody gave a reason for this element already.
+    /// Whether there is a proof of this element already.
     pub(crate) fn knows(&self, what: ElementKey) -> bool {
         match what {
             ElementKey::Node(node) => self.nodes.contains(&node),
@@ -268,7 +269,7 @@ impl<'a> Conclusions<'a> {
         }
     }
 
-    /// Whether a complete list, or every message's own header, speaks against an edge.
+    /// Whether a complete list, or every message's own header, contradicts an edge.
     pub(crate) fn denies(&mut self, what: ElementKey) -> bool {
         self.closed(|closed| closed.lists_deny(what) || closed.headers_deny(what))
     }
@@ -283,12 +284,12 @@ impl<'a> Conclusions<'a> {
         answer
     }
 
-    /// Whether a bag has a connection of this topic, be it without messages.
+    /// Whether a bag has a connection of this topic, even without messages.
     pub(crate) fn is_recorded(&self, topic: Name) -> bool {
         self.recorded.contains_key(&topic)
     }
 
-    /// The type of a recorded topic as ROS 1 writes it, without `/msg`; empty if no bag tells it.
+    /// The type of a recorded topic as ROS 1 writes it, without `/msg`; empty if no bag states it.
     pub(crate) fn kind(&self, topic: Name) -> String {
         let first = self.recorded.get(&topic).and_then(|all| all.first());
         first.map_or_else(String::new, |at| {
@@ -297,12 +298,12 @@ impl<'a> Conclusions<'a> {
         })
     }
 
-    /// How many publishers a topic had when its recording began; `None` if the bag does not tell.
+    /// The number of publishers of a topic when its recording began; `None` if the bag does not tell.
     pub(crate) fn offers(&self, topic: Name) -> Option<u32> {
         self.offers.get(&topic).copied()
     }
 
-    /// The known node that a logger belongs to: the one of its name, or the nearest above it.
+    /// The known node that a logger belongs to: the one of its name, or the nearest above it in the namespaces.
     pub(crate) fn owner(&self, logger: &str) -> Option<Name> {
         let mut above = logger;
         while !above.is_empty() {
@@ -315,19 +316,19 @@ impl<'a> Conclusions<'a> {
         None
     }
 
-    /// Everybody who names this topic as its own, as publisher or subscriber.
+    /// Whether a node other than `node` names this topic as its own, as publisher or subscriber.
     pub(crate) fn named_by_others(&self, topic: Name, node: Name) -> bool {
         self.facts.list.iter().any(|fact| {
             matches!(fact.claim, Claim::Lists(n, t) | Claim::Publish(n, t) if t == topic && n != node)
         })
     }
 
-    /// Everybody who is known to publish `topic` so far.
+    /// The nodes known so far to publish `topic`.
     pub(crate) fn publishers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
         self.publishers.get(&topic).into_iter().flatten().copied()
     }
 
-    /// Everybody who is known to subscribe `topic` so far.
+    /// The nodes known so far to subscribe `topic`.
     pub(crate) fn subscribers(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
         self.subscribers.get(&topic).into_iter().flatten().copied()
     }
@@ -349,7 +350,7 @@ impl<'a> Conclusions<'a> {
         &self.nodes
     }
 
-    /// The recorded topics whose type fits, in the order of their names.
+    /// The recorded topics whose type `fits` accepts, in the order of their names.
     pub(crate) fn topics_of(&self, fits: impl Fn(&str) -> bool) -> Vec<Name> {
         let fitting = self
             .streams
@@ -363,8 +364,8 @@ impl<'a> Conclusions<'a> {
         topics.into_iter().map(|(_, topic)| topic).collect()
     }
 
-    /// By a convention, `what` lives as long as `basis`, unless a complete list leaves it out. Headers say nothing
-    /// against it: what a node publishes by convention is often silent.
+    /// Adds `what` by a convention: it lives as long as `basis`, unless a complete list leaves it out. Headers do not
+    /// contradict it: a topic published by convention is often silent.
     pub(crate) fn like(&mut self, source: SourceId, what: ElementKey, basis: ElementKey) {
         if self.closed(|closed| closed.settled_lists_deny(what)) {
             return;
@@ -377,7 +378,7 @@ impl<'a> Conclusions<'a> {
         });
     }
 
-    /// By a convention, whoever publishes `basis` subscribes `topic` as well.
+    /// Adds, by a convention, a subscription of `topic` by a node that publishes `basis`.
     pub(crate) fn subscribes_as_well(
         &mut self,
         source: SourceId,
@@ -392,7 +393,7 @@ impl<'a> Conclusions<'a> {
         );
     }
 
-    /// The node that a name without its namespace means: the only known one that ends so, else one of this name.
+    /// The node of a name without its namespace: the only known one that ends so, else one of this name.
     pub(crate) fn meant(&self, node: Name) -> Name {
         let text = self.text(node);
         let loggers = self.facts.list.iter().filter_map(|fact| match fact.claim {
@@ -412,7 +413,7 @@ impl<'a> Conclusions<'a> {
         self.facts.text(name)
     }
 
-    /// When a fact was claimed, sorted; empty if that cannot be read, which is kept.
+    /// The times at which a fact was claimed, sorted; empty if they cannot be read, with the error kept.
     pub(crate) fn times(&mut self, fact: &ClaimRecord) -> Vec<Stamp> {
         self.facts.times(fact).unwrap_or_else(|error| {
             self.failed = Some(error);
@@ -421,7 +422,7 @@ impl<'a> Conclusions<'a> {
     }
 }
 
-/// How many publishers each topic was offered by, at most in one bag.
+/// The largest number of publishers that each topic was offered by in one bag.
 pub(crate) fn offers(of_streams: &BTreeMap<usize, u32>, streams: &[Stream]) -> BTreeMap<Name, u32> {
     let mut offers: BTreeMap<Name, u32> = BTreeMap::new();
     for (at, count) in of_streams {

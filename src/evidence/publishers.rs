@@ -1,5 +1,5 @@
-//! Which connection headers name a publisher that is not the whole truth: bags rewritten by tools that merge
-//! connections, and bags recorded while another one was played back.
+//! Connection headers that name a wrong publisher: in bags rewritten by tools that merge connections, and in bags
+//! recorded while another one was played back.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::evidence::claim::{Claim, Claims, Name};
 use crate::evidence::proof::{Reliability, Stream};
 
-/// Lowers the trust in streams whose header cannot be believed; says so once per bag.
+/// Lowers the reliability of streams with unreliable headers; adds a notice once per bag.
 pub(crate) fn judge(streams: &mut [Stream], facts: &Claims) -> Vec<Notice> {
     let named = NamedTopics::new(facts);
     let mut notices = Vec::new();
@@ -52,10 +52,10 @@ const REWRITTEN: &str = "the bag was rewritten by a tool that merges connections
 const PLAYBACK: &str =
     "the bag was recorded during a playback, so the player publishes what other nodes did once";
 
-/// Who names which topic as its own in log records and the like.
+/// The topics that nodes name as their own in log records and similar messages.
 struct NamedTopics {
     topics: BTreeMap<Name, BTreeSet<Name>>,
-    /// Names that log over the connection of another.
+    /// Names that log over the connection of another node.
     guests: BTreeMap<Name, BTreeSet<Name>>,
 }
 
@@ -85,7 +85,7 @@ impl NamedTopics {
     }
 }
 
-/// Whether a bag has no topic with two publishers, and one log connection that several nodes log over.
+/// Whether a bag has no topic with two publishers, and one log connection used by several nodes.
 fn rewritten(streams: &[Stream], of_bag: &[usize], named: &NamedTopics, facts: &Claims) -> bool {
     let mut topics = BTreeSet::new();
     if !of_bag.iter().all(|at| topics.insert(streams[*at].topic)) {

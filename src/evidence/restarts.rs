@@ -1,5 +1,5 @@
-//! Nodes that began anew under the same name: their sequence numbers fall back, or their latched messages come again
-//! after a silence of all that they publish.
+//! Restarts of nodes under the same name: their sequence numbers fall back, or their latched messages come again after
+//! a silence of all that they publish.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -10,7 +10,7 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::proof::{ElementKey, Proof, Reliability, Stream, Validity};
 use crate::evidence::times::SeriesId;
 
-/// A break in a node's life: its last sign before, its first one after.
+/// A restart of a node: its last sign before, its first one after.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Restart {
     pub(crate) death: Stamp,
@@ -20,16 +20,16 @@ pub(crate) struct Restart {
 /// Restarts by node, sorted by time.
 pub(crate) type Restarts = BTreeMap<Name, Vec<Restart>>;
 
-/// Sequence numbers that fall back faster than this are records out of order.
+/// The shortest time of a restart, in nanoseconds: sequence numbers that fall back faster are records out of order.
 const OUT_OF_ORDER_NS: i64 = 100_000_000;
-/// A latched message after less silence than this tells of no restart.
+/// The shortest silence before a latched message sent again, in nanoseconds: after a shorter one it shows no restart.
 const SILENCE_NS: i64 = 1_000_000_000;
-/// Fewer messages than this tell no rhythm.
+/// The fewest messages that show a rhythm.
 const RHYTHM: usize = 5;
-/// A latched topic with more messages than this is published anew all the time.
+/// The most messages of a latched topic: one with more is sent again all the time.
 const LATCHED: u64 = 20;
 
-/// Finds the restarts of all nodes; `proofs` tell what others say about a node, which may lag behind its end.
+/// Finds the restarts of all nodes; `proofs` hold the statements of others about a node, which may lag behind its end.
 pub(crate) fn restarts(
     recorded: &Recorded,
     streams: &[Stream],
@@ -59,7 +59,7 @@ pub(crate) fn restarts(
     Ok(all)
 }
 
-/// The streams of each publisher that is believed.
+/// The streams of each publisher with a reliable name.
 fn own_streams(streams: &[Stream]) -> BTreeMap<Name, Vec<usize>> {
     let mut of: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
     for (at, stream) in streams.iter().enumerate() {
@@ -73,7 +73,7 @@ fn own_streams(streams: &[Stream]) -> BTreeMap<Name, Vec<usize>> {
     of
 }
 
-/// When somebody said something of a node.
+/// The times of all statements about a node.
 fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
     let of_node = proofs.iter().filter(move |proof| match proof.what {
         ElementKey::Node(name) | ElementKey::Publish(name, _) | ElementKey::Subscribe(_, name) => {
@@ -117,7 +117,7 @@ fn fallen_back(recorded: &Recorded, streams: &[usize]) -> io::Result<Vec<(Stamp,
     Ok(found)
 }
 
-/// Stretches of time that end with a latched message sent again, in which no stream with a rhythm spoke.
+/// Stretches of time that end with a latched message sent again, and in which no stream with a rhythm had messages.
 fn sent_again(
     recorded: &Recorded,
     streams: &[&Stream],
@@ -150,7 +150,8 @@ fn may_be_sent_again(recorded: &Recorded, stream: &Stream) -> bool {
     stream.latched && (2..=LATCHED).contains(&recorded.messages.count(stream.times))
 }
 
-/// Since when a stream with a rhythm is silent at `at`, if that is long for it and it spoke before and after.
+/// The start of the silence of a stream with a rhythm at `at`; `None` if it is not long for it, or if it has no
+/// messages before or after.
 fn silent_since(times: &[Stamp], at: Stamp) -> Option<Stamp> {
     let next = times.partition_point(|t| *t < at);
     let last = *times.get(next.checked_sub(1)?)?;
@@ -161,7 +162,7 @@ fn silent_since(times: &[Stamp], at: Stamp) -> Option<Stamp> {
     (silence > SILENCE_NS && silence > usual.saturating_mul(3)).then_some(last)
 }
 
-/// Stretches that overlap tell of the same restart: what they share.
+/// Joins stretches that overlap, which show the same restart, to the part that they share.
 fn narrowed(mut breaks: Vec<(Stamp, Stamp)>) -> Vec<(Stamp, Stamp)> {
     breaks.sort_unstable();
     let mut narrow: Vec<(Stamp, Stamp)> = Vec::new();
@@ -174,7 +175,7 @@ fn narrowed(mut breaks: Vec<(Stamp, Stamp)>) -> Vec<(Stamp, Stamp)> {
     narrow
 }
 
-/// The longest time between two signs inside a stretch: the node was away then.
+/// The longest time between two signs inside a stretch, during which the node was away.
 fn widest_gap(signs: &[Stamp], from: Stamp, to: Stamp) -> Option<Restart> {
     let inside = &signs[signs.partition_point(|t| *t < from)..signs.partition_point(|t| *t <= to)];
     let gaps = inside.windows(2).map(|pair| (pair[1].since(pair[0]), pair));

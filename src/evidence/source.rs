@@ -1,4 +1,5 @@
-//! A kind of evidence: what it reads, and where its claims go. One file per kind.
+//! The interface of a kind of evidence: the messages that it reads, and the collection of its claims. One file per
+//! kind.
 
 pub(crate) mod action;
 pub(crate) mod anonymous;
@@ -41,24 +42,24 @@ use crate::evidence::proof::{Conclusions, Stream};
 
 /// A kind of evidence.
 pub struct Source {
-    /// Its word in JSON.
+    /// The source's word in JSON.
     pub word: &'static str,
-    /// What it reads, in one line.
+    /// A description in one line.
     pub about: &'static str,
     /// The layouts of the messages that it reads.
     pub(crate) reads: &'static [(MessageLayout, Read)],
-    /// Whether a node says it of itself, so that it was there when it did.
+    /// Whether nodes make these claims about themselves, so that the node was there at that time.
     pub(crate) own: bool,
-    /// What the announcement of a connection says.
+    /// Reads the announcement of a connection.
     pub(crate) announced: Option<fn(&mut SourceContext<'_>)>,
-    /// What follows from the whole mission; run in the order of the rows.
+    /// Conclusions from the whole mission; run in the order of the rows.
     pub(crate) conclude: &'static [Conclude],
 }
 
-/// Draws a conclusion.
+/// A function that draws a conclusion.
 pub(crate) type Conclude = fn(SourceId, &mut Conclusions<'_>);
 
-/// A source that does nothing yet, for rows to fill in.
+/// An empty source, for rows to fill in.
 pub(crate) const NOTHING: Source = Source {
     word: "",
     about: "",
@@ -68,31 +69,31 @@ pub(crate) const NOTHING: Source = Source {
     conclude: &[],
 };
 
-/// What a source hears, and where its claims go.
+/// The input of a source, and the collection of its claims.
 pub(crate) struct SourceContext<'a> {
     pub(crate) facts: &'a mut Claims,
     pub(crate) stream: &'a Stream,
     /// The stream's place among all streams.
     pub(crate) place: usize,
     pub(crate) source: SourceId,
-    /// When the message was recorded; `None` at an announcement.
+    /// The time at which the message was recorded; `None` at an announcement.
     pub(crate) time: Option<Stamp>,
 }
 
 impl SourceContext<'_> {
-    /// The handle on a text.
+    /// The name of a text.
     pub(crate) fn name(&mut self, text: &str) -> Name {
         self.facts.name(text)
     }
 
-    /// Takes down the sequence number of a message, which falls back when its publisher starts anew.
+    /// Adds the sequence number of a message, which falls back when its publisher restarts.
     pub(crate) fn sequence(&mut self, number: u32) {
         if let Some(time) = self.time {
             self.facts.sequence(self.place, time, number);
         }
     }
 
-    /// Takes a claim down, made now, with the words it rests on.
+    /// Adds a claim, made now, with its explanation.
     pub(crate) fn claim(&mut self, claim: Claim, degree: Degree, words: impl FnOnce() -> String) {
         let said = Statement {
             claim,
@@ -102,7 +103,7 @@ impl SourceContext<'_> {
         self.say(said, words);
     }
 
-    /// Takes a claim down that stands and falls with a snapshot.
+    /// Adds a claim that may belong to a snapshot.
     pub(crate) fn say(&mut self, said: Statement, words: impl FnOnce() -> String) {
         let word = SOURCES.get(self.source).map_or("", |s| s.word);
         self.facts.explain(said, word, self.time, words);
@@ -114,7 +115,8 @@ impl SourceContext<'_> {
 pub(crate) type Read =
     fn(&mut SourceContext<'_>, &mut PayloadCursor<'_>) -> cursor::PayloadResult<()>;
 
-/// The sources that read a connection's messages, with how; and whether some source knows its type by another layout.
+/// The sources that read a connection's messages, with their readers; and whether some source knows its type by another
+/// layout.
 pub(crate) fn readers(stream: &Stream) -> (Vec<(SourceId, Read)>, bool) {
     let mut readers = Vec::new();
     let mut foreign = false;

@@ -1,6 +1,6 @@
-//! How much a lag between messages varies: of two streams on one path the one next to the output varies less.
+//! The variation of the lag between messages: of two streams on one path the one next to the output varies less.
 
-/// Lags seen so far.
+/// The lags seen so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Spread {
     count: f64,
@@ -8,18 +8,18 @@ pub(crate) struct Spread {
     squares: f64,
 }
 
-/// How many standard errors two variances must lie apart to count as different.
+/// The number of standard errors by which two variances must differ to count as different.
 const CLEAR: f64 = 3.0;
 
 impl Spread {
-    /// Takes in a lag in seconds.
+    /// Adds a lag in seconds.
     pub(crate) fn add(&mut self, lag: f64) {
         self.count += 1.0;
         self.sum += lag;
         self.squares += lag * lag;
     }
 
-    /// The mean in seconds; 0 of nothing.
+    /// The mean in seconds; 0 without lags.
     pub(crate) fn mean(&self) -> f64 {
         self.sum / self.count.max(1.0)
     }
@@ -34,7 +34,7 @@ impl Spread {
         self.variance() * libm::sqrt(2.0 / self.count.max(2.0))
     }
 
-    /// Whether it varies clearly less than another.
+    /// Whether the lag varies clearly less than another.
     pub(crate) fn is_clearly_less(&self, other: &Self) -> bool {
         let errors = libm::sqrt(self.error() * self.error() + other.error() * other.error());
         other.variance() - self.variance() > CLEAR * errors

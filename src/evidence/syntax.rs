@@ -1,10 +1,10 @@
-//! Source text as a syntax tree: the one place that knows tree-sitter, which reads on behind what it does not understand.
+//! Source text as a syntax tree: the only user of tree-sitter, which continues after text that it does not understand.
 
 pub(crate) use tree_sitter::Node;
 
 use std::ops::ControlFlow;
 
-/// What a source file is written in.
+/// The language of a source file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Language {
     Python,
@@ -17,11 +17,11 @@ pub(crate) struct Parsed {
     tree: tree_sitter::Tree,
 }
 
-/// How often the parser may come up for air (it does so every hundred steps) per byte of text: usual text needs a
-/// hundredth of it. Text made to take long is given up, by a count of work and not by a clock.
+/// The most progress callbacks of the parser (one every hundred steps) per byte of text: usual text needs a hundredth
+/// of them. Text made to take long is given up, by a count of work and not by a clock.
 const BREATHS_PER_BYTE: usize = 4;
 
-/// Elements inside elements deeper than this are not looked into: real code stays below a hundred.
+/// The deepest nesting of elements that is visited: real code stays below a hundred.
 const DEEPEST: usize = 400;
 
 impl Parsed {
@@ -60,19 +60,19 @@ impl Parsed {
     }
 }
 
-/// The line on which an element begins, 1...
+/// The line on which an element begins, ≥ 1.
 pub(crate) fn line(node: Node<'_>) -> usize {
     node.start_position().row + 1
 }
 
-/// The elements inside one, in order, without punctuation and comments.
+/// The child elements, in order, without punctuation and comments.
 pub(crate) fn children(node: Node<'_>) -> Vec<Node<'_>> {
     let mut cursor = node.walk();
     let all = node.named_children(&mut cursor);
     all.filter(|child| !child.is_extra()).collect()
 }
 
-/// Visits an element and all inside it, in order, without recursion; `visit` tells whether to look inside.
+/// Visits an element and all inside it, in order, without recursion; `visit` returns whether to go inside.
 pub(crate) fn walk<'a>(node: Node<'a>, visit: &mut dyn FnMut(Node<'a>) -> bool) {
     let mut cursor = node.walk();
     let mut depth = 0;

@@ -1,5 +1,5 @@
-//! What nodes log and what small messages hold, as text side by side, so that a log text that repeats a message can be
-//! found. Bounded: a mission with more keeps what came first.
+//! Log texts of nodes and values of small messages, kept together so that a log text that repeats a message can be
+//! found. Bounded: of more, the first are kept.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,32 +14,32 @@ pub(crate) struct LoggedText {
     pub(crate) text: Box<str>,
 }
 
-/// A value in a message of the stream at a place.
+/// A value in a message of a stream.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ShownValue {
     pub(crate) time: Stamp,
     pub(crate) stream: usize,
-    /// The place of its field in the message.
+    /// The place of the field in the message.
     pub(crate) field: usize,
     pub(crate) value: Box<str>,
 }
 
-/// Texts of both sides.
+/// The kept log texts and message values.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LoggedTexts {
     said: Vec<LoggedText>,
     shown: Vec<ShownValue>,
-    /// Bytes of texts on either side.
+    /// The number of bytes of log texts and of values.
     bytes: [usize; 2],
 }
 
-/// Bytes of texts kept on either side.
+/// The most bytes that are kept of log texts, and of values.
 const MOST: usize = 2 << 20;
-/// What a short text takes besides its bytes.
+/// The number of bytes that a short text takes besides its own.
 const ENTRY: usize = 48;
 
 impl LoggedTexts {
-    /// Takes in a text of a logger.
+    /// Adds a log text.
     pub(crate) fn say(&mut self, time: Stamp, logger: &str, text: &str) {
         self.bytes[0] += text.len() + ENTRY;
         if self.bytes[0] <= MOST {
@@ -51,7 +51,7 @@ impl LoggedTexts {
         }
     }
 
-    /// Takes in a value in a message.
+    /// Adds a value in a message.
     pub(crate) fn show(&mut self, time: Stamp, (stream, field): (usize, usize), value: &str) {
         self.bytes[1] += value.len() + ENTRY;
         if self.bytes[1] <= MOST {
@@ -64,7 +64,7 @@ impl LoggedTexts {
         }
     }
 
-    /// Both sides, sorted; of values that a field repeats only the first.
+    /// Log texts and values, sorted; of values that a field repeats only the first.
     pub(crate) fn sorted(&self) -> (Vec<LoggedText>, Vec<ShownValue>) {
         let (mut said, mut shown) = (self.said.clone(), self.shown.clone());
         said.sort_unstable();

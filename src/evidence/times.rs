@@ -1,6 +1,6 @@
 //! All log times of a mission in little memory: sorted blocks, written to an unnamed file once they grow large.
 //!
-//! Times arrive in any order and are given back sorted, so that the order of messages in a file never matters.
+//! Times arrive in any order and are returned sorted, so that the order of messages in a file never matters.
 
 mod block;
 mod merge;
@@ -15,19 +15,20 @@ use crate::base::time::Stamp;
 
 pub(crate) use merge::Timed;
 
-/// Stamps per block: enough to make a block's head (32 bytes) not matter, few enough to sort in the cache.
+/// The number of stamps per block: enough to make a block's head (32 bytes) not matter, few enough to sort in the
+/// cache.
 const BLOCK: usize = 1024;
-/// Bytes of encoded blocks kept in memory (8 to 20 million stamps) before they go to a file.
+/// The number of bytes of encoded blocks kept in memory (8 to 20 million stamps) before they go to a file.
 const IN_MEMORY: usize = 16 << 20;
-/// Stamps not yet in a block, of all series together (8 MB), before all of them are put into blocks.
+/// The number of stamps not yet in a block, of all series together (8 MB), at which all of them are put into blocks.
 const MOST_OPEN: usize = 1 << 19;
 const DAY: i64 = 86_400_000_000_000;
 
-/// One sequence of times: 0...
+/// The number of a sequence of times, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct SeriesId(pub u32);
 
-/// An encoded run of stamps and where it lies.
+/// An encoded run of stamps and its place.
 #[derive(Clone, Debug)]
 struct StampBlock {
     first: Stamp,
@@ -51,7 +52,7 @@ struct OpenSeries {
 #[derive(Debug)]
 pub(crate) struct Stamps {
     series: Vec<OpenSeries>,
-    /// Locked because reading moves its position.
+    /// The temporary file; locked because reading moves its position.
     spool: Mutex<SpooledTempFile>,
     written: u64,
     open: usize,
@@ -80,7 +81,7 @@ impl Stamps {
         SeriesId(u32::try_from(self.series.len() - 1).unwrap_or(u32::MAX))
     }
 
-    /// Adds times; `sizes`, if given, is as long as `stamps`. A sequence that was never made takes nothing.
+    /// Adds times; `sizes`, if given, is as long as `stamps`. Times for a sequence that was never made are dropped.
     pub(crate) fn add(&mut self, id: SeriesId, stamps: &[Stamp], sizes: Option<&[u32]>) {
         let Some(series) = self.series.get_mut(id.0 as usize) else {
             return;
@@ -106,7 +107,7 @@ impl Stamps {
         }
     }
 
-    /// Puts all that came so far into blocks.
+    /// Puts all open stamps into blocks.
     fn close_all(&mut self) {
         let spool = self.spool.get_mut();
         let spool = spool.unwrap_or_else(PoisonError::into_inner);
@@ -117,7 +118,7 @@ impl Stamps {
         self.open = 0;
     }
 
-    /// Ends the taking in.
+    /// Ends the adding of times.
     ///
     /// # Errors
     /// If times could not be written to the unnamed file.
@@ -129,7 +130,7 @@ impl Stamps {
         self.failed.take().map_or(Ok(()), Err)
     }
 
-    /// How many times a sequence holds.
+    /// The number of times in a sequence.
     pub(crate) fn count(&self, id: SeriesId) -> u64 {
         self.get(id).map_or(0, |s| s.count)
     }

@@ -1,7 +1,7 @@
-//! What the user knows and the bag hides: nodes and edges from a file. It adds, and never overwrites what was measured.
+//! The user's additions to a bag: nodes and edges from a file. It adds, and never overwrites measurements.
 //!
-//! Read are the research prototype's CSV, a YAML form of ours, DOT saved by `rqt_graph`, and launch files: XML of ROS 1
-//! and ROS 2, YAML and Python of ROS 2. Nothing is run.
+//! The forms are the research prototype's CSV, a YAML form of ours, DOT saved by `rqt_graph`, and launch files: XML of
+//! ROS 1 and ROS 2, YAML and Python of ROS 2. Nothing is run.
 
 mod csv;
 mod dot;
@@ -31,34 +31,34 @@ pub enum NamedElement {
     Subscribe(String, String),
 }
 
-/// One thing that a file says.
+/// A node or edge in a file.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TopologyEntry {
-    /// What there is.
+    /// The element.
     pub element: NamedElement,
-    /// From when, in nanoseconds after the mission's start; `None`: from the start.
+    /// The beginning, in nanoseconds after the mission's start; `None`: from the start.
     pub from_ns: Option<i64>,
-    /// Until when, exclusive; `None`: to the end.
+    /// The end, exclusive, in nanoseconds after the mission's start; `None`: to the end.
     pub to_ns: Option<i64>,
-    /// Whether it only declares what should run (a launch file) and does not state what did.
+    /// Whether it is only declared to run (by a launch file), not stated to have run.
     pub declared: bool,
-    /// The file's own name and the line, for those who ask why: `robot.csv line 3`.
+    /// The file's own name and the line, for `why`: `robot.csv line 3`.
     pub place: String,
 }
 
-/// All that a file says, sorted, and what in it could not be used.
+/// All entries of a file, sorted, and the parts of it that could not be used.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
     /// Nodes and edges.
     pub entries: Vec<TopologyEntry>,
-    /// What could not be used: includes that were not found, nodes without a name.
+    /// Notices about unusable parts: includes that were not found, nodes without a name.
     pub notices: Vec<Notice>,
 }
 
 /// Reads a file of any of the forms, told apart by its name's ending and its content.
 ///
 /// # Errors
-/// [`Error::BadFile`] with the line that is wrong.
+/// [`Error::BadFile`] with the line of the mistake.
 pub fn read(path: &Path) -> Result<Topology> {
     let text = text(path)?;
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -89,7 +89,7 @@ pub fn read(path: &Path) -> Result<Topology> {
 /// Reads several files into one topology.
 ///
 /// # Errors
-/// As [`read`], for the first file that is wrong.
+/// As [`read`], for the first file with a mistake.
 pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
     let mut all = Topology::default();
     for path in paths {
@@ -100,13 +100,13 @@ pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
     Ok(all)
 }
 
-/// The text of a file that is not too long.
+/// The text of a file; an error if it is too long.
 fn text(path: &Path) -> Result<String> {
     let bytes = file::read(path, TOPOLOGY)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// A file of the user's that says something wrong.
+/// The error for a mistake in a file of the user's.
 fn bad(path: &Path, line: usize, reason: String, hint: &str) -> Error {
     Error::BadFile {
         path: path.to_owned(),
@@ -116,7 +116,7 @@ fn bad(path: &Path, line: usize, reason: String, hint: &str) -> Error {
     }
 }
 
-/// Where an entry stands; without a line where there is none.
+/// The place of an entry; without the line where there is none.
 fn place(path: &Path, line: usize) -> String {
     let name = crate::bag::file_name(path);
     match line {
@@ -130,7 +130,7 @@ fn resolved(name: &str) -> String {
     format!("/{}", name.trim().trim_start_matches('/'))
 }
 
-/// Something in a file that is not used.
+/// A notice about something in a file that is not used.
 fn unused(path: &Path, line: usize, what: &str) -> Notice {
     Notice::new(NoticeKind::Note, format!("{}: {what}", place(path, line)))
 }

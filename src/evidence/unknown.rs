@@ -1,8 +1,8 @@
-//! Publishers that the bag counts and nothing names. ROS 2 stores with each topic how many offered it, so that a box of
-//! its own stands for those that are left, with a question mark: `/scan ?`, `/scan ? ×2`. Where one well-known program alone
-//! publishes messages of the topic's type, the box bears its name: `/turtlesim ?`.
+//! Publishers that the bag counts but nothing names. ROS 2 stores with each topic the number of its publishers, so that
+//! a separate box stands for the remaining ones, with a question mark: `/scan ?`, `/scan ? ×2`. Where one well-known
+//! program alone publishes messages of the topic's type, the box bears its name: `/turtlesim ?`.
 //!
-//! Runs when all else is known, for such a box only stands in for what nobody knows better.
+//! Runs after all other sources, for such a box only stands in for unknown nodes.
 
 use crate::base::name::is_quiet;
 use crate::base::words::count;
@@ -64,7 +64,7 @@ fn add(
 ) {
     let source = SOURCES.iter().position(|s| s.word == word).unwrap_or(0);
     let node = known.facts.name(name);
-    // It comes and goes with its topic, of whose life it says nothing.
+    // It appears and vanishes with its topic, about whose life it says nothing.
     let topics = || Validity::Like(ElementKey::Topic(topic));
     let life = if word == "unknown" {
         topics()

@@ -1,4 +1,4 @@
-//! What elements are besides being there: lifecycle states, types and quality of service, as somebody states them.
+//! Stated values of elements: lifecycle states, types and quality of service.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -10,7 +10,7 @@ use crate::evidence::claim::{Claim, Claims, Name};
 /// Stated values by node or topic.
 #[derive(Debug, Default)]
 pub(crate) struct StatedValues {
-    /// When a node entered which state, sorted.
+    /// The states of each node with the times of its transitions, sorted.
     states: BTreeMap<Name, Vec<(Stamp, Arc<str>)>>,
     types: BTreeMap<Name, BTreeSet<Arc<str>>>,
     qualities: BTreeMap<Name, BTreeSet<Arc<str>>>,
@@ -45,7 +45,7 @@ impl StatedValues {
         Ok(all)
     }
 
-    /// The state a node is in when a window ends; `None` before its first transition.
+    /// The state of a node at the end of a window; `None` before its first transition.
     pub(crate) fn lifecycle(&self, node: Name, window: Span) -> Option<Arc<str>> {
         let states = self.states.get(&node)?;
         let next = states.partition_point(|(time, _)| *time < window.end);
@@ -54,12 +54,12 @@ impl StatedValues {
             .map(|(_, state)| Arc::clone(state))
     }
 
-    /// When a node entered which state, in order.
+    /// The transitions of a node with their times, in order.
     pub(crate) fn transitions(&self, node: Name) -> impl Iterator<Item = &(Stamp, Arc<str>)> {
         self.states.get(&node).into_iter().flatten()
     }
 
-    /// The types that somebody states of a topic.
+    /// The stated types of a topic.
     pub(crate) fn types(&self, topic: Name) -> impl Iterator<Item = Arc<str>> + '_ {
         self.types.get(&topic).into_iter().flatten().cloned()
     }

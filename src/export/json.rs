@@ -15,7 +15,7 @@ struct JsonEncoder<'a> {
 /// Begins the data file.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name with `{n}`.
+/// [`Error::Usage`](crate::base::error::Error::Usage) for a name with `{n}`.
 pub(crate) fn start<'a>(
     sequence: &'a Sequence<'a>,
     target: &Target,

@@ -48,7 +48,7 @@ struct Degrees {
 
 /// Evidence that says what should be, not what was. A file of the user's says what was.
 const DECLARING: [&str; 2] = ["source", "launch"];
-/// Evidence that names every node of ROS 1 that sends something recorded.
+/// Evidence that names every node that is there, of ROS 1 every one that sends something recorded.
 const NAMING: [&str; 5] = [
     "connection",
     "statistics",
@@ -56,6 +56,8 @@ const NAMING: [&str; 5] = [
     "discovery",
     "topology",
 ];
+/// Evidence that names every node of ROS 2 that starts while the recorder is there: it has parameters from then on.
+const STARTING: [&str; 1] = ["parameter_events"];
 /// Evidence that lists all subscribers of a topic.
 const LISTING: [&str; 4] = ["rosgraph", "discovery", "statistics", "topic_statistics"];
 
@@ -226,21 +228,22 @@ impl<'a> Facts<'a> {
         self.is_rewritten
     }
 
-    /// Whether the bag names nodes, so that one that it does not name is not there: not where a tool merged senders. A
-    /// ROS 1 bag names them in its connections; where a tool dropped these names, a log that most nodes never write to
-    /// is all that is left.
-    pub(crate) fn names_nodes(&self) -> bool {
-        let is_ros1 = self.is_ros1();
-        let is_named = |nodes: &[NodeId]| {
-            let says = |id: &NodeId| self.mission.elements.nodes[*id as usize].evidence;
-            let is_told = |id: &NodeId| !is_ros1 || has(says(id), &NAMING);
-            self.is_sure(nodes) && !self.is_tool(nodes) && nodes.iter().any(is_told)
+    /// Whether the bag names nodes, so that one that it does not name is not there, if it does not name so many that are
+    /// looked for. Where a tool merged senders it does not; where it dropped their names a log that most nodes never write
+    /// to is all that is left. Of ROS 2 it names those that start while it is recorded: more that are not there than it
+    /// names were there before the recorder.
+    pub(crate) fn names_nodes(&self, lost: usize) -> bool {
+        let sure = |nodes: &&[NodeId]| self.is_sure(nodes) && !self.is_tool(nodes);
+        let named: Vec<&[NodeId]> = self.roles().map(|(_, nodes)| nodes).filter(sure).collect();
+        let any = |words: &[&str]| {
+            let says = |id: &NodeId| has(self.mission.elements.nodes[*id as usize].evidence, words);
+            named.iter().any(|nodes| nodes.iter().any(says))
         };
-        !self.is_rewritten && self.roles().any(|(_, nodes)| is_named(nodes))
+        !self.is_rewritten && (any(&NAMING) || any(&STARTING) && lost < named.len())
     }
 
     /// Whether nodes of ROS 1 were recorded, by what they log.
-    fn is_ros1(&self) -> bool {
+    pub(crate) fn is_ros1(&self) -> bool {
         let mut types = self.mission.elements.topics.iter().flat_map(|t| &t.types);
         types.any(|word| &**word == "rosgraph_msgs/Log")
     }
@@ -332,7 +335,8 @@ impl<'a> Facts<'a> {
         match &own.qos {
             _ if states.contains(&State::Latched) => Some(true),
             Some(qos) => Some(qos.contains("transient_local")),
-            None if states.contains(&State::Silent) => Some(false),
+            // Without a message in the time that is judged nobody knows.
+            None if states.contains(&State::Silent) && self.messages(topic) > 0 => Some(false),
             None => None,
         }
     }

@@ -42,8 +42,9 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
         "node-missing",
         "A node that is expected is not in the bag.",
         "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
-         folded). Undecidable in a bag that names no node at all, or whose senders a tool has merged. `optional: true` asks \
-         for nothing.",
+         folded). Undecidable in a bag that names no node at all or only those that wrote a log, in one whose senders a tool \
+         has merged, and where more are missing than a bag of ROS 2 names, as where its recorder came late. `optional: \
+         true` asks for nothing.",
     ),
     (
         FindingKind::NodeForbidden,

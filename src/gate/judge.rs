@@ -100,6 +100,7 @@ impl Verdict {
 pub(crate) fn judge(expectation: &Expectation, mission: &Mission) -> Verdict {
     let facts = Facts::new(mission);
     let mut judge = Judge {
+        names_nodes: facts.names_nodes(lost(expectation, &facts)),
         facts: &facts,
         expectation,
         checks: Vec::new(),
@@ -121,9 +122,19 @@ pub(crate) fn judge(expectation: &Expectation, mission: &Mission) -> Verdict {
     Verdict { checks }
 }
 
+/// How many nodes are expected and not named by the bag.
+fn lost(expectation: &Expectation, facts: &Facts<'_>) -> usize {
+    let wanted = expectation.nodes.iter();
+    let wanted = wanted.filter(|named| !named.facts.forbidden && !named.facts.optional);
+    let lost = wanted.filter(|named| facts.nodes(&named.name).is_empty());
+    lost.count()
+}
+
 /// The work under way.
 struct Judge<'a> {
     facts: &'a Facts<'a>,
+    /// Whether a node that the bag does not name is not there.
+    names_nodes: bool,
     expectation: &'a Expectation,
     checks: Vec<Checked>,
     /// How many names were looked for among those that are there.

@@ -8,7 +8,7 @@ use crate::base::geometry::{Point, Rect, Size};
 const GAP: f64 = 14.0;
 const PADDING: f64 = 8.0;
 
-/// Everything packed, clusters around their members; it knows its siblings that pack and route.
+/// The layout with all boxes packed, clusters around their members; it uses its siblings that pack and route.
 pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     let (n, k) = (plan.vertices.len(), plan.clusters.len());
     // Places `n..` stand for clusters; the last group holds what is in none.
@@ -61,7 +61,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     }
 }
 
-/// Packs some members and notes their corners; the size of the whole.
+/// Packs some members and notes their corners; returns the size of the whole.
 fn packed(members: &[usize], sizes: &[Size], page: Size, corners: &mut [Point]) -> Size {
     let own: Vec<Size> = members.iter().map(|&member| sizes[member]).collect();
     let (places, whole) = pack(&own, page, GAP);

@@ -1,4 +1,4 @@
-//! Growing sequences: what comes nearest to wishes that are out of order.
+//! Growing sequences: the one nearest to goals that are out of order.
 
 /// The growing sequence nearest to the goals in weighted squares, by pooling adjacent violators.
 pub(crate) fn monotone(goal: &[f64], weight: &[f64]) -> Vec<f64> {

@@ -1,6 +1,6 @@
 //! The layered engine, step by step: parts, cycles, ranks, layers, order, places, routes, packing.
 //!
-//! It is the line through the other files of this folder, which is why it alone knows its siblings.
+//! It calls the other files of this folder one after the other, so it alone uses its siblings.
 
 pub(crate) mod acyclic;
 pub(crate) mod crossings;
@@ -24,11 +24,12 @@ use crate::base::geometry::{Point, Rect, Size};
 
 /// The room between parts.
 const PART_GAP: f64 = 20.0;
-/// A part with more edges is cut in one way only: the one that keeps it small.
+/// The largest number of edges of a part that is cut in several ways; a larger one is cut only in the way that keeps it
+/// small.
 const MANY: usize = 300;
-/// Layers with more items than this are not laid out.
+/// The largest number of items in layers that are laid out.
 const MOST: usize = 150_000;
-/// How many edges the search for good orders may sweep, over all parts.
+/// The number of edges that the search for good orders may sweep, over all parts.
 const EFFORT: usize = 120_000;
 
 /// The default engine.
@@ -73,7 +74,7 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
     best.map_or_else(Layout::empty, |best| best.1)
 }
 
-/// How many of the labels found room, from 0 to 1.
+/// The share of the labels that found room, from 0 to 1.
 fn labelled(plan: &Plan, layout: &Layout) -> f64 {
     let wanted = plan
         .links
@@ -159,7 +160,8 @@ pub(crate) struct PlacedPart {
     pub(crate) clusters: Vec<Rect>,
 }
 
-/// How good a drawing is: the scale at which it fills the page, above all; how small it is; how free of crossings.
+/// The quality of a drawing, larger for a better one: from the scale at which it fills the page above all, from its
+/// smallness, and from the number of its crossings.
 fn quality(size: Size, crossings: u64, links: usize, options: &LayoutOptions) -> f64 {
     let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
     let readable = libm::pow(pack::fit(size, options.page), 0.8) * libm::pow(small, 0.2);

@@ -2,7 +2,7 @@
 
 use crate::layout::{Component, LayerItem, Layers};
 
-/// Which cluster a long edge passes a layer in, besides the one around both of its ends.
+/// The cluster in which a long edge passes a layer, besides the one around both of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
     /// No other.
@@ -39,7 +39,7 @@ pub(crate) fn cut(part: &Component, rank: &[usize], lane: Lane) -> Layers {
     layers
 }
 
-/// How many items the layers would have.
+/// The number of items that the layers would have.
 pub(crate) fn items(part: &Component, rank: &[usize]) -> usize {
     let bends = part
         .ends
@@ -83,7 +83,8 @@ impl Layers {
         self.up[after].push(before);
     }
 
-    /// Leads an edge from its earlier end to its later.
+    /// Leads an edge from its earlier end to its later one, with a bend in every layer between; returns the items it
+    /// passes.
     fn chain(&mut self, from: usize, to: usize, lane: Lane) -> Vec<usize> {
         let shared = self.shared_home(from, to);
         let mut chain = vec![from];

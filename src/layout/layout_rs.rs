@@ -1,7 +1,7 @@
 //! A second engine: cycles, ranks and order are ours, the places come from the crate `layout-rs`, the routes are ours.
 //!
 //! Its own way through a graph takes exponential time on some and routes edges through boxes; its placement does not.
-//! Like `layered.rs`, it is a line through its siblings. It knows no clusters: their frames stay empty.
+//! Like `layered.rs`, it calls its siblings one after the other. It does not draw clusters: their frames stay empty.
 
 use std::cell::Cell;
 use std::panic::{self, UnwindSafe};
@@ -25,9 +25,9 @@ use super::{
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
 
-/// More vertices than this take it too long.
+/// The largest number of vertices it takes; more take too long.
 const MOST: usize = 150;
-/// How many edges the search for a good order may sweep, per part.
+/// The number of edges that the search for a good order may sweep, per part.
 const EFFORT: usize = 20_000;
 /// The room around boxes, and around edges: along, across.
 const BOX_HALO: Size = Size::new(50.0, 14.0);
@@ -53,11 +53,11 @@ impl Engine for LayoutRs {
 }
 
 thread_local! {
-    /// Whether a panic of this thread is nobody's business but ours.
+    /// Whether a panic of this thread is caught, so that nothing of it is printed.
     static IS_EXPECTED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `work` gives, or its panic, of which nothing is printed.
+/// The result of `work`, or its panic, of which nothing is printed.
 fn unheard<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
@@ -98,7 +98,7 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
     Ok(layout)
 }
 
-/// One part, or nothing if its boxes overlap.
+/// One part placed and routed; `None` if its boxes overlap.
 fn block(plan: &Plan, part: &Component, orientation: Orientation) -> Option<PlacedPart> {
     let n = part.vertices.len();
     let reversed = acyclic::in_order(n, &part.ends);

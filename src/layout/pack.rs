@@ -1,4 +1,4 @@
-//! Where to put blocks side by side: shelves, tallest first, towards the page's aspect.
+//! The packing of blocks side by side: shelves, tallest first, towards the page's aspect.
 
 use crate::base::geometry::{Point, Size};
 

@@ -1,4 +1,4 @@
-//! A layout that keeps the places of an earlier one: what is known stays, what is new finds room beside it.
+//! A layout that keeps the places of an earlier one: known boxes stay, new ones are placed beside them.
 
 use super::{Layout, Orientation, Plan};
 use crate::base::geometry::{Point, Rect, Size};
@@ -6,7 +6,7 @@ use crate::base::geometry::{Point, Rect, Size};
 /// The room around boxes, and inside the frames of clusters.
 const GAP: f64 = 10.0;
 const PADDING: f64 = 8.0;
-/// How far from its neighbours a new box is tried, in steps.
+/// The largest distance from its neighbours at which a new box is tried, in steps.
 const RINGS: i32 = 30;
 const STEP: Size = Size::new(30.0, 20.0);
 
@@ -129,7 +129,7 @@ impl PinnedBoxes<'_> {
         after <= before
     }
 
-    /// How many boxes and frames stand in clusters that are not theirs.
+    /// The number of boxes and frames that stand in clusters that are not theirs.
     fn foreign(&self) -> usize {
         let frames = self.frames();
         let mut count = 0;

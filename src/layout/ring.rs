@@ -7,16 +7,16 @@ use super::{Engine, Layout, LayoutOptions, Orientation, Outline, Plan, Route, Ve
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
 
-/// More boxes than this crowd the rim.
+/// The largest number of boxes; more would crowd the rim.
 pub(crate) const MOST: usize = 16;
 /// The least room between boxes that follow each other on the rim, for the labels between them.
 const GAP: f64 = 60.0;
-/// How far an edge swings to its right, over its length: the two ways between two boxes part. If it would meet a third
-/// box, the next one is tried.
+/// The distances that an edge may swing to its right, over its length, so that the two ways between two boxes lie
+/// apart. If it would meet a third box, the next one is tried.
 const BENDS: [f64; 7] = [0.1, 0.06, 0.16, 0.22, 0.02, -0.06, -0.14];
 /// The room between an edge and a box that it passes.
 const CLEAR: f64 = 4.0;
-/// A curve is looked at in so many pieces.
+/// The number of pieces in which a curve is checked.
 const PIECES: u32 = 48;
 
 /// The engine behind `--layout ring`.
@@ -78,7 +78,7 @@ fn rounded(part: f64) -> f64 {
     libm::copysign(libm::pow(part.abs(), 0.75), part)
 }
 
-/// The vertices along the rim: swapped two by two as long as that brings ends of edges nearer.
+/// The order of the vertices along the rim: swapped two by two as long as that brings ends of edges nearer.
 fn order(plan: &Plan) -> Vec<usize> {
     let n = plan.vertices.len();
     let mut order: Vec<usize> = (0..n).collect();
@@ -108,7 +108,7 @@ fn order(plan: &Plan) -> Vec<usize> {
     order
 }
 
-/// The way from box to box that meets no other: the first of the bends that does, or the last.
+/// The route from box to box that meets no other box: by the first of the bends that allows it, or else by the last.
 fn route(places: [usize; 2], ends: [&Vertex; 2], boxes: &[Rect]) -> Route {
     let [from, to] = places.map(|v| boxes[v]);
     if places[0] == places[1] {
@@ -171,7 +171,7 @@ fn in_ellipse(rect: &Rect, p: Point) -> bool {
     x * x + y * y < 1.0
 }
 
-/// The last place, from 0 to about a half, that is inside: where a curve leaves its box.
+/// The place, from 0 to about a half, at which a curve leaves its box: the last one that is inside.
 fn border(is_inside: impl Fn(f64) -> bool) -> f64 {
     let (mut inside, mut outside) = (0.0, 0.5);
     for _ in 0..30 {
@@ -189,7 +189,7 @@ fn mixed(a: Point, b: Point, t: f64) -> Point {
     Point::new(a.x + (b.x - a.x) * t, a.y + (b.y - a.y) * t)
 }
 
-/// The curve up to `at`, and from there on.
+/// The two parts of a curve: up to `at`, and from there on.
 fn split(curve: &[Point; 4], at: f64) -> [[Point; 4]; 2] {
     let [a, b, c, d] = *curve;
     let (ab, bc, cd) = (mixed(a, b, at), mixed(b, c, at), mixed(c, d, at));

@@ -1,4 +1,4 @@
-//! The way of each edge: level through every layer, bending only in the gaps between layers, so that it can meet no
+//! The route of each edge: level through every layer, bending only in the gaps between layers, so that it can meet no
 //! foreign box.
 
 pub(crate) mod around;
@@ -9,7 +9,7 @@ use crate::base::geometry::{Point, Size};
 /// The distance of neighbouring ports, where the side of a box is long enough.
 const PORT_STEP: f64 = 6.0;
 
-/// What a router sees, with x along and y across: vertices as they were placed and the layers' extents.
+/// The input of a router, with x along and y across: vertices as they were placed and the layers' extents.
 pub(crate) struct RoutingPlane<'a> {
     /// The layered graph.
     pub(crate) layers: &'a Layers,
@@ -69,7 +69,7 @@ impl RoutingPlane<'_> {
         }
     }
 
-    /// How far the outline of a vertex reaches across from its middle, at a distance along.
+    /// The reach of a vertex's outline across from its middle, at a distance along.
     fn rise(&self, v: usize, along: f64) -> f64 {
         let half = self.size[v].h / 2.0;
         match self.outline[v] {
@@ -81,7 +81,7 @@ impl RoutingPlane<'_> {
         }
     }
 
-    /// Where each chain leaves its first vertex and enters its last, across.
+    /// The places across at which each chain leaves its first vertex and enters its last.
     fn ports(&self) -> Vec<(f64, f64)> {
         let mut ports = vec![(0.0, 0.0); self.layers.chains.len()];
         let n = self.layers.vertices;
@@ -104,7 +104,7 @@ impl RoutingPlane<'_> {
         ports
     }
 
-    /// Ports for chains at one side of a vertex, in the order of where they come from.
+    /// Ports for chains at one side of a vertex, in the order of the places they come from.
     fn spread(&self, v: usize, chains: &mut [(f64, usize)]) -> Vec<(usize, f64)> {
         chains.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let n = chains.len() as f64;
@@ -117,7 +117,7 @@ impl RoutingPlane<'_> {
             .collect()
     }
 
-    /// How far the outline of a vertex reaches along from its middle, at a place across.
+    /// The reach of a vertex's outline along from its middle, at a place across.
     fn reach(&self, v: usize, across: f64) -> f64 {
         let half = self.size[v].w / 2.0;
         match self.outline[v] {
@@ -146,7 +146,7 @@ impl RoutingPlane<'_> {
     }
 }
 
-/// Draws a route piece by piece.
+/// A route being drawn piece by piece.
 struct RoutePen {
     at: Point,
     route: Route,
@@ -168,7 +168,7 @@ impl RoutePen {
         }
     }
 
-    /// A level line to `x`.
+    /// Draws a level line to `x`.
     fn level(&mut self, x: f64) {
         if (x - self.at.x).abs() < 0.05 {
             return;
@@ -192,7 +192,7 @@ impl RoutePen {
         self.is_level = true;
     }
 
-    /// A curve to `(x, y)`, level at both ends.
+    /// Draws a curve to `(x, y)`, level at both ends.
     fn bend(&mut self, x: f64, y: f64) {
         if (y - self.at.y).abs() < 0.05 {
             return self.level(x);

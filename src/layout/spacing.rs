@@ -1,6 +1,6 @@
-//! How much room everything takes: distances across, columns along, and the boxes around clusters.
+//! The room that everything takes: distances across, columns along, and the boxes around clusters.
 //!
-//! Here x runs along the edges and y across; [`Spacing::turned`] brings sizes there and back.
+//! Here x runs along the edges and y across; [`turned`] brings sizes there and back.
 
 use crate::base::geometry::{Rect, Size};
 use crate::layout::{Component, LayerItem, LayerRows, Layers, Orientation, Plan};
@@ -22,7 +22,7 @@ pub(crate) struct Spacing<'a> {
     orientation: Orientation,
     /// The size of each vertex.
     pub(crate) size: Vec<Size>,
-    /// How many self loops each vertex has.
+    /// The number of self loops of each vertex.
     loops: Vec<usize>,
     /// The longest label along that stands between a layer and the next.
     label: Vec<f64>,
@@ -86,7 +86,7 @@ impl<'a> Spacing<'a> {
         apart
     }
 
-    /// How far an item reaches across from its middle; borders reach inwards only.
+    /// The reach of an item across from its middle; borders reach inwards only.
     fn reach(&self, item: usize, onwards: bool) -> f64 {
         match (self.layers.kind[item], self.orientation) {
             (LayerItem::Vertex, _) => self.size[item].h / 2.0 + self.loop_room(item),

@@ -51,6 +51,11 @@ impl Cell {
         for node in &mut graph.nodes {
             node.lifecycle = None;
         }
+        // All cells stay, and were gathered without knowing how many states there would be.
+        graph.nodes.shrink_to_fit();
+        graph.topics.shrink_to_fit();
+        graph.publishes.shrink_to_fit();
+        graph.subscribes.shrink_to_fit();
         Self { span, graph }
     }
 }

@@ -84,7 +84,7 @@ pub(crate) fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 /// Checks every output before anything is read.
 ///
 /// # Errors
-/// As [`export::check`].
+/// As [`export::check()`].
 pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
     let inputs = job.reading.inputs.iter().filter_map(|input| match input {

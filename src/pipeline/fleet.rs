@@ -4,8 +4,8 @@
 //! plan ──> count (each bag, or each part of its time, anywhere) ──> merge ──> finish (each mission)
 //! ```
 //!
-//! A [`FleetPlan`] names the bags and fixes where windows begin, before anything is counted. [`count`] is a pure function of
-//! one bag and reads its index only. [`merge`] makes one of what was counted of the parts of a bag. [`finish`] makes the
+//! A [`FleetPlan`] names the bags and fixes where windows begin, before anything is counted. [`count()`] is a pure function of
+//! one bag and reads its index only. [`merge`] makes one of what was counted of the parts of a bag. [`finish()`] makes the
 //! [`Mission`](crate::Mission) of one mission's counts: states, changes and all that needs the whole.
 
 #[cfg(feature = "parquet")]

@@ -1,18 +1,19 @@
-//! What happened in a window, in words, the most important first.
+//! The caption of a window: its headlines in words, the most important first.
 
 use std::collections::BTreeMap;
 
 use super::items::Viewed;
 use super::{Headline, ItemKind, Phrase};
 use crate::base::name::last_part;
+use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::graph::{Element, Elements, NodeId};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, EntryId, Kind, Ledger};
+use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger};
 
-/// From here on, things of one kind are told together.
+/// The largest number of headlines of one kind that are told one by one; more are told together.
 const MOST_NAMED: usize = 3;
-/// Longer names are cut.
+/// The largest length of a name in characters; longer ones are cut.
 const LONGEST_NAME: usize = 48;
 
 /// Puts headlines into words, with full names: what is called alike in two namespaces is told apart.
@@ -20,8 +21,10 @@ pub(crate) struct Speaker<'a> {
     elements: &'a Elements,
     viewed: &'a Viewed,
     ledger: &'a Ledger,
-    /// Per headline of a node, how many topics came or went with it.
+    /// Per headline of a node, the number of topics that came or went with it.
     topics: BTreeMap<EntryId, usize>,
+    /// The headlines that last, in the order of their ends.
+    lasting: Vec<(Stamp, &'a Entry)>,
 }
 
 impl<'a> Speaker<'a> {
@@ -35,11 +38,17 @@ impl<'a> Speaker<'a> {
                 *topics.entry(whole).or_default() += 1;
             }
         }
+        let entries = mission.ledger.entries.iter();
+        let lasting = entries.filter(|e| e.is_headline() && viewed.sees(e.what));
+        let mut lasting: Vec<(Stamp, &Entry)> =
+            lasting.filter_map(|e| Some((e.until?, e))).collect();
+        lasting.sort_by_key(|(until, _)| *until);
         Self {
             elements: &mission.elements,
             viewed,
             ledger: &mission.ledger,
             topics,
+            lasting,
         }
     }
 
@@ -69,6 +78,29 @@ impl<'a> Speaker<'a> {
             }
         }
         phrases
+    }
+
+    /// A phrase for what is back from a silence or an absence that an earlier window told; it stands for no headline.
+    pub(crate) fn back(&self, window: Span) -> Option<Phrase> {
+        let from = self.lasting.partition_point(|(at, _)| *at < window.start);
+        let to = self.lasting.partition_point(|(at, _)| *at < window.end);
+        let ended = self.lasting[from..to.max(from)].iter();
+        let back: Vec<&Entry> = ended
+            .map(|(_, e)| *e)
+            .filter(|e| e.time < window.start)
+            .collect();
+        let text = match &back[..] {
+            [] => return None,
+            [one] => {
+                let away = words::duration(one.until.unwrap_or(one.time).since(one.time));
+                format!("{} is back after {away}", self.name(one.what))
+            }
+            all => {
+                let names: Vec<String> = all.iter().map(|e| self.short(e.what)).collect();
+                format!("{} are back", words::some_of(&names, MOST_NAMED))
+            }
+        };
+        Some(Phrase { text, headlines: 0 })
     }
 
     /// `4 nodes stopped with 5 topics (planner, costmap, …)`.
@@ -134,7 +166,7 @@ impl<'a> Speaker<'a> {
         }
     }
 
-    /// What a kind of headline says, behind whom it is about.
+    /// The verb of a kind of headline, which follows the name of the element it is about.
     fn verb(&self, kind: Kind) -> &'static str {
         match kind {
             Kind::Silent => "fell silent",
@@ -143,7 +175,7 @@ impl<'a> Speaker<'a> {
         }
     }
 
-    /// `b now subscribes /t`; `None` for a node or topic.
+    /// The phrase for a headline of an edge: `b now subscribes /t`; `None` for one of a node or topic.
     fn edge(&self, headline: &Headline) -> Option<String> {
         let (edge, verb) = match headline.what {
             Element::Publish(id) => (self.elements.publishes.get(id as usize)?, "publishes"),
@@ -212,7 +244,7 @@ impl<'a> Speaker<'a> {
     }
 }
 
-/// What several of a kind are called; `None` for those of which each is worth its name.
+/// The noun for several headlines of a kind; `None` for kinds of which each is told by its name.
 fn together(kind: Kind) -> Option<&'static str> {
     Some(match kind {
         Kind::Started | Kind::Stopped | Kind::Restarted => "nodes ",

@@ -1,4 +1,4 @@
-//! Namespaces drawn as one box: what goes inside, and which ones to collapse first when the page is too small.
+//! Namespaces drawn as one box: the nodes and topics inside, and the order of collapsing when the page is too small.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -44,8 +44,8 @@ impl<'a> Collapse<'a> {
 }
 
 /// The collapsed namespace that swallows a topic (or group): the one of all its `publishers` and `subscribers`, if it
-/// is the topic's `own` too or both kinds are there; with no connection at all, its `own`. What crosses the border of a namespace stays
-/// outside as the namespace's interface.
+/// is the topic's `own` too or both kinds are there; with no connection at all, its `own`. Topics that cross the border
+/// of a namespace stay outside as its interface.
 pub(crate) fn swallows<'a>(
     own: Option<&'a str>,
     publishers: &[Option<&'a str>],
@@ -65,13 +65,13 @@ pub(crate) fn swallows<'a>(
 pub struct Collapsible {
     /// The namespace: `/robot1/nav`.
     pub name: Arc<str>,
-    /// How many boxes it holds now.
+    /// The number of boxes it holds now.
     pub items: usize,
-    /// How many headlines tell of what is in it.
+    /// The number of headlines about elements in it.
     pub headlines: usize,
 }
 
-/// How many headlines tell of each name: of a node, of a topic, of an edge by its topic.
+/// The number of headlines about each name: of a node, of a topic, of an edge by its topic.
 pub(crate) fn news(mission: &Mission) -> BTreeMap<&str, usize> {
     let (elements, mut news) = (&mission.elements, BTreeMap::new());
     let topic = |id: u32| elements.topics.get(id as usize).map(|t| t.name.as_str());

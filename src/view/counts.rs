@@ -1,4 +1,4 @@
-//! How many headlines of each kind a window tells.
+//! The number of headlines of each kind in a window.
 
 use super::{Counts, Headline};
 use crate::graph::Element;
@@ -31,22 +31,22 @@ impl Counts {
         }
     }
 
-    /// All of them together.
+    /// The number of all headlines.
     pub fn total(&self) -> usize {
         self.came() + self.went() + self.changed()
     }
 
-    /// What began.
+    /// The number of beginnings.
     pub fn came(&self) -> usize {
         self.nodes_added + self.topics_added + self.edges_added
     }
 
-    /// What ended.
+    /// The number of ends.
     pub fn went(&self) -> usize {
         self.nodes_removed + self.topics_removed + self.edges_removed
     }
 
-    /// What changed without coming or going.
+    /// The number of changes other than beginnings and ends.
     pub fn changed(&self) -> usize {
         self.restarted + self.silent + self.handed_over + self.rates + self.values
     }

@@ -1,4 +1,4 @@
-//! The name filters of `rqt_graph`'s window: what is typed into its two boxes, with exactly its rules.
+//! The name filters of `rqt_graph`'s window: the texts of its two boxes, with exactly its rules.
 
 use regex::Regex;
 
@@ -22,10 +22,10 @@ struct FilterToken {
 }
 
 impl NameFilter {
-    /// The filter that is written so.
+    /// The filter of this text.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a pattern that is no regular expression, or one that needs what only Python has.
+    /// [`Error::Usage`] for a pattern that is not a regular expression, or one that needs what only Python has.
     pub fn parse(text: &str) -> Result<Self> {
         let tokens: Vec<&str> = text.split(',').map(str::trim).collect();
         let excludes = tokens.iter().filter_map(|t| t.strip_prefix('-'));
@@ -47,7 +47,7 @@ impl NameFilter {
         included && !self.excludes.iter().any(|t| t.matches(name))
     }
 
-    /// What is wished for, as it was written: names and patterns.
+    /// The inclusions as they were written: names and patterns.
     pub(crate) fn wanted(&self) -> Vec<&str> {
         self.includes.iter().map(|t| t.text.as_str()).collect()
     }
@@ -73,7 +73,7 @@ impl FilterToken {
     }
 }
 
-/// Python's `re.match` begins at the start of the text and may end anywhere.
+/// The pattern as Python's `re.match` takes it: bound to the start of the text, free to end anywhere.
 fn anchored(pattern: &str) -> Result<Regex> {
     // On its own first, so that a stray `)` cannot close our group.
     let compiled = Regex::new(pattern).and_then(|_| Regex::new(&format!(r"\A(?:{pattern})")));
@@ -82,7 +82,7 @@ fn anchored(pattern: &str) -> Result<Regex> {
         let reason = text.lines().last().unwrap_or_default();
         let reason = reason.trim().trim_start_matches("error: ");
         Error::usage(
-            format!("`{pattern}` is no pattern for names: {reason}"),
+            format!("`{pattern}` is not a pattern for names: {reason}"),
             "patterns are regular expressions: `/robot1/.*`, `-/rqt.*`",
         )
     })

@@ -10,8 +10,8 @@ use crate::mission::activity::Cell;
 use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Activity, EntryId, Ledger, Mission, Window};
 
-/// The evolution without what the view leaves out. Topics in groups and what is inside collapsed namespaces are seen,
-/// so they stay, under their own names; so do changes, as they were found in the whole graph.
+/// The mission without the elements that the view leaves out. Topics in groups and elements inside collapsed namespaces
+/// are seen, so they stay, under their own names; so do changes, as they were found in the whole graph.
 pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     let viewed = Viewed::new(&mission.elements, options);
     let mut keep = Keep::new(&mission.elements, options, &viewed);
@@ -29,7 +29,7 @@ pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
     }
 }
 
-/// Per element its new id, if it stays.
+/// The new ids: per element, its id if it stays.
 struct Keep {
     nodes: Vec<Option<u32>>,
     topics: Vec<Option<u32>>,
@@ -63,7 +63,7 @@ impl Keep {
         }
     }
 
-    /// The entries about what stays. What is told with something that does not stay is told by itself.
+    /// The entries about elements that stay. An entry that is part of one that does not stay becomes one of its own.
     fn ledger(&mut self, all: &Ledger) -> Ledger {
         let stays = |entry: &Entry| self.element(entry.what).is_some();
         self.entries = numbered(all.entries.iter().map(stays));
@@ -209,7 +209,7 @@ impl Keep {
     }
 }
 
-/// New ids, in the old order, for what stays.
+/// New ids, counted from 0 in the old order, for the elements that stay.
 fn numbered(stays: impl Iterator<Item = bool>) -> Vec<Option<u32>> {
     let mut next = 0;
     let number = |stays: bool| {

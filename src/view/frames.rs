@@ -1,4 +1,4 @@
-//! The windows one after the other, each with what the ledger tells in it.
+//! The windows one after the other, each with the headlines of the ledger in it.
 
 use super::caption::Speaker;
 use super::items::Viewed;
@@ -11,7 +11,7 @@ use super::{ArrowKind, Attendance, Counts, Frame, ItemKind, Mark, Shown, ViewOpt
 use crate::graph::Element;
 use crate::mission::{Mission, Window};
 
-/// The windows, and what becomes of each item and arrow in them.
+/// The windows, and the looks of each item and arrow in them.
 #[derive(Default)]
 pub(crate) struct Frames {
     pub(crate) list: Vec<Frame>,
@@ -19,7 +19,7 @@ pub(crate) struct Frames {
     pub(crate) arrows: Vec<Showing>,
 }
 
-/// The windows one after the other. Where nothing is told, only what has other numbers is looked at.
+/// The windows one after the other. In one without headlines, only elements whose numbers changed are looked at.
 pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Frames {
     let mut stage = ShownWindows::new(mission, options, viewed);
     let speaker = Speaker::new(mission, viewed);
@@ -35,13 +35,15 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
             stage.go_on(at);
         }
         let told = std::mem::take(&mut stage.turn.news.headlines);
+        let mut caption = speaker.caption(&told);
+        caption.extend(speaker.back(window.span));
         list.push(Frame {
             index: window.index,
             span: window.span,
             partial: window.partial,
             messages: window.messages,
             counts: Counts::of(&told),
-            caption: speaker.caption(&told),
+            caption,
             headlines: told,
             rolls: stage.rolls.clone(),
         });
@@ -54,7 +56,8 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
     }
 }
 
-/// For each window whether anything is told in it or ends its being told: all else in between stays as it is.
+/// For each window, whether it is the first, or an entry of the ledger begins or ends in it or in the window before: in
+/// all others everything stays as it is.
 fn turns(mission: &Mission) -> Vec<bool> {
     let windows = &mission.windows;
     let mut turns = vec![false; windows.len()];
@@ -73,7 +76,7 @@ fn turns(mission: &Mission) -> Vec<bool> {
     turns
 }
 
-/// What is shown, window by window.
+/// The picture so far, built window by window.
 struct ShownWindows<'a> {
     mission: &'a Mission,
     viewed: &'a Viewed,
@@ -86,11 +89,11 @@ struct ShownWindows<'a> {
     arrows: Cast,
 }
 
-/// The items, or the arrows: what was shown of each so far.
+/// The items, or the arrows: the looks of each so far.
 #[derive(Default)]
 struct Cast {
     shown: Vec<ShowingWriter>,
-    /// Those with other numbers than in the window before.
+    /// The ids of those with other numbers than in the window before.
     touched: Vec<u32>,
     is_touched: Vec<bool>,
 }
@@ -162,7 +165,7 @@ impl<'a> ShownWindows<'a> {
         !(self.items.touched.is_empty() && self.arrows.touched.is_empty())
     }
 
-    /// Shows a window in which something is told, or was in the one before.
+    /// Shows a window with headlines, or the first after one with headlines.
     fn turn(&mut self, at: u32, window: &Window) {
         let span = window.span;
         let alive = self.lives.during(span);
@@ -187,7 +190,7 @@ impl<'a> ShownWindows<'a> {
         }
     }
 
-    /// Shows a window in which nothing is told, after one in which nothing was: who is there stays so.
+    /// Shows a window without headlines after another without: everything that is there stays there.
     fn go_on(&mut self, at: u32) {
         for who in self.rolls.iter_mut().flatten() {
             *who = match who {
@@ -211,7 +214,7 @@ impl<'a> ShownWindows<'a> {
     }
 }
 
-/// Who of each fleet is there, given who lives before and after the window.
+/// The presence of each member of each fleet, given the elements alive before and after the window.
 fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<Vec<Attendance>> {
     let lives = |alive: &Alive, element: &Element| {
         let (list, id) = match element {
@@ -237,7 +240,7 @@ fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<
         .collect()
 }
 
-/// What is there before and after a window, and what is told in between.
+/// The items and arrows there before and after a window, and the news in between.
 #[derive(Default)]
 struct WindowTurn {
     before: LivingItems,
@@ -245,7 +248,7 @@ struct WindowTurn {
     news: News,
 }
 
-/// An item in a window in which something is told.
+/// An item in a window with headlines.
 struct Marked {
     /// Whether anything of it lives.
     is_there: bool,
@@ -293,7 +296,7 @@ impl WindowTurn {
         (0..).zip(&viewed.arrows).map(arrow).collect()
     }
 
-    /// What the headlines that are told on a folded namespace or a bundle count.
+    /// The number of headlines told on a folded namespace or a bundle; `None` without any.
     fn inside(&self, shown: &Shown) -> Option<Box<Counts>> {
         let told = self.news.headlines.iter();
         let counts = Counts::of(told.filter(|h| shown.entries.binary_search(&h.entry).is_ok()));
@@ -301,7 +304,7 @@ impl WindowTurn {
     }
 }
 
-/// What the ends of an arrow tell of it, which was there before, is there after, or both.
+/// The news of an arrow that follows from its ends; `there` says whether it was there before and is there after.
 fn with_ends(there: (bool, bool), ends: [&Shown; 2]) -> Option<Told> {
     let mark = match there {
         (false, true) => Mark::Added,
@@ -317,7 +320,8 @@ fn with_ends(there: (bool, bool), ends: [&Shown; 2]) -> Option<Told> {
     })
 }
 
-/// What is shown of something that was there before, is there after, or both; `None` for what went without a word.
+/// The look of an item or arrow that was there before, is there after, or both; `None` for one that ended without an
+/// entry.
 fn marked(shown: Shown, there: (bool, bool), told: Option<&Told>) -> Option<Shown> {
     let Some(told) = told else {
         return there.1.then_some(shown);

@@ -39,7 +39,7 @@ pub(crate) fn groups(elements: &Elements, seen: &[bool], wish: Grouping) -> Grou
 
 /// A family of topics with a common prefix.
 struct Family {
-    /// The suffix that makes us look for the others.
+    /// The suffix of the topic whose presence starts the search for the others.
     sign: &'static str,
     suffixes: &'static [&'static str],
     at_least: usize,
@@ -89,13 +89,13 @@ fn by_key<'a>(
     }
 }
 
-/// `X/_action/feedback`, `X/_action/status` and the events of its hidden services.
+/// The group of `X/_action/feedback`, `X/_action/status` and the events of its hidden services.
 fn action_of_ros2(topic: &str) -> Option<String> {
     let (action, _) = topic.split_once("/_action/")?;
     Some(format!("{action}{}", ACTION.name))
 }
 
-/// The event topics of the services of one namespace, which is most often a node's name.
+/// The group of the event topics of the services of one namespace, which is most often a node's name.
 fn service_events(topic: &str) -> Option<String> {
     let service = topic.strip_suffix("/_service_event")?;
     let space = namespace(service).trim_end_matches('/');

@@ -9,10 +9,11 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::graph::Elements;
 
-/// So many names are given as examples.
+/// The largest number of names given as examples.
 const EXAMPLES: usize = 3;
 
-/// What was hidden for each reason, counted. What was grouped or collapsed is seen, as part of its box.
+/// One notice per reason for hiding, with the number of elements hidden. Grouped and collapsed elements are seen as
+/// part of their box.
 pub(crate) fn notes(elements: &Elements, viewed: &Viewed, options: &ViewOptions) -> Notices {
     let nodes = elements.nodes.iter().map(|n| n.name.as_str());
     let topics = elements.topics.iter().map(|t| t.name.as_str());
@@ -55,7 +56,7 @@ fn add(notices: &mut Notices, count: usize, text: String) {
     });
 }
 
-/// What was left out, and how to see it.
+/// The words for the elements left out for a reason, and the way to see them.
 fn words(reason: Reason) -> (&'static str, &'static str) {
     match reason {
         Reason::NsFilter => (

@@ -1,4 +1,4 @@
-//! Who is on stage: every box and arrow of the mission, and where each element of the graph went.
+//! The items of a view: every box and arrow of the mission, and the place of each element of the graph among them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -12,16 +12,16 @@ use super::select::{Selection, finish, select};
 use super::{Arrow, ArrowKind, Item, ItemKind, Mode, ViewOptions};
 use crate::graph::{Edge, EdgeId, Element, Elements, NodeId, Topic, TopicId};
 
-/// Where an edge of the graph went.
+/// The place of an edge of the graph in the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum EdgePlace {
-    /// Nowhere.
+    /// It is not drawn.
     Hidden,
     /// It is this item, or part of it.
     Item(u32),
-    /// Into this arrow.
+    /// It is part of this arrow.
     Arrow(u32),
-    /// Inside this item.
+    /// It is inside this item.
     Inside(u32),
 }
 
@@ -37,9 +37,9 @@ pub(crate) struct Viewed {
     pub(crate) node: Vec<Option<u32>>,
     /// Per topic of the mission, its item.
     pub(crate) topic: Vec<Option<u32>>,
-    /// Per publication. In mode *nodes* it may be part of several arrows and is told by `pairs` alone.
+    /// The place of each publication. In mode *nodes* it may be part of several arrows and is told by `pairs` alone.
     pub(crate) publish: Vec<EdgePlace>,
-    /// Per subscription.
+    /// The place of each subscription.
     pub(crate) subscribe: Vec<EdgePlace>,
     /// Per arrow from node to node, the publications and subscriptions that it joins.
     pub(crate) pairs: Vec<Vec<(EdgeId, EdgeId)>>,
@@ -49,12 +49,12 @@ pub(crate) struct Viewed {
     pub(crate) subscribed: Vec<(NodeId, TopicId)>,
     /// Per edge, and per topic with publications, the arrows that carry it; those of a topic from its publishers.
     pub(crate) carriers: BTreeMap<Element, Vec<u32>>,
-    /// Arrows from node to node that were too many.
+    /// The number of arrows from node to node that were left out because they were too many.
     pub(crate) dropped: usize,
 }
 
-/// How many pairs of publishers and subscribers are drawn from node to node. One topic with thousands of both has
-/// millions, which nobody could read.
+/// The largest number of pairs of publishers and subscribers drawn from node to node. One topic with thousands of both
+/// has millions, which nobody could read.
 const MOST_PAIRS: usize = 200_000;
 
 /// The fleets to draw as one: none where names are wanted exactly, or everything on its own.
@@ -279,7 +279,7 @@ impl Viewed {
         }
     }
 
-    /// Notes which arrows each topic's publications are part of.
+    /// Notes the arrows that each topic's publications are part of.
     fn set_carriers(&mut self, elements: &Elements) {
         for (arrow, id) in self.arrows.iter().zip(0..) {
             for member in &arrow.members {

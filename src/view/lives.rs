@@ -1,4 +1,4 @@
-//! When each element lives, by the ledger: what has no beginning in it was there before, what has no end stays.
+//! The lives of elements by the ledger: one without a beginning in it was there before, one without an end stays.
 //!
 //! What the picture shows follows from this and not from what happened to be heard in a window, so that nothing comes,
 //! goes or changes its look without an entry that says so.
@@ -11,9 +11,9 @@ use crate::mission::ledger::Kind;
 /// Beginnings and ends in continuous time.
 pub(crate) struct ItemTurns<'a> {
     elements: &'a Elements,
-    /// Per element, sorted by time, when it began (true) and ended.
+    /// Per element, the times at which it began (true) and ended (false), sorted.
     turns: PerElement<(Stamp, bool)>,
-    /// Per element, from when to when it was silent or away.
+    /// Per element, the times in which it was silent or away.
     pauses: PerElement<Span>,
 }
 
@@ -55,7 +55,7 @@ impl<T> PerElement<T> {
     }
 }
 
-/// Which elements live, per id.
+/// Whether each element lives, per id.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Alive {
     pub(crate) nodes: Vec<bool>,
@@ -97,12 +97,12 @@ impl<'a> ItemTurns<'a> {
         lives
     }
 
-    /// What lives just before a moment.
+    /// The elements that live just before a moment.
     pub(crate) fn before(&self, at: Stamp) -> Alive {
         self.alive(|turns| lives_at(turns, turns.partition_point(|t| t.0 < at)))
     }
 
-    /// What lives at any time of a window.
+    /// The elements that live at any time of a window.
     pub(crate) fn during(&self, span: Span) -> Alive {
         self.alive(|turns| {
             let first = turns.partition_point(|t| t.0 < span.start);
@@ -199,7 +199,7 @@ impl<'a> ItemTurns<'a> {
     }
 }
 
-/// Whether an element lives after the first `done` of its turns: before the first one, if that is no beginning.
+/// Whether an element lives after the first `done` of its turns: before the first one, if that is not a beginning.
 fn lives_at(turns: &[(Stamp, bool)], done: usize) -> bool {
     match done.checked_sub(1).and_then(|last| turns.get(last)) {
         Some((_, begins)) => *begins,

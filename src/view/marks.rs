@@ -1,4 +1,4 @@
-//! What the entries of the ledger in one window mean for the items and arrows of the picture.
+//! The marks of a window: the entries of the ledger in it, gathered by item and arrow of the picture.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::graph::Element;
 use crate::mission::Ledger;
 use crate::mission::ledger::{Detail, Entry, EntryId, Kind};
 
-/// What is told of an item or arrow in a window.
+/// The news of an item or arrow in a window.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Told {
     /// Whether something of it began, or ended.
@@ -19,14 +19,14 @@ pub(crate) struct Told {
     pub(crate) mark: Option<Mark>,
     /// Messages per second before and after.
     pub(crate) rates: Option<(f64, f64)>,
-    /// The headlines that say so, sorted.
+    /// The headlines behind the mark, sorted.
     pub(crate) entries: Vec<EntryId>,
 }
 
 /// The parts of each headline, by their places in the ledger.
 pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
 
-/// What is told in one window, by id.
+/// The news of one window by the id of the item or arrow.
 #[derive(Default)]
 pub(crate) struct News {
     pub(crate) headlines: Vec<Headline>,
@@ -35,7 +35,8 @@ pub(crate) struct News {
 }
 
 impl News {
-    /// `parts` are the parts of each headline. They are told with it, whenever they were seen.
+    /// The news of the window `span`. `parts` are the parts of each headline; they are told with it, whenever they were
+    /// seen.
     pub(crate) fn new(ledger: &Ledger, parts: &Parts, span: Span, viewed: &Viewed) -> Self {
         let mut news = Self::default();
         for (id, entry) in ledger.headlines(span) {
@@ -118,10 +119,10 @@ impl News {
     }
 }
 
-/// How what an entry is about relates to its box or arrow.
+/// The relation of the element of an entry to its box or arrow.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reach {
-    /// It is all there is in it.
+    /// It is the only one in it.
     Whole,
     /// One of several that are drawn as one, with their rates summed.
     Part,
@@ -158,7 +159,7 @@ impl Reach {
     }
 }
 
-/// What one entry says of whatever it is told on.
+/// The effect of one entry on the item or arrow that it is told on.
 struct EntrySign {
     kind: Kind,
     rates: Option<(f64, f64)>,
@@ -192,7 +193,7 @@ impl EntrySign {
         }
     }
 
-    /// Notes it; of several marks on the same thing the more telling one stays.
+    /// Notes the entry for an item or arrow; of several marks on the same one, the more telling one stays.
     fn keep(&self, all: &mut BTreeMap<u32, Told>, id: u32, reach: Reach) {
         let told = all.entry(id).or_default();
         told.came |= matches!(self.kind, Kind::Started | Kind::Appeared);

@@ -1,4 +1,4 @@
-//! Which names are housekeeping by the lists of `rqt_graph`; our own short list is the names' station's.
+//! The names that are housekeeping by the lists of `rqt_graph`; our own short list is with the names of the graph.
 
 pub(crate) use crate::base::name::is_quiet;
 

@@ -1,4 +1,4 @@
-//! Why a view shows nothing at all, and which name may have been meant.
+//! The error of a view that shows nothing at all, with the name that may have been meant.
 
 use std::collections::BTreeSet;
 

@@ -1,21 +1,21 @@
-//! What the user wants to see, in `rqt_graph`'s words.
+//! The options of a view, in `rqt_graph`'s words.
 
 use std::sync::Arc;
 
 use super::filter::NameFilter;
 use crate::base::error::{Error, Result};
 
-/// Which boxes and arrows there are, as in the first box of `rqt_graph`'s window.
+/// The kinds of boxes and arrows in the picture, as in the first box of `rqt_graph`'s window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     /// Nodes only, an arrow from each publisher to each subscriber for every topic between them.
     Nodes,
-    /// Nodes and collapsed namespaces only, one arrow from each to each for all topics between them: what is left of a
-    /// graph that no page can hold.
+    /// Nodes and collapsed namespaces only, one arrow from each to each for all topics between them, for a graph that
+    /// no page can hold.
     Bundles,
-    /// Nodes and topics, in each window only what carries messages in it.
+    /// Nodes and topics, in each window only those that carry messages in it.
     Active,
-    /// Nodes and topics, all that is known.
+    /// Nodes and topics, all that are known.
     #[default]
     All,
 }
@@ -52,7 +52,7 @@ impl Mode {
     }
 }
 
-/// What to leave out. The default is `quiet` alone.
+/// The things to leave out. The default is `quiet` alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(
     clippy::struct_excessive_bools,
@@ -61,7 +61,8 @@ impl Mode {
 pub struct Hide {
     /// Housekeeping topics, the recorder and the player: our default.
     pub quiet: bool,
-    /// What `rqt_graph` calls debug: viewers, monitors, `/rosout`, `/clock`, `/statistics`, names that begin with `_`.
+    /// The nodes and topics that `rqt_graph` calls debug: viewers, monitors, `/rosout`, `/clock`, `/statistics`, names
+    /// that begin with `_`.
     pub debug: bool,
     /// Topics without a subscriber.
     pub dead: bool,
@@ -87,7 +88,8 @@ impl Hide {
         unreachable: false,
     };
 
-    /// What a list like `debug,dead` names, in the place of the default; `none` and the empty list hide nothing.
+    /// The things to leave out by a list like `debug,dead`, in the place of the default; `none` and the empty list hide
+    /// nothing.
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown word.
@@ -122,7 +124,7 @@ impl Default for Hide {
     }
 }
 
-/// What to draw as one box. The default is everything, with a box around every namespace.
+/// The things to draw as one box. The default is everything, with a box around every namespace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grouping {
     /// The topics of an action, and the event topics of services, as one box each.
@@ -131,7 +133,7 @@ pub struct Grouping {
     pub tf: bool,
     /// An image with its compressed transports as one box.
     pub images: bool,
-    /// How many levels of namespaces get a box around their members; `None` for all of them, 0 for none.
+    /// The number of levels of namespaces that get a box around their members; `None` for all of them, 0 for none.
     pub namespaces: Option<usize>,
 }
 
@@ -144,11 +146,11 @@ impl Grouping {
         namespaces: Some(0),
     };
 
-    /// What a list like `actions,tf,namespaces=2` names, in the place of the default. A list that does not speak of
-    /// namespaces leaves them boxed on all levels, unless it is `none`.
+    /// The things to draw as one box by a list like `actions,tf,namespaces=2`, in the place of the default. A list
+    /// without `namespaces` leaves them boxed on all levels, unless it is `none`.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an unknown word or a depth that is no number.
+    /// [`Error::Usage`] for an unknown word or a depth that is not a number.
     pub fn parse(list: &str) -> Result<Self> {
         let mut group = Self {
             namespaces: None,
@@ -164,7 +166,7 @@ impl Grouping {
                 ("namespaces", depth) => {
                     group.namespaces = Some(depth.parse().map_err(|_| {
                         Error::usage(
-                            format!("`{depth}` is no depth of namespaces"),
+                            format!("`{depth}` is not a depth of namespaces"),
                             "write a whole number: `namespaces=2`",
                         )
                     })?);
@@ -190,19 +192,19 @@ impl Default for Grouping {
     }
 }
 
-/// What the picture shows of the graph.
+/// The choice of what the picture shows of the graph.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct ViewOptions {
-    /// Boxes and arrows.
+    /// The kinds of boxes and arrows.
     pub mode: Mode,
-    /// Which nodes.
+    /// The filter for nodes, by their full names.
     pub ns_filter: NameFilter,
-    /// Which topics.
+    /// The filter for topics.
     pub topic_filter: NameFilter,
-    /// What is left out.
+    /// The things to leave out.
     pub hide: Hide,
-    /// What is drawn as one box.
+    /// The things to draw as one box.
     pub group: Grouping,
     /// Namespaces to draw as one box each: `/robot1/nav`.
     pub collapse: Vec<Arc<str>>,
@@ -215,7 +217,7 @@ pub struct ViewOptions {
 }
 
 impl ViewOptions {
-    /// What `rqt_graph`'s window is set to when it opens. Its "Unreachable" is left out: a bag cannot tell which node
+    /// The settings of `rqt_graph`'s window when it opens. Its "Unreachable" is left out: a bag cannot tell which node
     /// would not have answered.
     pub fn rqt_defaults() -> Self {
         Self {
@@ -244,7 +246,10 @@ fn words(list: &str) -> impl Iterator<Item = &str> {
 }
 
 fn unknown(what: &str, word: &str, all: &str) -> Error {
-    Error::usage(format!("`{word}` is no {what}"), format!("one of: {all}"))
+    Error::usage(
+        format!("`{word}` is not a {what}"),
+        format!("one of: {all}"),
+    )
 }
 
 #[cfg(test)]

@@ -10,10 +10,10 @@ use super::ViewOptions;
 use crate::base::name::namespace;
 use crate::graph::{Edge, Element, Elements};
 
-/// Fewer than this are drawn side by side.
+/// The least number of equal namespaces that are drawn as one; fewer are drawn side by side.
 const FEWEST: usize = 3;
 
-/// So often fleets are looked for among what is left of the namespaces.
+/// The largest number of searches for fleets among the namespaces that are left.
 const MOST_ROUNDS: usize = 16;
 
 /// Namespaces with the same graph, drawn as one.
@@ -28,22 +28,22 @@ pub(crate) struct Fleet {
 }
 
 impl Fleet {
-    /// What tells each member from the others: `01`.
+    /// The index of each member, which tells it from the others: `01`.
     pub(crate) fn indices(&self) -> Vec<Arc<str>> {
         let index = |member: &Arc<str>| member.get(stem(member).len()..).unwrap_or_default().into();
         self.members.iter().map(index).collect()
     }
 }
 
-/// All of them.
+/// All fleets of a view.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fleets {
     pub(crate) all: Vec<Fleet>,
-    /// Namespaces to the place of their fleet.
+    /// The place of each namespace's fleet, by the name of the namespace.
     place: BTreeMap<Arc<str>, usize>,
 }
 
-/// What a namespace holds and is linked to, its own name taken out: a hash for each.
+/// A hash for each thing that a namespace holds or is linked to, without the name of the namespace.
 type Inside = BTreeSet<u64>;
 
 impl Fleets {
@@ -111,7 +111,7 @@ impl Fleets {
 }
 
 impl ViewOptions {
-    /// The same with every namespace opened: none collapsed, none drawn for several.
+    /// The same options with every namespace opened: none collapsed, none drawn for several.
     pub(crate) fn opened(&self, elements: &Elements) -> Self {
         let mut options = Self {
             collapse: Vec::new(),

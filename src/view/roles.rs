@@ -1,4 +1,5 @@
-//! Nodes by what they are for: the runs of one anonymous node are one box, called without what is new in every run.
+//! Nodes by what they are for: the runs of one anonymous node are one box, named without the part that is new in every
+//! run.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -73,12 +74,12 @@ fn is_anonymous(node: &Node) -> bool {
     *node.role != *node.name.as_str()
 }
 
-/// Whether a node is really called so.
+/// Whether a node has this role as its real name.
 fn is_taken(elements: &Elements, role: &str) -> bool {
     elements.nodes.iter().any(|n| n.name.as_str() == role)
 }
 
-/// Whether each was last seen before the next was first seen.
+/// Whether each run was last seen before the next was first seen.
 fn follow(runs: &mut [&Node]) -> bool {
     runs.sort_by_key(|n| n.first);
     runs.windows(2)

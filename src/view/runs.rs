@@ -1,4 +1,5 @@
-//! A mission as data for a page: per element one flat list of when it became what, so that any window is one search away.
+//! A mission as data for a page: per element a flat list of its values and the windows from which they hold, so that
+//! any window is one search away.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,16 +11,17 @@ use crate::evidence::Degree;
 use crate::graph::State;
 use crate::view::{Arrow, Mark, Showing, Shown, View};
 
-/// From this window on, this value of a table, until the next run of the same list.
+/// A value of a table that holds from a window on, until the next run of the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Run {
-    /// A place in [`View::frames`].
+    /// The first window: a place in [`View::frames`].
     pub from: u32,
-    /// A place in the table.
+    /// The value: a place in the table.
     pub value: u32,
 }
 
-/// What becomes of one item or arrow. Lists are sorted by window; before its first run a list has value 0.
+/// The values of one item or arrow over the windows. Lists are sorted by window; before its first run a list has value
+/// 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ElementRuns {
     /// Its class words: places in [`Runs::classes`].
@@ -28,8 +30,8 @@ pub(crate) struct ElementRuns {
     pub rates: Vec<Run>,
     /// Its lifecycle state: places in [`Runs::labels`]. While it is not there, the last value stays.
     pub lifecycles: Vec<Run>,
-    /// Windows in which its rate changed, each with from what to what: places in [`Runs::labels`]. Such a value holds
-    /// for one window.
+    /// Windows in which its rate changed, each with the old and the new rate: places in [`Runs::labels`]. Such a value
+    /// holds for one window.
     pub turns: Vec<Run>,
 }
 
@@ -40,9 +42,9 @@ pub(crate) struct Runs {
     pub classes: Vec<String>,
     /// Rates and lifecycle states as they are written; the first is empty: not known.
     pub labels: Vec<String>,
-    /// A life per item of the view.
+    /// The values of each item of the view.
     pub items: Vec<ElementRuns>,
-    /// A life per arrow of the view.
+    /// The values of each arrow of the view.
     pub arrows: Vec<ElementRuns>,
 }
 
@@ -53,7 +55,8 @@ pub(crate) fn at(list: &[Run], window: u32) -> u32 {
 }
 
 impl Runs {
-    /// The runs of a view. `label` writes the rate of an element in a window, and what an arrow carries; empty for none.
+    /// The runs of a view. `label` writes the rate of an element in a window, and the topics that an arrow carries;
+    /// empty for none.
     pub(crate) fn of(view: &View, label: impl Fn(&Shown, Option<&Arrow>) -> String) -> Self {
         let mut classes = ValueTable::starting_with(None);
         let mut labels = ValueTable::starting_with(String::new());
@@ -102,13 +105,13 @@ impl Runs {
     }
 }
 
-/// What decides the look of an element in a window.
+/// The properties that decide the look of an element in a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct LookClass {
     state: State,
     degree: Degree,
     mark: Option<Mark>,
-    /// How thick an arrow is; 0 for items.
+    /// The step of an arrow's thickness, 0..=[`STEPS`]; 0 for items.
     step: u8,
 }
 
@@ -224,7 +227,7 @@ fn renumber(list: &mut [Run], new: &[u32]) {
     }
 }
 
-/// Writes the lives of the items, or of the arrows.
+/// A writer of the values of the items, or of the arrows.
 struct RunRecorder<'a, F> {
     classes: &'a mut ValueTable<Option<LookClass>>,
     labels: &'a mut ValueTable<String>,

@@ -1,4 +1,4 @@
-//! Which nodes and topics of the mission are seen at all, in the order of `rqt_graph`'s own steps.
+//! The choice of the nodes and topics that are seen at all, in the order of `rqt_graph`'s own steps.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use super::options::{Mode, ViewOptions};
 use crate::graph::{Elements, Topic};
 use crate::mission::activity::records;
 
-/// Why something is left out.
+/// The reason for leaving a node or topic out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Reason {
     NsFilter,
@@ -23,19 +23,19 @@ pub(crate) enum Reason {
     Recorder,
 }
 
-/// Per node and topic of the mission, why it is left out; `None` for what is seen.
+/// Per node and topic of the mission, the reason for leaving it out; `None` for one that is seen.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Selection {
     pub(crate) nodes: Vec<Option<Reason>>,
     pub(crate) topics: Vec<Option<Reason>>,
 }
 
-/// How many connections a topic has.
+/// The number of connections of a topic.
 #[derive(Clone, Copy, Default)]
 struct TopicDegrees {
     publishers: usize,
     subscribers: usize,
-    /// How many of both pass the filter of namespaces.
+    /// The number of both that pass the filter of namespaces.
     kept: usize,
     /// Whether a hidden recorder or player is another end of it.
     is_recorded: bool,

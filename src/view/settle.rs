@@ -1,4 +1,5 @@
-//! Looks that do not flicker: between what the ledger tells, an element keeps its state and the thickness of its rate.
+//! Looks that do not flicker: between two entries of the ledger, an element keeps its state and the thickness of its
+//! rate.
 
 use super::showing::{Showing, ShowingWriter};
 use super::{Mark, Shown};
@@ -6,7 +7,7 @@ use crate::base::time::Span;
 use crate::evidence::Degree;
 use crate::graph::State;
 
-/// How long windows are together, in nanoseconds, from the first to each.
+/// The length of all windows before each, in nanoseconds; the last entry is the length of all.
 pub(crate) struct Lengths(Vec<i64>);
 
 impl Lengths {
@@ -20,7 +21,7 @@ impl Lengths {
         Self(all)
     }
 
-    /// The windows from this one up to that one, without it.
+    /// The length of the windows `from..to`, in nanoseconds.
     pub(crate) fn of(&self, from: u32, to: u32) -> f64 {
         let at = |window: u32| self.0.get(window as usize).copied().unwrap_or(0);
         (at(to) - at(from)) as f64
@@ -31,7 +32,7 @@ impl Lengths {
     }
 }
 
-/// What is known so far of an element's present life.
+/// The facts gathered so far about an element's present life.
 #[derive(Clone, Copy, Default)]
 struct PresentLife {
     look: Option<(State, Degree)>,
@@ -184,7 +185,7 @@ fn is_ghost(shown: &Shown) -> bool {
     shown.mark == Some(Mark::Removed)
 }
 
-/// Alive by a latched message counts most, since it says more than messages do.
+/// The livelier of two states. Alive by a latched message counts most, since it says more than messages do.
 fn livelier(a: State, b: State) -> State {
     let rank = |state| match state {
         State::Latched => 0,

@@ -1,5 +1,5 @@
-//! All that is shown of one item or arrow: every look once, and from which window on it has which. Memory grows with what
-//! changes, not with how often one looks.
+//! The looks of one item or arrow: every look once, and the windows from which it has each. Memory grows with the
+//! number of changes, not with the number of windows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,40 +11,41 @@ use crate::graph::State;
 /// The looks of one item or arrow, window by window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Showing {
-    /// What it looks like, each only once unless it is marked.
+    /// Its looks, each only once unless it is marked.
     looks: Vec<Shown>,
-    /// From this window on this look, or [`AWAY`]; sorted.
+    /// Pairs of a window and the place of the look from then on, or [`AWAY`]; sorted.
     runs: Vec<(u32, u32)>,
 }
 
-/// It is not there.
+/// The place that stands for not being there.
 const AWAY: u32 = u32::MAX;
 
 impl Showing {
-    /// What is shown in the window at a place; `None` where it is not there.
+    /// The look in the window at a place; `None` where it is not there.
     pub fn at(&self, window: usize) -> Option<&Shown> {
         let after = self.runs.partition_point(|run| run.0 as usize <= window);
         let (_, look) = self.runs.get(after.checked_sub(1)?)?;
         self.looks.get(*look as usize)
     }
 
-    /// Every look that it ever has, in no order.
+    /// Every look that it ever has, in no particular order.
     pub fn looks(&self) -> &[Shown] {
         &self.looks
     }
 
-    /// From which window on it looks how, in order; before the first of these it is not there.
+    /// Its looks with the window from which each holds, in order; `None` where it is not there, as before the first of
+    /// these.
     pub fn runs(&self) -> impl DoubleEndedIterator<Item = (u32, Option<&Shown>)> + Clone {
         let look = |place: u32| self.looks.get(place as usize);
         self.runs.iter().map(move |run| (run.0, look(run.1)))
     }
 
-    /// The places of its looks beside their windows.
+    /// The windows from which its looks hold, with the place of each look or [`AWAY`].
     pub(super) fn places(&self) -> &[(u32, u32)] {
         &self.runs
     }
 
-    /// What is shown in each window of a sequence.
+    /// The looks in the windows of a sequence, one entry per window.
     pub fn of<'a>(windows: impl IntoIterator<Item = Option<&'a Shown>>) -> Self {
         let mut writer = ShowingWriter::default();
         for (window, shown) in (0..).zip(windows) {
@@ -54,14 +55,14 @@ impl Showing {
     }
 }
 
-/// Takes in what is shown, in order of the windows.
+/// A writer that takes in looks in order of the windows.
 #[derive(Debug, Default)]
 pub(super) struct ShowingWriter {
     showing: Showing,
     places: BTreeMap<LookKey, u32>,
 }
 
-/// What tells one look without a mark from another.
+/// The properties that tell one look without a mark from another.
 type LookKey = (
     (State, Degree, bool),
     [Option<u64>; 3],
@@ -70,13 +71,13 @@ type LookKey = (
 );
 
 impl ShowingWriter {
-    /// From this window on it looks so, or is not there.
+    /// Notes the look from this window on; `None` where it is not there.
     pub(super) fn show(&mut self, window: u32, shown: Option<Shown>) {
         let place = shown.map_or(AWAY, |shown| self.look(shown));
         self.turn(window, place);
     }
 
-    /// The place of a look. What is marked has a place of its own each time.
+    /// The place of a look. A look with a mark gets a place of its own each time.
     pub(super) fn look(&mut self, shown: Shown) -> u32 {
         let all = &mut self.showing.looks;
         let next = u32::try_from(all.len()).unwrap_or(AWAY - 1);
@@ -90,7 +91,7 @@ impl ShowingWriter {
         })
     }
 
-    /// From this window on it has the look at this place.
+    /// Notes the place of the look from this window on.
     pub(super) fn turn(&mut self, window: u32, place: u32) {
         let runs = &mut self.showing.runs;
         if runs.last().map_or(AWAY, |last| last.1) != place {

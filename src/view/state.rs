@@ -1,4 +1,4 @@
-//! What of the mission one window shows: states, rates and counts gathered from the graph's elements.
+//! The state of items and arrows in one window: states, rates and counts gathered from the graph's elements.
 
 use std::collections::BTreeSet;
 
@@ -38,7 +38,7 @@ struct One {
 }
 
 impl One {
-    /// Alive without a sign of it.
+    /// An element that is alive without a message in the window.
     const UNHEARD: Self = Self {
         state: State::Silent,
         degree: Degree::Declared,
@@ -56,7 +56,7 @@ impl One {
     }
 }
 
-/// Which items and arrows have a living element at a moment.
+/// The items and arrows that have a living element at a moment.
 #[derive(Default)]
 pub(crate) struct LivingItems {
     pub(crate) items: Vec<bool>,
@@ -108,16 +108,16 @@ pub(crate) fn shows_topic(state: State, options: &ViewOptions) -> bool {
     options.mode != Mode::Active || state == State::Active
 }
 
-/// What is known of all elements in one window.
+/// The state of all elements in one window.
 pub(crate) struct Now<'a> {
     mission: &'a Mission,
     options: &'a ViewOptions,
     viewed: &'a Viewed,
     /// A window as long as this one.
     span: Span,
-    /// Those that live in it, and those that pause.
+    /// The elements that live in it, and those that pause.
     lives: (Alive, Alive),
-    /// What the graph says of each element that is in it, by kind and id.
+    /// The row of the graph for each element that is in it, by kind and id.
     rows: ElementRows,
 }
 
@@ -148,7 +148,7 @@ impl ElementRows {
 }
 
 impl<'a> Now<'a> {
-    /// Nothing is known yet.
+    /// The state before the first window, in which nothing is known.
     pub(crate) fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
         Self {
             mission,
@@ -163,22 +163,22 @@ impl<'a> Now<'a> {
         }
     }
 
-    /// From now on the graph says this of an element, or nothing.
+    /// Sets the row of the graph for an element from now on; `None` where it has none.
     pub(crate) fn hear(&mut self, what: Element, row: Option<Row>) {
         self.rows.set(what, row);
     }
 
-    /// From this window on these live, and these pause.
+    /// Sets the elements that live and pause from this window on.
     pub(crate) fn live(&mut self, window: Span, alive: Alive, paused: Alive) {
         (self.span, self.lives) = (window, (alive, paused));
     }
 
-    /// Whether a window is longer or shorter, so that rates are others.
+    /// Whether a window is longer or shorter than the present one, so that rates differ.
     pub(crate) fn is_other_length(&self, window: Span) -> bool {
         window.nanos() != self.span.nanos()
     }
 
-    /// What an element that lives shows: nothing of itself, where it was not heard.
+    /// The state of an element, `None` if it does not live; [`One::UNHEARD`] where it lives but was not heard.
     fn one(&self, kind: usize, id: u32, lists: [&[bool]; 2]) -> Option<One> {
         let at = id as usize;
         let [alive, paused] = lists.map(|list| list.get(at) == Some(&true));
@@ -220,7 +220,7 @@ impl<'a> Now<'a> {
         self.one(3, id, [&alive.subscribes, &paused.subscribes])
     }
 
-    /// What an item shows; `None` where nothing of it lives. Ghosts are not among them.
+    /// The look of an item; `None` where nothing of it lives. Ghosts are not among them.
     pub(crate) fn item(&self, id: u32) -> Option<Shown> {
         let item = self.viewed.items.get(id as usize)?;
         let mut slot = None;
@@ -254,7 +254,7 @@ impl<'a> Now<'a> {
         Some(shown)
     }
 
-    /// What an arrow shows, whether or not its ends are there.
+    /// The look of an arrow, whether or not its ends are there.
     pub(crate) fn arrow(&self, id: u32) -> Option<Shown> {
         let arrow = self.viewed.arrows.get(id as usize)?;
         let slot = match self.options.mode {
@@ -317,7 +317,7 @@ impl<'a> Now<'a> {
         slot.map(|shown| Shown { topics, ..shown })
     }
 
-    /// Whether what is heard of an element may decide who is shown at all.
+    /// Whether the options hide elements that are not heard in a window.
     pub(crate) fn hides_the_silent(&self) -> bool {
         self.options.hide.unreachable || self.options.mode == Mode::Active
     }

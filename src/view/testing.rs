@@ -232,7 +232,7 @@ fn graph(words: &[Word<'_>], elements: &Elements) -> Graph {
     graph
 }
 
-/// Messages in a window of one second.
+/// The number of messages in a window of one second.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,4 +1,4 @@
-//! All windows as one: what a still picture of the whole mission shows.
+//! All windows as one, for a still picture of the whole mission.
 
 use crate::view::settle::Lengths;
 use crate::view::{SeenWindow, Showing, Shown, View};
@@ -18,7 +18,7 @@ pub(crate) fn union(view: &View) -> Option<SeenWindow> {
     })
 }
 
-/// What is shown of one item or arrow, all windows together.
+/// The look of one item or arrow in all windows together.
 fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
     let ends = showing.runs().skip(1).map(|next| next.0);
     let ends = ends.chain([lengths.windows()]);
@@ -39,7 +39,7 @@ fn whole(showing: &Showing, lengths: &Lengths) -> Option<Shown> {
     })
 }
 
-/// Adds so many windows of this length in nanoseconds together; rates become sums over time.
+/// Adds a look that holds in `windows` windows, `length` nanoseconds together; rates become sums over time.
 fn gather(slot: &mut Option<Shown>, shown: &Shown, length: f64, windows: u64) {
     let count = shown.count.map(|count| count.saturating_mul(windows));
     let Some(sum) = slot else {

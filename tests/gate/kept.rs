@@ -141,3 +141,29 @@ fn other_recordings_of_one_mission_keep_its_expectation() {
         assert!(!said.contains("warning["), "{said}");
     }
 }
+
+/// Nodes of ROS 2 are named as they start, and by what they log.
+#[test]
+fn a_recorder_that_came_late_proves_no_node_missing() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    assert_eq!(run(here, &["baseline", COURIER, "-o", "g.yaml"]).0, 0);
+    let late = ["check", COURIER, "--expect", "g.yaml", "--start", "50"];
+    let (code, said) = run(here, &late);
+    assert!(!said.contains("error[") && code == 0, "{said}");
+    assert!(
+        said.contains("unknown[node-missing]: cannot tell whether /amcl is there"),
+        "{said}"
+    );
+    // One that is missing where all others are named is missing.
+    let text = fs::read_to_string(here.join("g.yaml")).unwrap();
+    let more = text.replace("nodes:\n", "nodes:\n  /radar: {}\n");
+    fs::write(here.join("g.yaml"), more).unwrap();
+    let (code, said) = run(here, &["check", COURIER, "--expect", "g.yaml"]);
+    assert!(
+        code == 1 && said.contains("error[node-missing]: /radar"),
+        "{said}"
+    );
+    let (_, said) = run(here, &["diff", COURIER, COURIER, "--start", "50"]);
+    assert!(said.contains("no differences"), "{said}");
+}

@@ -1,10 +1,10 @@
-//! What was found in a chunk, held until the index behind it has said how much there was.
+//! The messages found in a chunk, held until the index behind it has told how many there were.
 
 use crate::bag::adapters::Gather;
 use crate::bag::model::{ConnectionId, Sink};
 use crate::base::time::Stamp;
 
-/// What an index record behind a chunk says.
+/// An index record behind a chunk.
 pub(super) struct Behind {
     pub(super) id: ConnectionId,
     pub(super) count: u32,
@@ -16,15 +16,16 @@ pub(super) struct Behind {
 #[derive(Default)]
 pub(super) struct ToldMessages {
     gather: Gather,
-    /// How many messages of the bag have been told, or will be.
+    /// The number of messages of the bag that have been told, or will be.
     pub(super) messages: u64,
-    /// The chunk is damaged, so that its index is believed instead.
+    /// Whether the chunk is damaged, so that its index is believed instead.
     doubtful: bool,
-    /// Another record stood behind the chunk: it may have been a chunk, and what follows its index.
+    /// Whether another record stood behind the chunk: it may have been a chunk, and the index records after it may be
+    /// its own.
     interrupted: bool,
     /// Index records that disagree with the chunk.
     behind: Vec<Behind>,
-    /// How many messages the index has that the chunk has not, and the other way round.
+    /// The number of messages that the index has and the chunk lacks; `surplus` is the number the other way round.
     missing: u64,
     surplus: u64,
 }
@@ -36,7 +37,7 @@ impl ToldMessages {
         self.gather.add(id, time, size, sink);
     }
 
-    /// Of a chunk that is damaged only what can be true is kept: times inside `times`, none twice.
+    /// Marks the chunk as damaged and keeps only plausible messages: times inside `times`, none twice.
     pub(super) fn doubt(&mut self, times: Option<(Stamp, Stamp)>) {
         self.doubtful = true;
         if let Some((first, last)) = times {
@@ -44,7 +45,7 @@ impl ToldMessages {
         }
     }
 
-    /// Takes note that a record stands behind the chunk that is none of its index.
+    /// Notes that a record behind the chunk is not part of its index.
     pub(super) fn interrupt(&mut self) {
         self.interrupted = true;
     }
@@ -56,12 +57,12 @@ impl ToldMessages {
         self.interrupted || differs || found < u64::from(count)
     }
 
-    /// Whether an index record belongs to another chunk than the last, one that was not seen.
+    /// Whether an index record belongs to a chunk that was not seen, not to the last one.
     pub(super) fn is_of_another(&self, id: ConnectionId, stamps: &[Stamp]) -> bool {
         self.interrupted && !self.gather.holds(id, stamps)
     }
 
-    /// Takes note of an index record.
+    /// Notes an index record.
     pub(super) fn behind(&mut self, record: Behind) {
         let (found, count) = (self.gather.count(record.id), u64::from(record.count));
         self.missing += count.saturating_sub(found);
@@ -71,8 +72,8 @@ impl ToldMessages {
         }
     }
 
-    /// Tells all of it; answers for how many messages the index is the only witness. Where chunk and index disagree,
-    /// the index is believed if the chunk is damaged or has lost more than it has too much.
+    /// Tells all messages; returns the number of those that only the index has. Where chunk and index disagree, the
+    /// index is believed if the chunk is damaged or has lost more messages than it has in excess.
     pub(super) fn settle(&mut self, sink: &mut dyn Sink) -> u64 {
         let believed = self.doubtful || self.missing > self.surplus;
         let mut witnessed = 0;

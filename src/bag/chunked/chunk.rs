@@ -15,7 +15,7 @@ use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
 impl<G: Grammar> Query<'_, G> {
-    /// Tells `sink` all stamps of `chunk` and what is wanted of its messages.
+    /// Tells `sink` all stamps of `chunk` and the wanted parts of its messages.
     pub(super) fn read(&self, chunk: &Chunk, sink: &mut dyn Sink) {
         // Without an index here the bag has said elsewhere that the chunk is empty.
         let Some(promised) = &chunk.promised else {
@@ -72,7 +72,7 @@ impl<G: Grammar> Query<'_, G> {
         }
     }
 
-    /// The chunk's index, if it says exactly what the tail says, and whether it stands where it should.
+    /// The chunk's index, if it agrees exactly with the tail, and whether it stands where it should.
     fn index(&self, chunk: &Chunk, promised: &IndexSum) -> io::Result<Option<(Index, bool)>> {
         let len = chunk.index.end - chunk.index.start;
         if len > LONGEST_INDEX {
@@ -101,7 +101,7 @@ impl<G: Grammar> Query<'_, G> {
         Ok(G::index(&bytes[..got], promised))
     }
 
-    /// The chunk's compression and where its body stands.
+    /// The chunk's compression and the place of its body.
     pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<ChunkBody>> {
         let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, NEAR);
         let head = match G::next(&mut stream) {
@@ -115,7 +115,7 @@ impl<G: Grammar> Query<'_, G> {
         Ok(how.map(|how| ChunkBody { how, range }))
     }
 
-    /// The body of a chunk that the tail names too early.
+    /// The body of a chunk for which the tail names a place too early.
     fn moved(&self, chunk: &Chunk) -> Option<ChunkBody> {
         let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
         let start = next_chunk::<G>(&mut stream).then(|| stream.position())?;
@@ -126,7 +126,7 @@ impl<G: Grammar> Query<'_, G> {
         self.body(&here).ok().flatten()
     }
 
-    /// Tells `sink` of the chunk that `stream` stands at record by record, and what is wrong with it.
+    /// Tells `sink` of the chunk at the position of `stream`, record by record, and reports damage in it.
     fn told(&self, stream: &mut ByteStream<'_>, what: Share, sink: &mut dyn Sink) {
         if let Err(why) = self.walk(stream, what, sink) {
             let text = format!("a chunk is damaged inside: {why}");
@@ -159,11 +159,11 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-/// What is told of a chunk.
+/// The part of a chunk that is told.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Share {
     Whole,
-    /// Only what is wanted of its messages: their stamps are told by an index elsewhere.
+    /// Only the wanted payloads: the stamps are told by an index elsewhere.
     Payloads,
 }
 

@@ -14,18 +14,18 @@ use crate::bag::source::ByteStream;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
-/// How far is looked at a time for where records go on, in bytes.
+/// The number of bytes searched at a time for the next record.
 const STRIDE: usize = 64 * 1024;
 
-/// What was found on the way.
+/// The result of reading from the front.
 #[derive(Debug, Default)]
 pub(super) struct ForwardScan {
     pub(super) compression: BTreeSet<Compression>,
-    /// The bag has its end, and nothing was skipped.
+    /// Whether the bag has its end and nothing was skipped.
     pub(super) complete: bool,
 }
 
-/// Messages that came before the connection that they belong to.
+/// Messages that came before the description of their connection.
 #[derive(Default)]
 struct Early {
     runs: BTreeMap<u32, (Vec<Stamp>, Vec<u32>)>,
@@ -33,10 +33,10 @@ struct Early {
     dropped: u64,
 }
 
-/// How many early messages are held: 3 MB.
+/// The most early messages that are held: 3 MB.
 const MOST_EARLY: usize = 1 << 18;
 
-/// Walks the records of a bag.
+/// A walk through the records of a bag.
 struct Forward<'s, G> {
     sink: &'s mut dyn Sink,
     grammar: G,
@@ -46,13 +46,13 @@ struct Forward<'s, G> {
     early: Early,
     found: ForwardScan,
     allowance: Arc<Allowance>,
-    /// How many messages the bag says it holds.
+    /// The number of messages that the bag states.
     total: Option<u64>,
-    /// The end of the data was met.
+    /// Whether the end of the data was met.
     ended: bool,
 }
 
-/// Reads all that `stream` holds from the first record on; `size` is the length of the bag, 0 if it is not known.
+/// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if it is not known.
 pub(super) fn read<G: Grammar>(
     stream: &mut ByteStream<'_>,
     size: u64,
@@ -78,7 +78,7 @@ pub(super) fn read<G: Grammar>(
 }
 
 impl<G: Grammar> Forward<'_, G> {
-    /// The records of the file itself; answers why and where they end.
+    /// Reads the records of the file itself; returns why and where they end.
     fn outside(&mut self, stream: &mut ByteStream<'_>, size: u64) -> (NoRecord, u64) {
         loop {
             let done = match G::next(stream) {
@@ -130,7 +130,7 @@ impl<G: Grammar> Forward<'_, G> {
         }
     }
 
-    /// Whether the bag ends here, as it should.
+    /// Whether the bag ends here properly.
     fn file_end(&mut self, stream: &mut ByteStream<'_>, len: u64) -> NoRecord {
         self.ended = true;
         if let Err(stop) = pass(stream, len) {
@@ -149,13 +149,13 @@ impl<G: Grammar> Forward<'_, G> {
         }
     }
 
-    /// Passes over what is no record, up to the next chunk; answers whether there is one.
+    /// Skips bytes that are not a record, up to the next chunk; returns whether there is one.
     fn resume(&mut self, stream: &mut ByteStream<'_>) -> bool {
         let from = stream.position();
         let found = next_chunk::<G>(stream);
         if found {
             let lost = stream.position() - from;
-            self.damage(&format!("{lost} bytes from byte {from} on are no records"));
+            self.damage(&format!("{lost} bytes from byte {from} on are not records"));
         }
         found
     }
@@ -178,7 +178,7 @@ impl<G: Grammar> Forward<'_, G> {
         Ok(())
     }
 
-    /// The rest of the file as one compressed chunk that was never closed.
+    /// Reads the rest of the file as one compressed chunk that was never closed.
     fn tail(&mut self, stream: &mut ByteStream<'_>, how: Compression) -> NoRecord {
         let mut plain = match self.allowance.open(how, &mut *stream) {
             Ok(reader) => ByteStream::of_reader(reader),
@@ -190,7 +190,7 @@ impl<G: Grammar> Forward<'_, G> {
         }
     }
 
-    /// Compares what an index record says with what was found in the chunk before it.
+    /// Compares an index record with the messages found in the chunk before it.
     fn index(
         &mut self,
         stream: &mut ByteStream<'_>,
@@ -213,7 +213,7 @@ impl<G: Grammar> Forward<'_, G> {
         pass(stream, len)
     }
 
-    /// Tells what was found in the last chunk, once all that stands behind it has been read.
+    /// Tells the messages of the last chunk, once everything behind it has been read.
     fn settle(&mut self) {
         let mended = self.told.settle(self.sink);
         if mended > 0 {
@@ -256,7 +256,7 @@ impl<G: Grammar> Forward<'_, G> {
             ),
             NoRecord::Broken => (
                 NoticeKind::Damaged,
-                format!("what stands from byte {at} on is no record"),
+                format!("what stands from byte {at} on is not a record"),
             ),
             NoRecord::Io(e) => (
                 NoticeKind::Damaged,
@@ -310,7 +310,7 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
     }
 }
 
-/// The `len` bytes that `stream` stands at, without taking them.
+/// The next `len` bytes of `stream`, without taking them.
 fn peek_whole<'s>(stream: &'s mut ByteStream<'_>, len: u64) -> Result<&'s [u8], NoRecord> {
     let len = usize::try_from(len).unwrap_or(usize::MAX);
     let bytes = stream.peek(len.min(MOST_PAYLOAD))?;
@@ -320,7 +320,7 @@ fn peek_whole<'s>(stream: &'s mut ByteStream<'_>, len: u64) -> Result<&'s [u8], 
     Ok(bytes)
 }
 
-/// Goes to where a chunk begins; at the end of the stream there is none.
+/// Goes to the beginning of the next chunk; false if there is none before the end of the stream.
 pub(super) fn next_chunk<G: Grammar>(stream: &mut ByteStream<'_>) -> bool {
     while let Ok(window) = stream.peek(2 * STRIDE) {
         let len = window.len();

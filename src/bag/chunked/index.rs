@@ -1,4 +1,4 @@
-//! What the index behind a chunk says, told to a sink; and wanted messages, picked out of the chunk's bytes.
+//! The index behind a chunk, told to a sink; and wanted messages, picked out of the chunk's bytes.
 
 use std::io;
 use std::marker::PhantomData;
@@ -13,7 +13,7 @@ use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
-/// What the index of a chunk should add up to, in any order.
+/// The sum that the index of a chunk should have, whatever the order of its entries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct IndexSum {
     pub(crate) connections: u32,
@@ -42,7 +42,7 @@ pub(crate) struct Index {
     /// The bag's own number for a connection, and the place of its entries.
     runs: Vec<(u32, Range<usize>)>,
     stamps: Vec<Stamp>,
-    /// From the start of the chunk's plain bytes.
+    /// The place of each message, from the start of the chunk's plain bytes.
     offsets: Vec<u64>,
 }
 
@@ -57,7 +57,7 @@ impl Index {
         self.runs.push((raw, start..self.stamps.len()));
     }
 
-    /// Whether its first and last times are these.
+    /// Whether these are the first and last times in the index.
     pub(super) fn spans(&self, first: Stamp, last: Stamp) -> bool {
         let (mut low, mut high) = (Stamp::MAX, Stamp::MIN);
         for at in &self.stamps {
@@ -68,15 +68,15 @@ impl Index {
     }
 }
 
-/// Where a chunk's records lie.
+/// The place of a chunk's records.
 pub(crate) struct ChunkBody {
     pub(crate) how: Compression,
     pub(crate) range: Range<u64>,
 }
 
 impl ChunkBody {
-    /// Its plain bytes, and the position at which they start. `step` is how much is read at a time if they are plain
-    /// in the file.
+    /// A stream of the plain bytes, and the position at which they start. `step` is the number of bytes read at a time
+    /// if they are plain in the file.
     pub(crate) fn plain<'a>(
         &self,
         source: &'a FileSource,
@@ -92,15 +92,15 @@ impl ChunkBody {
     }
 }
 
-/// What is asked for of a bag: the same for all of its chunks.
+/// The parts of a bag that are asked for: the same for all of its chunks.
 pub(super) struct Query<'a, G> {
     pub(super) source: &'a FileSource,
     pub(super) allowance: Arc<Allowance>,
     pub(super) connections: &'a Connections,
-    /// What is wanted, by connection.
+    /// The wanted part of each message, by connection.
     pub(super) wants: &'a [Want],
     pub(super) range: Option<Span>,
-    /// Where the last chunk and its index end.
+    /// The place behind the last chunk and its index.
     pub(super) tail: u64,
     pub(super) grammar: PhantomData<fn() -> G>,
 }
@@ -134,7 +134,7 @@ impl<G: Grammar> Query<'_, G> {
         }
     }
 
-    /// The entries of which more than the stamp is wanted, in the order of the chunk.
+    /// The entries for which more than the stamp is wanted, in the order of the chunk.
     fn wanted(&self, index: &Index) -> Vec<Wanted> {
         let mut all = Vec::new();
         for (raw, entries) in &index.runs {
@@ -163,7 +163,7 @@ impl<G: Grammar> Query<'_, G> {
         all
     }
 
-    /// Fetches wanted messages; answers the size per entry if all were there.
+    /// Fetches wanted messages; returns the size per entry if all were there.
     fn fetch(
         &self,
         wanted: &[Wanted],
@@ -193,7 +193,7 @@ impl<G: Grammar> Query<'_, G> {
     }
 }
 
-/// Tells `sink` one wanted message; answers its size, or nothing if it is not there.
+/// Tells `sink` one wanted message; returns its size, or `None` if it is not there.
 fn pick<G: Grammar>(
     stream: &mut ByteStream<'_>,
     base: u64,
@@ -231,7 +231,7 @@ struct Wanted {
     want: Want,
 }
 
-/// Messages of a connection that the bag does not describe.
+/// Reports messages of a connection that the bag does not describe.
 pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
     sink.notice(Notice {
         kind: NoticeKind::Damaged,
@@ -240,7 +240,7 @@ pub(crate) fn nameless(sink: &mut dyn Sink, count: u64) {
     });
 }
 
-/// Messages that only the index knows of.
+/// Reports messages that only the index has.
 pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
     sink.notice(Notice {
         kind: NoticeKind::Damaged,
@@ -249,7 +249,7 @@ pub(super) fn absent(sink: &mut dyn Sink, count: u64) {
     });
 }
 
-/// Hands over what is wanted of the message that `stream` stands at, and passes over it.
+/// Hands over the wanted part of the message at the position of `stream`, and passes over it.
 pub(super) fn hand_over(
     stream: &mut ByteStream<'_>,
     (connection, time, size): (ConnectionId, Stamp, u32),
@@ -267,7 +267,7 @@ pub(super) fn hand_over(
     super::record::pass(stream, u64::from(size))
 }
 
-/// Hands over what is wanted of a message that another reader holds.
+/// Hands over the wanted part of a message that another reader holds.
 pub(crate) fn hand_over_slice(
     whole: &[u8],
     (connection, time): (ConnectionId, Stamp),
@@ -288,7 +288,7 @@ pub(crate) fn hand_over_slice(
     });
 }
 
-/// The bytes that are wanted of the message that `stream` stands at; `None` if none are, or too many.
+/// The wanted bytes of the message at the position of `stream`; `None` if none are wanted, or too many.
 fn wanted_part<'s>(
     stream: &'s mut ByteStream<'_>,
     size: u32,
@@ -311,5 +311,5 @@ fn wanted_part<'s>(
     Ok(Some(data))
 }
 
-/// What is said of a payload past [`MOST_PAYLOAD`].
+/// The notice about a payload larger than [`MOST_PAYLOAD`].
 const TOO_LARGE: &str = "messages larger than 16 MiB were counted and not looked into";

@@ -1,4 +1,4 @@
-//! What the tail of a bag promises: its connections and chunks, and whether they can be relied on.
+//! The tail of a bag: its connections and chunks, and whether they are reliable.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -9,21 +9,21 @@ use crate::bag::model::{ConnectionId, Message, Sink, Want};
 use crate::base::notice::Notice;
 use crate::base::time::{Span, Stamp};
 
-/// What the tail says about a chunk. Its sums do not overflow.
+/// A chunk as the tail describes it. Sums of its numbers do not overflow.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk {
-    /// Where its record begins.
+    /// The place of its record.
     pub(crate) start: u64,
-    /// Where its index should lie.
+    /// The expected place of its index.
     pub(crate) index: Range<u64>,
-    /// Where its index ends at the latest.
+    /// The latest possible end of its index.
     pub(crate) end: u64,
-    /// The times of its first and last message, if that is true.
+    /// The times of its first and last message, as stated.
     pub(crate) first: Stamp,
     pub(crate) last: Stamp,
-    /// What its index should add up to; `None` if it has none.
+    /// The expected sum of its index; `None` if it has none.
     pub(crate) promised: Option<IndexSum>,
-    /// Where the plan keeps how many messages of which connection that is; empty if it does not.
+    /// The place of its message counts in [`ChunkPlan::counts`]; empty if they are not kept.
     pub(crate) counts: Range<usize>,
 }
 
@@ -33,25 +33,24 @@ impl Chunk {
     }
 }
 
-/// What the tail says.
+/// The contents of the tail.
 #[derive(Debug, Default)]
 pub(crate) struct ChunkPlan {
     pub(crate) connections: Connections,
-    /// In the order of the file, none twice, none over another.
+    /// The chunks in the order of the file, none twice, none over another.
     pub(crate) chunks: Vec<Chunk>,
-    /// How many messages of each connection, by the bag's own number for it, the chunks are said to hold, one chunk
-    /// after the other.
+    /// The stated number of messages of each connection, by the bag's own number for it, chunk after chunk.
     pub(crate) counts: Vec<(u32, u32)>,
-    /// Where the chunks lie.
+    /// The part of the file that holds the chunks.
     pub(crate) body: Range<u64>,
-    /// What is worth saying of the bag as a whole.
+    /// Notices about the bag as a whole.
     pub(crate) notices: Vec<Notice>,
 }
 
-/// More chunks than this are not planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
+/// The most chunks that are planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
 pub(crate) const MOST_CHUNKS: usize = 1 << 20;
 
-/// The most counts of chunks that are kept, 16 MB: a bag of 30,000 chunks with 60 connections in each.
+/// The most message counts of chunks that are kept, 16 MB: a bag of 30,000 chunks with 60 connections in each.
 const MOST_COUNTS: usize = 1 << 21;
 
 impl ChunkPlan {
@@ -64,7 +63,8 @@ impl ChunkPlan {
         start..self.counts.len()
     }
 
-    /// What a chunk is said to hold: messages of connections that are described, all of them known.
+    /// The messages that a chunk is stated to hold, per connection; `None` if a connection is not described or the
+    /// counts do not add up.
     pub(super) fn lump(&self, chunk: &Chunk) -> Option<Vec<(ConnectionId, u64)>> {
         let counts = self.counts.get(chunk.counts.clone())?;
         let known = |(raw, count): &(u32, u32)| {
@@ -76,13 +76,14 @@ impl ChunkPlan {
         (Some(sum) == chunk.promised.map(|p| p.messages)).then_some(lump)
     }
 
-    /// How many bytes the longest index takes.
+    /// The number of bytes of the longest index.
     pub(super) fn longest_index(&self) -> u64 {
         let len = |c: &Chunk| c.index.end - c.index.start;
         self.chunks.iter().map(len).max().unwrap_or(0)
     }
 
-    /// The time covered: `read` looks into the chunks that are said to be first and last, or into all if they are few.
+    /// The time covered: `read` looks into the chunks that are stated to be first and last, or into all if they are
+    /// few.
     pub(super) fn span(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Option<Span> {
         let mut seen = Extremes::default();
         let full: Vec<&Chunk> = self.chunks.iter().filter(|c| c.holds_messages()).collect();
@@ -98,16 +99,16 @@ impl ChunkPlan {
     }
 }
 
-/// Why a bag cannot be read by its index.
+/// The reason why a bag cannot be read by its index.
 #[derive(Clone, Debug)]
 pub(crate) struct Unindexed {
     pub(crate) why: String,
-    /// The head says that there was more.
+    /// Whether the head says that there was more.
     pub(crate) cut: bool,
 }
 
 impl Unindexed {
-    /// For this reason.
+    /// An error with this reason.
     pub(crate) fn because<T>(why: impl Into<String>) -> Result<T, Self> {
         Err(Self {
             why: why.into(),
@@ -116,9 +117,9 @@ impl Unindexed {
     }
 }
 
-/// The numbers of the connections that chunks are said to hold messages of.
+/// The numbers of the connections that chunks are stated to hold messages of.
 pub(crate) struct Used {
-    /// By number, for all that real bags use.
+    /// Flags by number, for all numbers that real bags use.
     small: Vec<bool>,
     large: BTreeSet<u32>,
 }
@@ -133,7 +134,7 @@ impl Default for Used {
 }
 
 impl Used {
-    /// Adds one.
+    /// Adds the number of a connection.
     pub(crate) fn add(&mut self, raw: u32) {
         match self.small.get_mut(raw as usize) {
             Some(used) => *used = true,
@@ -141,7 +142,7 @@ impl Used {
         }
     }
 
-    /// Whether all of them are described. If not, the chunks themselves may describe the others.
+    /// Checks that all of them are described. If not, the chunks themselves may describe the others.
     pub(crate) fn are_in(&self, connections: &Connections) -> Result<(), Unindexed> {
         let small = (0..).zip(&self.small).filter(|(_, used)| **used);
         let mut all = small.map(|(raw, _)| raw).chain(self.large.iter().copied());
@@ -152,7 +153,7 @@ impl Used {
     }
 }
 
-/// A way to find the first and the last stamp: all the rest is forgotten.
+/// A sink that keeps only the first and the last stamp.
 #[derive(Default)]
 struct Extremes(Option<(Stamp, Stamp)>);
 

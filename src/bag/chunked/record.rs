@@ -1,4 +1,5 @@
-//! What a grammar makes of the bytes of a chunked bag: records, why none comes, and the connections they describe.
+//! The records of a chunked bag as a grammar reads them, the reasons why none follows, and the connections they
+//! describe.
 
 use std::collections::HashMap;
 use std::{fmt, io};
@@ -9,58 +10,58 @@ use crate::bag::source::ByteStream;
 use crate::base::budget::CONNECTIONS;
 use crate::base::time::Stamp;
 
-/// The head of a record; the stream stands behind it. `len` is what follows.
+/// The head of a record; the stream stands behind it. `len` is the number of bytes that follow.
 #[derive(Debug)]
 pub(crate) enum RecordHead<D> {
     /// A chunk, whose body follows.
     Chunk(ChunkHead),
     /// A message of the connection that the bag calls `raw`; its payload follows.
     Message { raw: u32, time: Stamp, size: u32 },
-    /// What describes connections.
+    /// A description of connections.
     Description { what: D, len: u64 },
-    /// How many messages of a connection the chunk before it holds; their entries follow.
+    /// The number of messages of a connection that the chunk before it holds; their entries follow.
     Index { raw: u32, count: u32, len: u64 },
-    /// How many messages the bag says it holds.
+    /// The number of messages that the bag states.
     Total { messages: u64, len: u64 },
-    /// No message follows.
+    /// The end of the data: no message follows.
     DataEnd { len: u64 },
-    /// Nothing follows but what the bag closes with.
+    /// The end of the file: only the closing bytes of the bag follow.
     FileEnd { len: u64 },
     /// A record that does not concern us.
     Other { len: u64 },
 }
 
-/// What stands before a chunk's records.
+/// The head of a chunk, before its records.
 #[derive(Clone, Debug)]
 pub(crate) struct ChunkHead {
-    /// `None` for one that no reader knows.
+    /// `None` for an unknown compression.
     pub(crate) how: Option<Compression>,
     /// The bytes of its body in the file.
     pub(crate) packed: u64,
     /// The bytes behind the body that belong to the chunk.
     pub(crate) padding: u64,
-    /// The bytes of its records, if that is true.
+    /// The stated number of bytes of its records.
     pub(crate) plain: u64,
-    /// The CRC-32 of its records, if it states one.
+    /// The stated CRC-32 of its records, if there is one.
     pub(crate) crc: Option<u32>,
-    /// The first and the last time in it, if it states them.
+    /// The first and the last time in it, if stated.
     pub(crate) times: Option<(Stamp, Stamp)>,
-    /// It is marked as a record of another kind.
+    /// Whether it is marked as a record of another kind.
     pub(crate) misnamed: bool,
-    /// The recorder was killed before it wrote the lengths; the body goes on to the end.
+    /// Whether the recorder was killed before it wrote the lengths; the body goes on to the end.
     pub(crate) unclosed: bool,
 }
 
-/// Why no record comes.
+/// The reason why no record follows.
 #[derive(Debug)]
 pub(crate) enum NoRecord {
     /// The bytes end where a record could begin.
     End,
     /// They end inside a record.
     Cut,
-    /// What stands here is no record.
+    /// The bytes here are not a record.
     Broken,
-    /// The system, or a decompressor, refuses.
+    /// An error of the system, or of a decompressor.
     Io(io::Error),
 }
 
@@ -78,13 +79,13 @@ impl fmt::Display for NoRecord {
         match self {
             Self::End => f.write_str("it ends"),
             Self::Cut => f.write_str("it ends inside a record"),
-            Self::Broken => f.write_str("what stands there is no record"),
+            Self::Broken => f.write_str("what stands there is not a record"),
             Self::Io(e) => e.fmt(f),
         }
     }
 }
 
-/// Passes over `len` bytes, which must be there: a length that leaves the file is no length, and nothing is passed.
+/// Passes over `len` bytes, which must be there: if the length leads out of the file, nothing is passed.
 pub(crate) fn pass(stream: &mut ByteStream<'_>, len: u64) -> Result<(), NoRecord> {
     if stream.left().is_some_and(|left| left < len) {
         return Err(NoRecord::Cut);
@@ -108,13 +109,13 @@ impl Connections {
         self.ids.get(&raw).copied()
     }
 
-    /// All of them in the order of their announcement.
+    /// All connections in the order of their announcement.
     pub(crate) fn list(&self) -> &[Connection] {
         &self.list
     }
 
-    /// Adds one under the next free id; answers it if it is new. A second one of the same number is passed over, as
-    /// every reader does.
+    /// Adds a connection under the next free id; returns it if it is new. A second one of the same number is passed
+    /// over, as every reader does.
     pub(crate) fn add(&mut self, raw: u32, connection: Connection) -> Option<&Connection> {
         if self.ids.contains_key(&raw) || self.list.len() >= CONNECTIONS {
             return None;

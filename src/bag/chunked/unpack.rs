@@ -1,4 +1,4 @@
-//! A chunk opened: its records, one after the other, and whether they are what the chunk says.
+//! The records of a chunk, one after the other, with checks of the chunk's own numbers.
 
 use std::io::{self, Read};
 use std::sync::{Arc, OnceLock};
@@ -9,16 +9,16 @@ use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::source::ByteStream;
 use crate::base::time::Stamp;
 
-/// What takes in the records of a chunk.
+/// The receiver of a chunk's records.
 pub(super) trait Visitor<G: Grammar> {
-    /// A message, whose payload `stream` stands at.
+    /// A message, whose payload is next in `stream`.
     fn message(
         &mut self,
         stream: &mut ByteStream<'_>,
         message: (u32, Stamp, u32),
     ) -> Result<(), NoRecord>;
 
-    /// A description, `len` bytes that `stream` stands at.
+    /// A description, the next `len` bytes of `stream`.
     fn description(
         &mut self,
         stream: &mut ByteStream<'_>,
@@ -29,11 +29,11 @@ pub(super) trait Visitor<G: Grammar> {
     }
 }
 
-/// Hands over the records of the chunk whose body `stream` stands at, and goes to its end. Answers what is wrong with
-/// them, if anything is.
+/// Hands over the records of the chunk whose body is next in `stream`, and goes to its end. Returns what is wrong with
+/// them, if anything.
 ///
 /// # Errors
-/// Where the file ends first or cannot be read on.
+/// Fails where the file ends first or cannot be read on.
 pub(super) fn unpack<G: Grammar>(
     stream: &mut ByteStream<'_>,
     head: &ChunkHead,
@@ -58,8 +58,8 @@ pub(super) fn unpack<G: Grammar>(
     }
 }
 
-/// The records of a chunk that stand in the file as they are. Nobody looks at their checksum: that would mean reading
-/// every payload.
+/// Hands over the records of an uncompressed chunk. Their checksum is not verified: that would mean reading every
+/// payload.
 fn plain<G: Grammar>(
     stream: &mut ByteStream<'_>,
     end: u64,
@@ -72,7 +72,7 @@ fn plain<G: Grammar>(
     }
 }
 
-/// The records of a compressed chunk.
+/// Hands over the records of a compressed chunk.
 fn packed<G: Grammar>(
     stream: &mut ByteStream<'_>,
     head: &ChunkHead,
@@ -104,7 +104,7 @@ fn packed<G: Grammar>(
     }
 }
 
-/// The records up to where `stream` stands at `end`.
+/// Hands over the records up to position `end` of `stream`.
 pub(super) fn records<G: Grammar>(
     stream: &mut ByteStream<'_>,
     end: u64,
@@ -152,11 +152,11 @@ fn one<G: Grammar>(
     }
 }
 
-/// Sums up what is read.
+/// A reader that sums up the bytes it reads.
 struct CrcReader<'a, R> {
     from: R,
     hasher: Option<crc32fast::Hasher>,
-    /// The sum, once everything has been read.
+    /// The sum, set once everything has been read.
     at_end: &'a OnceLock<u32>,
 }
 

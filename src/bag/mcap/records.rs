@@ -1,7 +1,7 @@
 //! The records of an MCAP file, read with bounds, and the channels they describe.
 //!
-//! What is read once per file is parsed by the crate `mcap`; what is read once per chunk or message here, from a stream
-//! and without copies, and text that is not UTF-8 is replaced where the crate refuses the record.
+//! The records of which there is one per file are parsed by the crate `mcap`; those of each chunk or message are parsed
+//! here, from a stream and without copies, and text that is not UTF-8 is replaced where the crate refuses the record.
 
 use std::sync::Arc;
 
@@ -15,13 +15,14 @@ use crate::bag::source::ByteStream;
 use crate::base::budget::DEFINITIONS;
 use crate::base::time::Stamp;
 
-/// The bytes of a record's head: kind and length.
+/// The number of bytes of a record's head: kind and length.
 pub(super) const HEAD: u64 = 9;
-/// The bytes of a message before its payload.
+/// The number of bytes of a message before its payload.
 const MESSAGE_HEAD: usize = 22;
-/// The bytes of an entry of a message index: time and offset.
+/// The number of bytes of an entry of a message index: time and offset.
 pub(super) const ENTRY: usize = 16;
-/// The bytes of a footer, and of the end of the data, which tells them from records with a damaged kind.
+/// The number of bytes of a footer, and of the record that ends the data, which tells them from records with a damaged
+/// kind.
 pub(super) const FOOTER: u64 = 20;
 const DATA_END: u64 = 4;
 
@@ -62,7 +63,7 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     })
 }
 
-/// Takes a record's kind and the length of what `stream` then stands at.
+/// Takes a record's kind and the length of the content that follows in `stream`.
 pub(super) fn head(stream: &mut ByteStream<'_>) -> Result<(u8, u64), NoRecord> {
     let head = stream.peek(9)?;
     if head.is_empty() {
@@ -76,7 +77,7 @@ pub(super) fn head(stream: &mut ByteStream<'_>) -> Result<(u8, u64), NoRecord> {
     Ok((kind, len))
 }
 
-/// Takes what stands before a message's payload.
+/// Takes the fields before a message's payload.
 fn message(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>, NoRecord> {
     let size = len.checked_sub(MESSAGE_HEAD as u64);
     let size = size.and_then(|size| u32::try_from(size).ok());
@@ -112,13 +113,13 @@ fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>,
     })
 }
 
-/// More bytes than this behind a chunk's records are no part of it: one of the two lengths is damaged.
+/// The most bytes behind a chunk's records that may belong to it; with more, one of the two lengths is damaged.
 const MOST_PADDING: u64 = 4096;
 
-/// The bytes of a chunk before the name of its compression.
+/// The number of bytes of a chunk before the name of its compression.
 const CHUNK_HEAD: usize = 8 + 8 + 8 + 4;
 
-/// Takes what stands before a chunk's records.
+/// Takes the fields before a chunk's records.
 pub(super) fn chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<ChunkHead, NoRecord> {
     let bytes = stream.peek(256)?;
     let total = bytes.len();
@@ -127,7 +128,7 @@ pub(super) fn chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<ChunkHead, 
         let (first, last, plain) = (cursor.u64()?, cursor.u64()?, cursor.u64()?);
         let crc = cursor.u32()?;
         let name = cursor.bytes()?;
-        // What calls its compression by no word is no chunk.
+        // A record with an unknown name of a compression is not a chunk.
         let is_word = name.len() <= 16 && name.iter().all(u8::is_ascii_graphic);
         let how = Compression::named(name);
         let packed = cursor.u64().filter(|_| is_word)?;
@@ -173,7 +174,7 @@ pub(super) fn is_chunk(bytes: &[u8]) -> bool {
     cursor.u64().is_some_and(|len| is_chunk_of(cursor.0, len))
 }
 
-/// Whether a record of `len` bytes that begin so is a chunk: its two lengths agree.
+/// Whether a record of `len` bytes that begins like this is a chunk: its two lengths agree.
 fn is_chunk_of(bytes: &[u8], len: u64) -> bool {
     let mut rest = FieldCursor(bytes.get(CHUNK_HEAD..).unwrap_or_default());
     let Some(name) = rest.bytes() else {
@@ -184,7 +185,7 @@ fn is_chunk_of(bytes: &[u8], len: u64) -> bool {
     Compression::named(name).is_some() && packed == Some(len)
 }
 
-/// Fields one after the other, never past the end.
+/// A cursor over the fields of a record, never past the end.
 pub(super) struct FieldCursor<'a>(pub(super) &'a [u8]);
 
 impl<'a> FieldCursor<'a> {
@@ -210,7 +211,7 @@ impl<'a> FieldCursor<'a> {
         self.take().map(u64::from_le_bytes)
     }
 
-    /// Bytes behind their length.
+    /// A byte string that follows its length.
     pub(super) fn bytes(&mut self) -> Option<&'a [u8]> {
         let len = usize::try_from(self.u32()?).ok()?;
         let (bytes, rest) = self.0.split_at_checked(len)?;
@@ -218,7 +219,7 @@ impl<'a> FieldCursor<'a> {
         Some(bytes)
     }
 
-    /// Text behind its length; what is not UTF-8 is replaced.
+    /// A text that follows its length; bytes that are not UTF-8 are replaced.
     pub(super) fn text(&mut self) -> Option<String> {
         Some(String::from_utf8_lossy(self.bytes()?).into_owned())
     }
@@ -230,7 +231,7 @@ pub(super) struct SchemaRecord {
     definition: Option<Arc<str>>,
 }
 
-/// Adds what a schema record says. A second one of the same id is passed over.
+/// Adds the schema of a record. A second one of the same id is passed over.
 pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
     let mut cursor = FieldCursor(record);
     let id = cursor.u16()?;
@@ -284,7 +285,7 @@ pub(super) fn channel(
     Some((id, connection))
 }
 
-/// What ROS keeps in a channel's metadata.
+/// Adds the fields that ROS keeps in a channel's metadata.
 fn describe(connection: &mut Connection, metadata: &[u8]) {
     let mut cursor = FieldCursor(metadata);
     while let (Some(key), Some(value)) = (cursor.text(), cursor.text()) {

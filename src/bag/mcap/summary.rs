@@ -1,4 +1,4 @@
-//! The summary at the end of an MCAP file: its channels and chunks, and whether they can be relied on.
+//! The summary at the end of an MCAP file: its channels and chunks, and whether they are reliable.
 
 use std::io;
 
@@ -15,10 +15,10 @@ use crate::bag::model::MOST_PAYLOAD;
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
 use crate::base::time::Stamp;
 
-/// As many as there are ids for channels.
+/// The most channels: as many as there are ids.
 const MOST_CHANNELS: usize = 1 << 16;
 
-/// Reads the end of `source`.
+/// Reads the summary at the end of `source`.
 pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
     let start = match footer(source)? {
         Ok(start) => start,
@@ -34,10 +34,10 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
     Ok(summary.settle(source))
 }
 
-/// The bytes of a footer record and of what closes the file.
+/// The number of bytes of a footer record and of the closing bytes of the file.
 const END: usize = 9 + 20 + 8;
 
-/// Where the summary begins.
+/// The place where the summary begins.
 fn footer(source: &FileSource) -> io::Result<Result<u64, Unindexed>> {
     let mut bytes = [0; END];
     let Some(at) = source.len().checked_sub(bytes.len() as u64) else {
@@ -61,14 +61,14 @@ fn footer(source: &FileSource) -> io::Result<Result<u64, Unindexed>> {
     })
 }
 
-/// What has been read of a summary.
+/// The part of a summary that has been read.
 #[derive(Default)]
 struct Summary {
     plan: ChunkPlan,
     grammar: Mcap,
     used: Used,
     statistics: Option<Statistics>,
-    /// A chunk holds records and has no message index.
+    /// Whether a chunk holds records and has no message index.
     blind: bool,
 }
 
@@ -159,7 +159,8 @@ impl Summary {
     }
 }
 
-/// Looks between the chunks, where other records may stand, but no messages that the summary does not know of.
+/// Checks between the chunks, where other records may stand, that there are no messages that the summary does not know
+/// of.
 fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
     let mut free = plan.body.start;
     let ends = plan.chunks.iter().map(|c| (c.start, c.end));
@@ -181,7 +182,7 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
                     | RecordHead::FileEnd { len }
                     | RecordHead::Other { len },
                 ) if pass(&mut stream, len).is_ok() => {}
-                // What is no record hides no message that could be read.
+                // Bytes that are not a record hide no message that could be read.
                 _ => break,
             }
         }
@@ -198,10 +199,10 @@ fn statistics(record: &[u8]) -> Option<Statistics> {
     }
 }
 
-/// What a chunk index record says.
+/// A chunk index record.
 struct ChunkIndex {
     chunk: Chunk,
-    /// Messages by channel.
+    /// Message counts by channel.
     counts: Vec<(u32, u32)>,
     /// The length of the chunk's records.
     size: u64,
@@ -238,8 +239,8 @@ fn chunk_index(record: &[u8], used: &mut Used) -> Option<ChunkIndex> {
     })
 }
 
-/// The counts that follow from where the message indexes of a chunk's channels begin: they stand one behind the other,
-/// 15 bytes and 16 for each message. `None` if they do not, or if there are none.
+/// The message counts, computed from the places where the message indexes of a chunk's channels begin: they stand one
+/// behind the other, 15 bytes and 16 for each message. `None` if they do not stand so, or if there are none.
 fn counts(offsets: &[u8], start: u64, end: u64) -> Option<Vec<(u32, u32)>> {
     let mut places = Vec::with_capacity(offsets.len() / 10);
     let mut cursor = FieldCursor(offsets);
@@ -259,7 +260,7 @@ fn counts(offsets: &[u8], start: u64, end: u64) -> Option<Vec<(u32, u32)>> {
     places.iter().zip(ends).map(count).collect()
 }
 
-/// What the index should add up to.
+/// The expected sum of the index.
 fn promised(counts: &[(u32, u32)], used: &mut Used) -> IndexSum {
     let mut sum = IndexSum::default();
     for (channel, count) in counts {

@@ -1,4 +1,4 @@
-//! An MCAP file read a second time by somebody else's reader, the crate `mcap`, with all checksums.
+//! An MCAP file read a second time by an independent reader, the crate `mcap`, with all checksums.
 
 use std::io::{self, Read};
 
@@ -14,7 +14,7 @@ use crate::bag::model::{Sink, Want};
 use crate::bag::source::{ByteStream, FAR, FileSource};
 use crate::base::time::Stamp;
 
-/// Longer records are not looked into, in bytes.
+/// The longest record that is looked into, in bytes.
 const LONGEST_RECORD: usize = 256 << 20;
 
 /// The crate's findings on their way to a sink.
@@ -26,10 +26,10 @@ struct Crate<'s> {
     gather: Gather,
 }
 
-/// Tells `sink` all that the crate finds.
+/// Tells `sink` everything that the crate finds.
 ///
 /// # Errors
-/// Why it did not get to the end: a wrong checksum, a cut, or anything else that is not as the format has it.
+/// The reason why it did not get to the end: a wrong checksum, a cut, or another breach of the format.
 pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), String> {
     bound(source)?;
     let mut from = ByteStream::of_file(source, 0, source.len(), FAR);
@@ -51,8 +51,8 @@ pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), Strin
     told
 }
 
-/// Walks the plain chunks as the crate will, and refuses what it could not bear: it subtracts the length of a record from
-/// what is left of the chunk, its head included, before it compares them.
+/// Walks the plain chunks as the crate will, and refuses a file that it could not bear: it subtracts the length of a
+/// record from what is left of the chunk, its head included, before it compares them.
 fn bound(source: &FileSource) -> Result<(), String> {
     let mut stream = ByteStream::of_file(source, 0, source.len(), FAR);
     Mcap::begin(&mut stream);

@@ -11,7 +11,7 @@ use crate::base::budget::DEFINITIONS;
 use crate::base::name::{NodeName, TopicName};
 use crate::base::time::Stamp;
 
-/// A record's header, as far as it concerns us.
+/// The header of a record, as far as it is used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Header {
     Bag {
@@ -42,11 +42,11 @@ pub(super) enum Header {
         end: Stamp,
         count: u32,
     },
-    /// An operation that we do not know, or one without the fields it needs.
+    /// An unknown operation, or one without the fields it needs.
     Other,
 }
 
-/// The longest header that is believed, in bytes; real ones stay below 300.
+/// The longest header that is accepted, in bytes; real ones stay below 300.
 const LONGEST_HEADER: usize = 1 << 20;
 
 /// Takes the head of the next record.
@@ -71,7 +71,7 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
     })
 }
 
-/// What stands before a chunk's records. A recorder writes the lengths when it closes the chunk.
+/// The head of a chunk. A recorder writes the lengths when it closes the chunk.
 fn chunk(compression: &[u8], size: u32, len: u64) -> ChunkHead {
     let how = Compression::named(compression);
     ChunkHead {
@@ -86,7 +86,7 @@ fn chunk(compression: &[u8], size: u32, len: u64) -> ChunkHead {
     }
 }
 
-/// Takes the header of the next record, and the length that it states of the data that `stream` then stands at.
+/// Takes the header of the next record, and the stated length of the data that follows in `stream`.
 pub(super) fn header(stream: &mut ByteStream<'_>) -> Result<(Header, u32), NoRecord> {
     let head = stream.peek(4)?;
     if head.is_empty() {
@@ -105,10 +105,10 @@ pub(super) fn header(stream: &mut ByteStream<'_>) -> Result<(Header, u32), NoRec
     Ok((record, data_len))
 }
 
-/// The bytes of an entry of an index record: time and offset.
+/// The number of bytes of an entry of an index record: time and offset.
 pub(super) const ENTRY: u32 = 12;
 
-/// What a header says; `None` if it is none: a field without a name, or longer than the header.
+/// The parsed header; `None` if it is broken: a field without a name, or longer than the header.
 pub(super) fn parse(header: &[u8]) -> Option<Header> {
     let mut fields = HeaderFields::default();
     let mut rest = header;
@@ -123,10 +123,10 @@ pub(super) fn parse(header: &[u8]) -> Option<Header> {
     Some(fields.record().unwrap_or(Header::Other))
 }
 
-/// Real headers have up to six fields.
+/// The most fields in a header; real ones have up to six.
 const MOST_FIELDS: usize = 12;
 
-/// The names and values in a header.
+/// An iterator over the names and values in a header.
 #[derive(Default)]
 struct HeaderFields<'a> {
     all: [(&'a [u8], &'a [u8]); MOST_FIELDS],
@@ -187,7 +187,7 @@ impl<'a> HeaderFields<'a> {
     }
 }
 
-/// The first field of a header and what follows it.
+/// The first field of a header and the rest.
 fn field(header: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     let len = u32_at(header, 0)? as usize;
     let (field, rest) = header[4..].split_at_checked(len)?;
@@ -195,18 +195,18 @@ fn field(header: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
     Some((&field[..equals], &field[equals + 1..], rest))
 }
 
-/// The number that stands at `at`, if there are four bytes.
+/// The number at `at`, if there are four bytes.
 pub(super) fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
     let four = bytes.get(at..at.checked_add(4)?)?;
     four.try_into().ok().map(u32::from_le_bytes)
 }
 
-/// The time that stands at `at`, if there are eight bytes.
+/// The time at `at`, if there are eight bytes.
 pub(super) fn time_at(bytes: &[u8], at: usize) -> Option<Stamp> {
     Some(Stamp::from_ros(u32_at(bytes, at)?, u32_at(bytes, at + 4)?))
 }
 
-/// Text of any encoding; what is not UTF-8 is replaced.
+/// Text of any encoding; bytes that are not UTF-8 are replaced.
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
@@ -230,7 +230,7 @@ pub(super) fn connection(grammar: &mut Rosbag1, topic: &[u8], mut data: &[u8]) -
     connection
 }
 
-/// Equal definitions share one text.
+/// The text of a definition, shared with equal ones.
 fn definition(grammar: &mut Rosbag1, value: &[u8]) -> Option<Arc<str>> {
     let text = String::from_utf8_lossy(value);
     if let Some(known) = grammar.definitions.get(text.as_ref()) {

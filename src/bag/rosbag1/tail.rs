@@ -1,4 +1,4 @@
-//! The tail of a ROS 1 bag: which connections and chunks it has, and whether that can be relied on.
+//! The tail of a ROS 1 bag: its connections and chunks, and whether they are reliable.
 
 use std::io;
 
@@ -56,14 +56,14 @@ fn misplaced(index_pos: u64, body: u64, len: u64) -> Option<String> {
     }
 }
 
-/// Says what names cannot be known.
+/// A notice about names that cannot be known.
 fn encrypted(encryptor: &str) -> Option<Notice> {
     let text =
         format!("the bag is encrypted by `{encryptor}`: counts are right, names are not known");
     (!encryptor.is_empty()).then(|| Notice::new(NoticeKind::Note, text))
 }
 
-/// What has been read of a tail.
+/// The part of a tail that has been read.
 #[derive(Default)]
 struct Tail {
     plan: ChunkPlan,
@@ -72,7 +72,7 @@ struct Tail {
 }
 
 impl Tail {
-    /// The records of the tail: `expected` connections and chunks. What follows them does not matter.
+    /// Reads the records of the tail: `expected` connections and chunks. Anything after them does not matter.
     fn records(&mut self, source: &FileSource, expected: (u32, u32)) -> Result<(), NoRecord> {
         let mut stream = ByteStream::of_file(source, self.plan.body.end, source.len(), FAR);
         let (mut connections, mut chunks) = (0, 0);
@@ -178,7 +178,7 @@ impl Tail {
         Ok((sum, counts))
     }
 
-    /// Orders the chunks and tells each where it ends.
+    /// Orders the chunks and sets the end of each.
     fn settle(mut self) -> Result<ChunkPlan, Unindexed> {
         let body = self.plan.body.clone();
         let chunks = &mut self.plan.chunks;
@@ -205,7 +205,7 @@ impl Tail {
     }
 }
 
-/// How long the index records are if their headers are as every writer makes them: 47 bytes.
+/// The expected length of the index records, with headers as every writer makes them: 47 bytes.
 fn index_len(promised: &IndexSum) -> u64 {
     let entries = promised.messages.saturating_mul(u64::from(ENTRY));
     entries.saturating_add(u64::from(promised.connections) * (4 + 47 + 4))

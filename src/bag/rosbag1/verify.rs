@@ -1,4 +1,5 @@
-//! A ROS 1 bag read a second time by somebody else's reader, the crate `rosbag`, once every chunk is known to be bounded.
+//! A ROS 1 bag read a second time by an independent reader, the crate `rosbag`, once every chunk is known to be
+//! bounded.
 
 use std::io;
 use std::sync::Arc;
@@ -20,7 +21,8 @@ use crate::base::time::Stamp;
 /// The largest chunk that the crate may unpack into memory, in bytes.
 const LARGEST_CHUNK: u32 = 256 << 20;
 
-/// Tells `sink` all that the crate finds. `plan` says where the index is: without one the crate does not read.
+/// Tells `sink` everything that the crate finds. `plan` holds the place of the index: without one the crate does not
+/// read.
 pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -> SecondReading {
     let mut verified = SecondReading::default();
     let bag = bound(source, plan, &mut verified).and_then(|()| {
@@ -44,8 +46,8 @@ pub(super) fn read(source: &FileSource, plan: &ChunkPlan, sink: &mut dyn Sink) -
     verified
 }
 
-/// Walks the chunks as the crate will, and refuses what it could not bear: it unpacks a chunk before it looks at its
-/// size.
+/// Walks the chunks as the crate will, and refuses a file that it could not bear: it unpacks a chunk before it looks at
+/// its size.
 fn bound(
     source: &FileSource,
     plan: &ChunkPlan,
@@ -75,7 +77,7 @@ fn bound(
     }
 }
 
-/// Refuses a chunk that is not as long as it says, or too long.
+/// Refuses a chunk whose length is not the stated one, or too large.
 fn bound_chunk(
     source: &FileSource,
     body: &ChunkBody,
@@ -92,7 +94,7 @@ fn bound_chunk(
     Ok(())
 }
 
-/// How long a chunk is when unpacked; at most one more than `most`.
+/// The length of a chunk when unpacked; at most one more than `most`.
 fn unpacked_len(
     source: &FileSource,
     body: &ChunkBody,

@@ -1,4 +1,4 @@
-//! `metadata.yaml` of a rosbag2 folder, versions 1 to 9, as a hint: which files, which quality of service.
+//! `metadata.yaml` of a rosbag2 folder, versions 1 to 9, as a hint: storage files and quality of service.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::base::budget::YAML;
 use crate::base::yaml::{self, Value};
 
-/// What `metadata.yaml` says.
+/// The contents of `metadata.yaml`.
 #[derive(Default)]
 pub(super) struct Metadata {
     /// Names of storage files, as written.
@@ -18,7 +18,7 @@ pub(super) struct Metadata {
     pub(super) facts: Vec<(String, String)>,
 }
 
-/// What it says of a topic.
+/// A topic in `metadata.yaml`.
 pub(super) struct TopicMetadata {
     pub(super) type_name: Arc<str>,
     pub(super) encoding: String,
@@ -26,7 +26,7 @@ pub(super) struct TopicMetadata {
     pub(super) hash: Option<Arc<str>>,
 }
 
-/// Reads `metadata.yaml` in `folder`: `Ok(None)` if there is none, the reason if it cannot be understood.
+/// Reads `metadata.yaml` in `folder`: `Ok(None)` if there is none, the reason if it cannot be parsed.
 pub(super) fn read(folder: &Path) -> Result<Option<Metadata>, String> {
     let path = folder.join("metadata.yaml");
     if !path.is_file() {
@@ -104,7 +104,7 @@ fn of_topic<'v>(topic: &'v Value, text: impl Fn(&'static str) -> &'v str) -> Top
 /// own name stands before it.
 ///
 /// # Errors
-/// A sentence that says why not.
+/// A sentence with the reason why not.
 pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
     let path = Path::new(name);
     if path
@@ -133,13 +133,13 @@ pub(super) fn locate(folder: &Path, name: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Whether a file lies in a folder once all links are followed.
+/// Whether a file lies in a folder after all links are followed.
 pub(super) fn is_inside(folder: &Path, file: &Path) -> bool {
     let real = file.canonicalize().ok().zip(folder.canonicalize().ok());
     real.is_some_and(|(file, folder)| file.starts_with(folder))
 }
 
-/// What is said of a link that is not.
+/// The notice about a link that leads out of the folder.
 pub(super) fn leads_out(name: &str) -> String {
     format!("`{name}` is a link out of the folder and was not followed")
 }

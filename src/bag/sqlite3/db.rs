@@ -13,7 +13,7 @@ use super::place::{Ready, address};
 /// An open database.
 pub(super) struct Db(Connection);
 
-/// What SQLite says when it refuses.
+/// An error of SQLite.
 #[derive(Debug)]
 pub(super) struct Refusal(rusqlite::Error);
 
@@ -29,14 +29,14 @@ impl From<rusqlite::Error> for Refusal {
     }
 }
 
-/// No value that SQLite makes for us is longer, in bytes.
+/// The longest value that SQLite may make for us, in bytes.
 const LONGEST_VALUE: i32 = 64 << 20;
 
 /// A row of a query; columns count from 0. SQLite does not enforce the types of columns.
 pub(super) struct QueryRow<'r>(&'r rusqlite::Row<'r>);
 
 impl QueryRow<'_> {
-    /// A column's whole number; `None` if it holds none.
+    /// A column's whole number; `None` if it does not hold one.
     pub(super) fn integer(&self, column: usize) -> Option<i64> {
         match self.0.get_ref(column).ok()? {
             ValueRef::Integer(n) => Some(n),
@@ -44,7 +44,7 @@ impl QueryRow<'_> {
         }
     }
 
-    /// A column's text, where it is not UTF-8 replaced; `None` if it holds none.
+    /// A column's text, with bytes that are not UTF-8 replaced; `None` if it does not hold text.
     pub(super) fn text(&self, column: usize) -> Option<String> {
         match self.0.get_ref(column).ok()? {
             ValueRef::Text(bytes) => Some(String::from_utf8_lossy(bytes).into_owned()),
@@ -52,7 +52,7 @@ impl QueryRow<'_> {
         }
     }
 
-    /// A column's bytes, be they text or not; `None` if it holds none.
+    /// A column's bytes, of text or not; `None` if it holds neither.
     pub(super) fn bytes(&self, column: usize) -> Option<&[u8]> {
         match self.0.get_ref(column).ok()? {
             ValueRef::Blob(bytes) | ValueRef::Text(bytes) => Some(bytes),
@@ -88,7 +88,7 @@ impl Db {
         Ok(Self(db))
     }
 
-    /// The columns of a table that hold what they say; none if it is no table.
+    /// The columns of a table that hold stored values; empty if it is not a table.
     pub(super) fn columns(&self, table: &str) -> Result<Vec<String>, Refusal> {
         let is_table = "SELECT count(*) FROM sqlite_schema WHERE name = ?1 COLLATE NOCASE AND type = 'table' AND rootpage > 0";
         let count: i64 = self.0.query_row(is_table, [table], |row| row.get(0))?;
@@ -106,7 +106,7 @@ impl Db {
         Ok(columns)
     }
 
-    /// Calls `visit` with each row until it breaks off.
+    /// Calls `visit` with each row until it stops.
     pub(super) fn each(
         &self,
         sql: &str,
@@ -123,7 +123,7 @@ impl Db {
         Ok(())
     }
 
-    /// What `pick` takes from the first row; `None` if there is no row, or nothing to pick.
+    /// The value that `pick` takes from the first row; `None` if there is no row, or nothing to pick.
     pub(super) fn first<T>(
         &self,
         sql: &str,

@@ -1,4 +1,4 @@
-//! Where a database can be opened so that no row is lost and nothing appears beside the user's file.
+//! The place where a database can be opened so that no row is lost and no file is made beside the user's.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,22 +9,22 @@ use crate::base::error::{Error, Result};
 /// A database ready to be opened.
 pub(super) struct Ready {
     pub(super) path: PathBuf,
-    /// The database is cut or damaged, and read as far as it goes.
+    /// Whether the database is cut or damaged, and read as far as possible.
     pub(super) damaged: bool,
-    /// Rows that are not looked at since the copy would be too large.
+    /// Whether rows are ignored because the copy would be too large.
     pub(super) left_behind: bool,
-    /// Removed when the bag has been read.
+    /// The copy, removed when the bag has been read.
     copy: Option<Temporary>,
 }
 
 impl Ready {
-    /// Whether it is a copy of ours, which SQLite may bring up to date; else it must not touch the file.
+    /// Whether it is a copy of ours, which SQLite may bring up to date; otherwise it must not touch the file.
     pub(super) fn is_copy(&self) -> bool {
         self.copy.is_some()
     }
 }
 
-/// Above this size in bytes nothing is copied: 16 GiB.
+/// The largest database that is copied, in bytes: 16 GiB.
 const LARGEST_COPY: u64 = 16 << 30;
 
 /// Copies a database whose newest rows lie beside it, in a log or a journal that was never merged.

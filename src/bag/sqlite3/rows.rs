@@ -1,4 +1,4 @@
-//! The rows of `messages`, part by part, and what is wanted of their payloads.
+//! The rows of `messages`, part by part, and the wanted parts of their payloads.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -11,28 +11,28 @@ use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
-/// Rows whose ids lie between these, both included.
+/// A range of row ids, both ends included.
 pub(super) type RowRange = (i64, i64);
 
-/// What a Zstandard frame begins with.
+/// The first bytes of a Zstandard frame.
 pub(super) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
-/// Reads rows of one bag; shared by threads.
+/// A reader of the rows of one bag; shared by threads.
 pub(super) struct RowReader<'a> {
     bag: &'a Sqlite3Bag,
     sql: String,
-    /// The same without payloads.
+    /// The query without payloads.
     bare: String,
     wants: &'a [Want],
     /// Whether the sizes of all payloads are told.
     sized: bool,
-    /// Rows come in the order of their ids: not by the index of times, which a range may use.
+    /// Whether rows come in the order of their ids: not by the index of times, which a range may use.
     in_order: bool,
-    /// For payloads that are compressed one by one.
+    /// The allowance for payloads that are compressed one by one.
     allowance: Arc<Allowance>,
 }
 
-/// Rows that say nothing, or not all.
+/// The numbers of rows that could not be told, or not fully.
 #[derive(Default)]
 struct LostRows {
     orphans: u64,
@@ -40,7 +40,7 @@ struct LostRows {
     payloads: u64,
 }
 
-/// From which end rows are read.
+/// The end from which rows are read.
 #[derive(Clone, Copy, PartialEq)]
 enum Direction {
     Up,
@@ -50,20 +50,20 @@ enum Direction {
 /// A part that is being read.
 struct RowReading<'a, 's> {
     rows: &'a RowReader<'a>,
-    /// What has not been told.
+    /// The rows that have not been told.
     left: RowRange,
-    /// A row came that had been told: the pages of a damaged table can form a ring.
+    /// Whether a row came that had been told: the pages of a damaged table can form a ring.
     repeated: bool,
     lost: LostRows,
     gather: Gather,
     sink: &'s mut dyn Sink,
 }
 
-/// So many payloads that cannot be read are passed over, one by one.
+/// The most unreadable payloads that are passed over, one by one.
 const MOST_RETRIES: u64 = 1000;
 
 impl RowReading<'_, '_> {
-    /// Tells the rows that are left, from one end on. Of a row whose payload is damaged the time is told.
+    /// Tells the remaining rows, starting from one end. Of a row whose payload is damaged the time is told.
     fn on(&mut self, way: Direction) -> Result<(), String> {
         let order = match way {
             // SQLite goes through the rows in their order unless there is a range, which has an index.
@@ -93,7 +93,7 @@ impl RowReading<'_, '_> {
         }
     }
 
-    /// Tells the rows of a query, and narrows what is left.
+    /// Tells the rows of a query, and narrows the range of remaining rows.
     fn some(&mut self, db: &Db, sql: &str, way: Direction) -> Result<(), Refusal> {
         let in_order = self.rows.in_order;
         self.repeated = false;
@@ -190,7 +190,7 @@ impl<'a> RowReader<'a> {
     }
 }
 
-/// Which rows' payloads are wanted, in SQL.
+/// The condition in SQL for rows whose payloads are wanted.
 fn wanted(bag: &Sqlite3Bag, wants: &[Want]) -> String {
     let wanted = |want: Want| want > Want::Sizes || bag.packed && want == Want::Sizes;
     let ids = bag
@@ -206,8 +206,8 @@ fn wanted(bag: &Sqlite3Bag, wants: &[Want]) -> String {
     }
 }
 
-/// The query for a part's rows: id, topic, time, length, and the payload where `which` says so. SQLite leaves payloads
-/// that nobody asks for on the disk.
+/// The query for a part's rows: id, topic, time, length, and the payload where `which` says so. SQLite does not read
+/// payloads that are not asked for.
 fn sql(bag: &Sqlite3Bag, which: &str, range: Option<Span>) -> String {
     // The index of times may be damaged where the rows are not; the sign keeps SQLite from it.
     let time = if bag.ready.damaged {
@@ -225,7 +225,7 @@ fn sql(bag: &Sqlite3Bag, which: &str, range: Option<Span>) -> String {
     )
 }
 
-/// Tells `sink` a payload, unpacked if it is packed; answers its length.
+/// Tells `sink` a payload, unpacked if it is packed; returns its length.
 fn tell_payload(
     data: &[u8],
     (connection, time): (ConnectionId, Stamp),

@@ -1,4 +1,4 @@
-//! YAML of which every part knows where it stands, for files whose mistakes are told with line and column.
+//! YAML as data with a place for every part, for files whose mistakes are reported with line and column.
 
 use std::fmt;
 
@@ -7,10 +7,10 @@ use serde_saphyr::Spanned;
 
 use super::{BadYaml, YamlPlace, read};
 
-/// The document as data of which every part knows where it stands, with the limits of [`super::parse`].
+/// The document as data with a place for every part, with the limits of [`super::parse`].
 ///
 /// # Errors
-/// As there, and for keys that are not text or stand twice in one mapping.
+/// As for [`super::parse`], and for keys that are not text or stand twice in one mapping.
 pub(crate) fn parse_placed(text: &str) -> Result<YamlPart, BadYaml> {
     read::<Spanned<Plain>>(text).map(YamlPart::from)
 }
@@ -22,13 +22,13 @@ pub(crate) struct YamlPart {
     pub(crate) data: YamlData,
 }
 
-/// What stands there.
+/// The content of a part.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum YamlData {
     /// A scalar as text: `true`, `2.5`, `/scan`; empty for null.
     Scalar(String),
     List(Vec<YamlPart>),
-    /// In the document's order: the key, its place, the value.
+    /// A mapping in the document's order: the key, its place, the value.
     Map(Vec<(String, YamlPlace, YamlPart)>),
 }
 
@@ -41,7 +41,7 @@ impl From<Spanned<Plain>> for YamlPart {
     }
 }
 
-/// [`YamlData`] as the parser gives it.
+/// [`YamlData`] as the parser builds it.
 struct Plain(YamlData);
 
 impl<'de> Deserialize<'de> for Plain {

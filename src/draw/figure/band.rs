@@ -1,4 +1,4 @@
-//! The band of phases with its running numbers, the time axis, and the phases' names: what all figures share.
+//! The band of phases with its running numbers, the time axis, and the phases' names, which all figures share.
 
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::notes::{TextRun, Unbroken, flow};
@@ -17,7 +17,7 @@ const STEPS: [i64; 22] = [
     172_800, 604_800, 2_592_000, 31_536_000,
 ];
 
-/// Where times stand: a line from `left` to `right`, in millimetres.
+/// The time axis: a line from `left` to `right`, in millimetres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Axis {
     pub(crate) left: f64,
@@ -33,14 +33,14 @@ impl Axis {
     }
 }
 
-/// A moment as figures write it: `4:56`, `1:02:03`.
+/// The text of a moment in figures: `4:56`, `1:02:03`.
 pub(crate) fn clock(nanos: i64) -> String {
     // To the nearest second.
     let text = words::offset_seconds(nanos.saturating_add(500_000_000));
     text.strip_prefix('0').map_or(text.clone(), str::to_owned)
 }
 
-/// The band from `y` down; phases of an odd number are darker, ramps are hatched.
+/// Draws the band from `y` down; phases of an odd number are darker, ramps are hatched.
 pub(crate) fn band(canvas: &mut PaperCanvas<'_>, axis: &Axis, y: f64, phases: &[Phase]) {
     for (k, phase) in phases.iter().enumerate() {
         let (left, right) = (axis.x(phase.span.start), axis.x(phase.span.end));
@@ -67,7 +67,7 @@ fn hatch(canvas: &mut PaperCanvas<'_>, rect: Rect) {
     }
 }
 
-/// The axis at `y` with its times below; answers where it ends below.
+/// Draws the axis at `y` with its times below; returns the y at which it ends below.
 pub(crate) fn axis(canvas: &mut PaperCanvas<'_>, axis: &Axis, y: f64, has_unit: bool) -> f64 {
     let ruler = Stroke::solid(ink::TEXT, HAIRLINE);
     canvas.line(Point::new(axis.left, y), Point::new(axis.right, y), &ruler);
@@ -98,7 +98,7 @@ pub(crate) fn axis(canvas: &mut PaperCanvas<'_>, axis: &Axis, y: f64, has_unit: 
     middle + canvas.cap(Type::Small) / 2.0 + 0.7
 }
 
-/// What a phase is called in a figure: `navigation (+4)`, `picking (+4 −4)`, `boot (11)`, `row (=)`, `(+2) as 3`.
+/// The title of a phase in a figure: `navigation (+4)`, `picking (+4 −4)`, `boot (11)`, `row (=)`, `(+2) as 3`.
 pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
     let Some(phase) = source.phases.get(k) else {
         return String::new();
@@ -119,8 +119,8 @@ pub(crate) fn title(source: &FigureSource<'_>, k: usize) -> String {
     format!("{name}{counts}{}", again.unwrap_or_default())
 }
 
-/// The names of the phases from `y` on: at their places on at most two lines where `axis` has room, else as running
-/// text. Answers where they end.
+/// Draws the names of the phases from `y` on: at their places on at most two lines where `axis` has room, else as
+/// running text. Returns the y at which they end.
 pub(crate) fn names(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,

@@ -1,4 +1,4 @@
-//! What figures are drawn with: lengths in millimetres, four kinds of type, one palette; it makes a scene of them.
+//! The canvas that figures are drawn on: lengths in millimetres, four kinds of type, one palette; it becomes a scene.
 
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text};
@@ -9,7 +9,7 @@ use crate::draw::text::{Fonts, Weight};
 pub(crate) const PX_PER_MM: f64 = 96.0 / 25.4;
 /// Millimetres per point.
 pub(crate) const MM_PER_PT: f64 = 25.4 / 72.0;
-/// The thinnest line in millimetres: 0.5 pt, what printers ask for.
+/// The thinnest line in millimetres: 0.5 pt, as printers ask for.
 pub(crate) const HAIRLINE: f64 = 0.18;
 
 /// The colours of a figure, which is on white paper. Every mark has a shape of its own too, so that grey print loses
@@ -35,7 +35,7 @@ pub(crate) mod ink {
     pub(crate) const GROUND: Color = Color::of([0xf6, 0xf8, 0xfb]);
 }
 
-/// What a text is, which decides its size and weight.
+/// The kind of a text, which decides its size and weight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Type {
     /// A node, a topic.
@@ -44,7 +44,7 @@ pub(crate) enum Type {
     Head,
     /// Everything else.
     Small,
-    /// The same, bold.
+    /// Everything else, in bold.
     Strong,
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct Sizes {
 }
 
 impl Sizes {
-    /// 7 and 6 pt, or as much more as `names` asks for.
+    /// The sizes with names of `names` points (at least 7) and all other text one point smaller.
     pub(crate) fn of_names(names: f64) -> Self {
         Self {
             name: names,
@@ -64,18 +64,18 @@ impl Sizes {
         }
     }
 
-    /// From one row to the next in millimetres: 2.75 at 7 pt, 3.15 at 8 pt.
+    /// The distance from one row to the next in millimetres: 2.75 at 7 pt, 3.15 at 8 pt.
     pub(crate) fn pitch(&self) -> f64 {
         2.75 + 0.4 * (self.name - 7.0)
     }
 
-    /// From one line of notes to the next.
+    /// The distance from one line of notes to the next in millimetres.
     pub(crate) fn line(&self) -> f64 {
         self.small * MM_PER_PT * 1.18
     }
 }
 
-/// A drawing in the making. Everything is in millimetres, y down.
+/// A drawing that is being made. Everything is in millimetres, y down.
 pub(crate) struct PaperCanvas<'a> {
     pub(crate) fonts: &'a Fonts,
     pub(crate) sizes: Sizes,
@@ -112,7 +112,7 @@ impl<'a> PaperCanvas<'a> {
         }
     }
 
-    /// The height of capital letters.
+    /// The height of capital letters in millimetres.
     pub(crate) fn cap(&self, of: Type) -> f64 {
         self.size(of).0 * MM_PER_PT * 0.727
     }
@@ -139,22 +139,22 @@ impl<'a> PaperCanvas<'a> {
         String::new()
     }
 
-    /// A line of text whose capitals are centred on `y`.
+    /// Draws a line of text that begins at `x`; its capitals are centred on `y`.
     pub(crate) fn text(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
         self.put(Anchor::Start, Point::new(x, y), of, color, None, text);
     }
 
-    /// The same, ending at `x`.
+    /// As [`PaperCanvas::text`], ending at `x`.
     pub(crate) fn text_end(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
         self.put(Anchor::End, Point::new(x, y), of, color, None, text);
     }
 
-    /// The same, its middle at `x`.
+    /// As [`PaperCanvas::text`], its middle at `x`.
     pub(crate) fn text_middle(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
         self.put(Anchor::Middle, Point::new(x, y), of, color, None, text);
     }
 
-    /// The same on a white halo, over lines.
+    /// As [`PaperCanvas::text_middle`], on a white halo, over lines.
     pub(crate) fn label(&mut self, x: f64, y: f64, of: Type, color: Color, text: &str) {
         let halo = Some((ink::PAPER, 0.7 * self.scale));
         self.put(Anchor::Middle, Point::new(x, y), of, color, halo, text);
@@ -254,7 +254,7 @@ impl<'a> PaperCanvas<'a> {
         Rect::new(r.x * by, r.y * by, r.w * by, r.h * by)
     }
 
-    /// The groups, for a page of somebody else's.
+    /// The groups, for a page that the caller makes.
     pub(crate) fn into_groups(self) -> Vec<Group> {
         let drawn = self.groups.into_iter();
         drawn.filter(|g| !g.pieces.is_empty()).collect()

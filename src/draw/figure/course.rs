@@ -1,4 +1,4 @@
-//! The course of a mission beside its picture: life lines without words for the strip below frames, and with names for
+//! The course of a mission beside its picture: life lines without names for the strip below frames, and with names for
 //! the timeline of a page.
 
 use super::groups;
@@ -9,7 +9,7 @@ use super::tracks::{SendingBar, TrackLife};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, NodeId};
 
-/// Who lived when, in rows from top to bottom, and the phases.
+/// The life lines of a mission, in rows from top to bottom, and its phases.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Course {
     /// The phases, none if there is only one.
@@ -19,7 +19,7 @@ pub struct Course {
     pub(crate) handovers: Vec<(Stamp, usize, usize)>,
 }
 
-/// A node, a topic, some of them that come and go together, or all that live throughout.
+/// A row of a course: a node, a topic, some of them that come and go together, or all that live throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CourseRow {
     pub(crate) lives: Vec<TrackLife>,
@@ -65,7 +65,7 @@ impl Course {
     }
 }
 
-/// The lives that both the course and the life lines tell: of nodes; of topics where publishers are unknown.
+/// The lives behind both the course and the life lines: of nodes; of topics where publishers are unknown.
 pub(crate) fn of_all<'a>(source: &'a FigureSource<'a>) -> LivesFigure<'a> {
     LivesFigure::new(source, !source.knows_publishers())
 }
@@ -97,13 +97,13 @@ pub struct LifeLines {
     pub(crate) handovers: Vec<(Stamp, usize, usize)>,
 }
 
-/// A node, a topic, or the title of the namespace of those that follow.
+/// A row of the life lines: a node, a topic, or the title of the namespace of those that follow.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LifeLine {
     pub(crate) label: String,
     /// Whether it stands below the title of its namespace.
     pub(crate) is_inside: bool,
-    /// Whom it is about; `None` for a title.
+    /// The node or topic of the row; `None` for a title.
     pub(crate) what: Option<Element>,
     pub(crate) lives: Vec<TrackLife>,
     pub(crate) bars: Vec<SendingBar>,

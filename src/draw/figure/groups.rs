@@ -14,7 +14,7 @@ use crate::base::time::Span;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NodeGroup {
     pub(crate) space: String,
-    /// The phases it lives in, 0..; all of them where there are no phases.
+    /// The phases it lives in, counted from 0; empty where there are no phases.
     pub(crate) phases: BTreeSet<usize>,
     /// Places of its members in the list of names given.
     pub(crate) members: Vec<usize>,

@@ -1,4 +1,4 @@
-//! What happened in the rows that is marked with a letter or an arrow: returns, steps of rates, hand-overs.
+//! Incidents: events in rows that are marked with a letter or an arrow: returns, steps of rates, hand-overs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,29 +10,29 @@ use crate::base::words;
 use crate::graph::TopicId;
 use crate::mission::phases::{Configuration, configuration_of};
 
-/// A step of a rate is marked from this factor and this difference on.
+/// The least factor and the least difference in Hz of a step of a rate that is marked.
 const STEP: (f64, f64) = (1.5, 0.3);
 /// The most letters, and the most arrows.
 const MOST: (usize, usize) = (10, 6);
-/// Silences up to one part in so many of the mission may be a slow rate.
+/// The part of the mission, one in this many, up to which a silence may be a slow rate.
 const BRIDGED: i64 = 20;
-/// So many messages on both sides make a step.
+/// The least number of messages on both sides of a step.
 const COUNTED: f64 = 3.0;
-/// A silence of a topic row that is marked: this many times what interrupts a bar.
+/// The least silence of a topic row that is marked, in multiples of the one that interrupts a bar.
 const PAUSE: i64 = 2;
 
-/// A lettered mark.
+/// An incident that is marked with a letter.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Incident {
     pub(crate) at: Stamp,
-    /// The row.
+    /// The row: a place among the tracks.
     pub(crate) track: usize,
-    /// What it says, after its time: `planner: plan 1 → 0.2 Hz`.
+    /// Its text, after its time: `planner: plan 1 → 0.2 Hz`.
     pub(crate) text: String,
     weight: f64,
 }
 
-/// A topic that others send from a phase on.
+/// Topics that another row sends from a phase on.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Handover {
     pub(crate) at: Stamp,
@@ -43,7 +43,7 @@ pub(crate) struct Handover {
     pub(crate) ids: Vec<TopicId>,
 }
 
-/// The incidents to mark, in order of time, and how many smaller ones are not.
+/// The incidents to mark, in order of time, and the number of smaller ones that are not marked.
 pub(crate) fn incidents(source: &FigureSource<'_>, tracks: &[Track]) -> (Vec<Incident>, usize) {
     let mut all = Vec::new();
     for (at, track) in tracks.iter().enumerate() {
@@ -166,7 +166,7 @@ pub(crate) fn configurations(source: &FigureSource<'_>) -> Vec<Configuration> {
 }
 
 /// Topics whose main sender in a phase differs from that in the phase before, put together by the two rows; the first
-/// few of them, and how many more there are.
+/// few of them, and the number of the others.
 pub(crate) fn handovers(source: &FigureSource<'_>, tracks: &[Track]) -> (Vec<Handover>, usize) {
     let row = |role: &str| tracks.iter().position(|t| &*t.name == role);
     let found = configurations(source);

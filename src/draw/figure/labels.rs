@@ -1,32 +1,33 @@
-//! Where the labels of arrows stand: on their arrow or beside it, over no box, no title, no tip and no other label.
+//! The places of the labels of arrows: on their arrow or beside it, over no box, no title, no tip and no other label.
 
 use crate::base::geometry::{Point, Rect, Size};
 
-/// So many places along an arrow are tried on both sides of its middle, so far apart in its length.
+/// The number of places along an arrow that are tried on each side of its middle, and their distance as a part of its
+/// length.
 const STATIONS: (usize, f64) = (15, 0.028);
-/// What it costs to lie on another arrow, to stand beside the own one, and to be an arrow's length off its middle.
+/// The cost of a label on another arrow, of one beside its own, and of one that is an arrow's length off its middle.
 const ON_ARROW: f64 = 2.0;
 const ASIDE: f64 = 0.8;
 const OFF_MIDDLE: f64 = 1.25;
-/// How near another arrow may come to a label beside its own before nobody knows whose it is.
+/// The distance in millimetres that a label keeps from other arrows, so that it is clear whose it is.
 const NEAR: f64 = 0.4;
 
-/// What labels are placed among.
+/// The things that labels are placed among.
 pub(crate) struct Room<'a> {
     /// The arrows as chains of short straight pieces.
     pub(crate) routes: &'a [Vec<Point>],
-    /// Per arrow what may be written on it, the best first.
+    /// Per arrow the sizes of the texts that may be written on it, the best first.
     pub(crate) labels: &'a [Vec<Size>],
     /// The width of the page.
     pub(crate) width: f64,
-    /// What no label may cover.
+    /// The rectangles that no label may cover.
     pub(crate) fixed: Vec<Rect>,
 }
 
-/// A label that has a place: its middle, and which of its alternatives it is.
+/// The place of a label: its middle, and the place of its text among its alternatives.
 pub(crate) type Spot = (Point, usize);
 
-/// The labels of a drawing in the making.
+/// The labels of a drawing while they are being placed.
 struct Labels<'a> {
     room: &'a Room<'a>,
     spots: Vec<Option<Spot>>,
@@ -53,7 +54,7 @@ pub(crate) fn set(room: &Room<'_>) -> Vec<Option<Spot>> {
 }
 
 impl Room<'_> {
-    /// Where a label stands.
+    /// The rectangle of a label at a spot.
     pub(crate) fn rect(&self, at: usize, (middle, which): Spot) -> Rect {
         Rect::around(middle, self.labels[at][which])
     }
@@ -63,7 +64,7 @@ impl Room<'_> {
         self.crossed(at, &self.rect(at, spot).grown(NEAR)) > 0
     }
 
-    /// How many other arrows run through a rectangle.
+    /// The number of other arrows that run through a rectangle.
     fn crossed(&self, at: usize, rect: &Rect) -> usize {
         let others = self.routes.iter().enumerate().filter(|(o, _)| *o != at);
         others.filter(|(_, route)| crosses(route, rect)).count()
@@ -108,7 +109,7 @@ impl Labels<'_> {
         (0..self.room.labels[at].len()).find_map(free)
     }
 
-    /// The labels that one at this place would cover.
+    /// The labels that a label at this spot would cover.
     fn hit(&self, at: usize, spot: Spot) -> impl Iterator<Item = usize> + '_ {
         let rect = self.room.rect(at, spot).grown(0.1);
         let others = self.spots.iter().enumerate().filter(move |(o, _)| *o != at);
@@ -118,7 +119,7 @@ impl Labels<'_> {
         })
     }
 
-    /// Puts a label where one other stands that has room elsewhere.
+    /// Puts a label at the place of one other label that has room elsewhere.
     fn push_aside(&mut self, at: usize) {
         for which in 0..self.room.labels[at].len() {
             let mut all = self.room.spots(at, which);
@@ -138,7 +139,8 @@ impl Labels<'_> {
     }
 }
 
-/// Places along an arrow, and how far from its middle each is.
+/// The distances from the middle of an arrow at which a label is tried, each with its place along the arrow; both are
+/// parts of its length.
 fn stations() -> impl Iterator<Item = (f64, f64)> {
     let (many, step) = STATIONS;
     let off = (0..many).map(move |k| k as f64 * step);

@@ -1,11 +1,11 @@
-//! A jittering rate as a few steps: the piecewise constant course that errs least, where every step has its price.
+//! A jittering rate as a few steps: the piecewise constant course with the least error, where every step has a price.
 
 /// Levels per octave; finer than the eye tells bars apart.
 const PER_OCTAVE: f64 = 4.0;
 /// The most levels (16 octaves).
 const MOST: usize = 64;
 
-/// For every value the level it is on, in the values' unit. `values` are positive; `price` is what a step costs, in
+/// For every value the level it is on, in the values' unit. `values` are positive; `price` is the cost of a step, in
 /// octave-cells; a step holds for at least `least` cells.
 pub(crate) fn levels(values: &[f64], price: f64, least: usize) -> Vec<f64> {
     let octaves: Vec<f64> = values.iter().map(|v| libm::log2(v.max(1e-9))).collect();

@@ -1,4 +1,4 @@
-//! Life lines as time goes: what a frame adds to rows that stand still.
+//! Life lines in a frame of a sequence: the parts that a frame adds to the rows.
 
 use super::canvas::{PaperCanvas, Type, ink};
 use super::lives::{LivesFigure, RowPlace, thick};
@@ -34,7 +34,7 @@ impl LivesFigure<'_> {
         self
     }
 
-    /// Keeps the rows of the busiest tracks, at most `most` rows; answers how many tracks are left out.
+    /// Keeps the rows of the busiest tracks, at most `most` rows; returns the number of tracks left out.
     pub(crate) fn shorten(&mut self, most: usize, messages: &dyn Fn(&Track) -> u64) -> usize {
         let mut order: Vec<usize> = (0..self.tracks.len()).collect();
         order.sort_by_key(|at| std::cmp::Reverse(messages(&self.tracks[*at])));
@@ -76,7 +76,7 @@ impl LivesFigure<'_> {
         rows.filter_map(line).collect()
     }
 
-    /// The names of the rows: those for which `is_now` holds stand out.
+    /// Draws the names of the rows; those for which `is_now` holds stand out.
     pub(crate) fn names(
         &self,
         canvas: &mut PaperCanvas<'_>,
@@ -92,7 +92,7 @@ impl LivesFigure<'_> {
         }
     }
 
-    /// What was sent until a moment.
+    /// Draws the bars of sending up to a moment.
     pub(crate) fn past(&self, canvas: &mut PaperCanvas<'_>, place: &RowPlace, until: Stamp) {
         for (y, track, ..) in self.lines(canvas, place) {
             for bar in track.bars.iter().filter(|b| b.span.start < until) {

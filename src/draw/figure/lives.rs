@@ -1,7 +1,7 @@
-//! Life lines: a row per node (or topic), time to the right; what is alive when, how busily it sends, what changed.
+//! Life lines: a row per node (or topic), time to the right; when it is alive, how busily it sends, what changed.
 //!
-//! One drawing at three sizes: a figure on paper ([`page`]), and, for whoever has a page already, the rows alone.
-//! `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` says how much room the rows take, and
+//! One drawing at three sizes: a figure on paper ([`super::page`]), and, for a caller that has a page already, the rows alone.
+//! `Lives::new(&source, by_topics)` reads the mission, `lives.height(&canvas)` gives the height of the rows, and
 //! `lives.draw(&mut canvas, &place)` draws band, rows, marks and axis there. A canvas in pixels (a timeline below
 //! frames, the topic board) is `Canvas::new(fonts, sizes, scale)` with pixels per millimetre as its scale, and gives
 //! its groups by `into_groups`.
@@ -23,36 +23,37 @@ const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
 const TICK: (f64, f64) = (0.4, 2.24 / 2.75);
 const CROSS: f64 = 0.5;
 const LETTER: f64 = 1.08;
-/// How far letters and arrows keep from each other in millimetres.
+/// The least distance between letters and arrows in millimetres.
 const APART: f64 = 2.3;
-/// From this width on a column says who sends and receives what, this wide.
+/// The least width of a figure with a column of the topics that each row sends and receives, and the width of that
+/// column; in millimetres.
 pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
 
-/// Everything that a figure of lives says.
+/// The content of a figure of lives.
 pub(crate) struct LivesFigure<'a> {
     pub(crate) source: &'a FigureSource<'a>,
     pub(crate) tracks: Vec<Track>,
     pub(crate) rows: Vec<FigureRow>,
     pub(crate) incidents: Vec<Incident>,
-    /// How many smaller ones have no letter.
+    /// The number of smaller ones without a letter or arrow.
     pub(crate) unmarked: usize,
     pub(crate) handovers: Vec<Handover>,
 }
 
-/// Where the rows of a figure stand, in millimetres.
+/// The places of the rows of a figure, in millimetres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowPlace {
     /// The top of the band.
     pub(crate) top: f64,
-    /// Where names begin.
+    /// The left end of the names.
     pub(crate) left: f64,
     /// The time axis.
     pub(crate) axis: Axis,
     /// The right end of the column of rates, if there is one.
     pub(crate) rates: Option<f64>,
-    /// Where the text of who sends and receives what begins, and its width, if there is room.
+    /// The left end and the width of the column of topics that each row sends and receives, if there is room.
     pub(crate) talk: Option<(f64, f64)>,
-    /// Whether names and what was sent are drawn by [`super::live`], as time goes; bars are then pale.
+    /// Whether names and bars of sending are drawn by [`super::live`], frame by frame; the bars here are then pale.
     pub(crate) is_live: bool,
 }
 
@@ -93,7 +94,7 @@ impl<'a> LivesFigure<'a> {
         band + self.rows.len() as f64 * canvas.sizes.pitch() + 0.4 + canvas.sizes.line() + 1.2
     }
 
-    /// How wide the column of names is: the widest, at most 36 % of `width`.
+    /// The width of the column of names: that of the widest, at most 36 % of `width`.
     pub(crate) fn names_width(&self, canvas: &PaperCanvas<'_>, width: f64) -> f64 {
         let one = |row: &FigureRow| match row {
             FigureRow::Space(name) => canvas.width(name, Type::Head),
@@ -108,18 +109,18 @@ impl<'a> LivesFigure<'a> {
         (widest + 1.2).min(width * 0.36)
     }
 
-    /// Where the rows begin.
+    /// The y at which the rows begin.
     pub(crate) fn top(&self, place: &RowPlace) -> f64 {
         let has_band = !self.source.phases.is_empty();
         place.top + if has_band { band::HEIGHT + 0.9 } else { 0.0 }
     }
 
-    /// Where they end, at the axis.
+    /// The y at which the rows end, at the axis.
     pub(crate) fn bottom(&self, canvas: &PaperCanvas<'_>, place: &RowPlace) -> f64 {
         self.top(place) + self.rows.len() as f64 * canvas.sizes.pitch() + 0.4
     }
 
-    /// Draws band, rows, marks and axis; answers where the axis ends below.
+    /// Draws band, rows, marks and axis; returns the y at which the axis ends below.
     pub(crate) fn draw(&self, canvas: &mut PaperCanvas<'_>, place: &RowPlace) -> f64 {
         let pitch = canvas.sizes.pitch();
         let top = self.top(place);
@@ -223,7 +224,7 @@ impl<'a> LivesFigure<'a> {
         }
     }
 
-    /// Rows that live throughout: one light bar.
+    /// Draws rows that live throughout as one light bar.
     fn folded(
         &self,
         canvas: &mut PaperCanvas<'_>,
@@ -251,7 +252,7 @@ impl<'a> LivesFigure<'a> {
         }
     }
 
-    /// The arrows of hand-overs; answers where they and their labels stand: x, from y, to y.
+    /// Draws the arrows of hand-overs; returns the places of them and their labels: x, from y, to y.
     fn arrows(
         &self,
         canvas: &mut PaperCanvas<'_>,
@@ -297,7 +298,7 @@ impl<'a> LivesFigure<'a> {
     }
 }
 
-/// A circled letter at a moment of a row, out of the way of what stands there.
+/// Draws a circled letter at a moment of a row, beside the letters and arrows that are there already.
 fn letter(
     canvas: &mut PaperCanvas<'_>,
     place: &RowPlace,
@@ -349,7 +350,7 @@ fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>)
     canvas.text_end(right, y, Type::Small, ink::QUIET, &text);
 }
 
-/// The lives and the bars of a row, its starts and its ends.
+/// Draws the lives and the bars of a row, its starts and its ends.
 fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) {
     for life in &track.lives {
         thin(canvas, place, y, life);
@@ -383,7 +384,7 @@ fn thin(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, life: &TrackLife
     canvas.line(Point::new(from, y), Point::new(to, y), &stroke);
 }
 
-/// A stretch of sending.
+/// Draws a stretch of sending.
 pub(crate) fn thick(
     canvas: &mut PaperCanvas<'_>,
     place: &RowPlace,
@@ -397,14 +398,14 @@ pub(crate) fn thick(
     canvas.fill(Rect::new(from, y - high / 2.0, wide, high), color);
 }
 
-/// The mark of a start.
+/// Draws the mark of a start.
 pub(crate) fn start(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let high = TICK.1 * canvas.sizes.pitch();
     let rect = Rect::new(x - TICK.0 / 2.0, y - high / 2.0, TICK.0, high);
     canvas.fill(rect, ink::ADDED);
 }
 
-/// The mark of an end.
+/// Draws the mark of an end.
 pub(crate) fn cross(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let stroke = Stroke::solid(ink::REMOVED, 0.38);
     let (a, b) = (CROSS, CROSS * 1.35);
@@ -412,7 +413,7 @@ pub(crate) fn cross(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     canvas.line(Point::new(x - a, y + b), Point::new(x + a, y - b), &stroke);
 }
 
-/// What a node sends, the fastest first, and what it receives, as far as there is room.
+/// Draws the topics that a node sends, the fastest first, and those that it receives, as far as there is room.
 fn talk(
     canvas: &mut PaperCanvas<'_>,
     source: &FigureSource<'_>,

@@ -1,4 +1,5 @@
-//! The map: who talks to whom over the whole mission, and in which phases everyone lives.
+//! The map: the nodes of the whole mission with arrows from publisher to subscriber, and the phases in which each
+//! lives.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -19,16 +20,16 @@ use crate::base::words;
 use crate::draw::scene::{Scene, Stroke};
 use crate::layout::{Cluster, Link, Outline, Plan, Vertex, engine};
 
-/// Nodes give way to groups from this height on, in millimetres, where these fit.
+/// The height of a map of nodes, in millimetres, from which on groups are drawn instead where these fit.
 const HIGH: f64 = 130.0;
-/// The height of a node.
+/// The height of a node in millimetres.
 const PILL: f64 = 3.3;
-/// The most members a group names.
+/// The most members that a group names.
 const NAMED: usize = 4;
 /// The most nodes that are laid out one by one; more never fit.
 const MOST_NODES: usize = 120;
 
-/// One box: what is written in it.
+/// One box with the text in it.
 enum MapBox {
     /// A node by its label, and its phases.
     Pill(String, String),
@@ -45,11 +46,11 @@ struct MapDrawing {
     talks: Vec<Talk>,
     labels: Vec<Vec<Vec<String>>>,
     placed: PlacedPanel,
-    /// Nodes of no framed namespace without a known partner: told in a note.
+    /// Nodes outside framed namespaces without a known partner, which a note tells.
     alone: Vec<String>,
 }
 
-/// The figure, on the ladder from nodes to groups to refusal.
+/// The figure and its remarks: with nodes, else with groups, else an error.
 pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let tracks = of_nodes(sheet.source);
     if tracks.is_empty() {
@@ -129,7 +130,7 @@ fn page(sheet: &FigureSheet<'_>, tracks: &[Track], is_grouped: bool) -> Option<S
     Some(canvas.into_scene(Size::new(width, y + 0.3), sheet.title("Map")))
 }
 
-/// Band, names and notes below the drawing, which ends at `end`; answers where they end.
+/// Draws band, names and notes below the drawing, which ends at `end`; returns the y at which they end.
 fn below(
     canvas: &mut PaperCanvas<'_>,
     sheet: &FigureSheet<'_>,
@@ -182,7 +183,7 @@ fn below(
     )
 }
 
-/// Every node as a pill, namespaces as frames.
+/// The map with every node as a pill, namespaces as frames; `None` where it does not fit.
 fn of_pills(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,
@@ -248,7 +249,7 @@ fn of_pills(
     Some(MapDrawing { alone, ..drawn })
 }
 
-/// Every group as a box.
+/// The map with every group as a box; `None` where it does not fit.
 fn of_groups(
     sheet: &FigureSheet<'_>,
     canvas: &PaperCanvas<'_>,

@@ -4,7 +4,8 @@ use super::canvas::{PaperCanvas, Type};
 use crate::base::geometry::Point;
 use crate::draw::style::Color;
 
-/// A small drawing inside a text: its width in millimetres, and what draws it with its left end and its middle line.
+/// A small drawing inside a text: its width in millimetres, and the function that draws it from its left end and its
+/// middle line.
 pub(crate) type InlineSign = (f64, fn(&mut PaperCanvas<'_>, f64, f64));
 
 /// A part of a text.
@@ -13,19 +14,19 @@ pub(crate) enum TextRun {
     Sign(InlineSign),
 }
 
-/// What is kept on one line if it can be.
+/// Runs of text that are kept on one line if possible.
 pub(crate) type Unbroken = Vec<TextRun>;
 
-/// The room between items.
+/// The room between items in millimetres.
 const GAP: f64 = 2.6;
 
-/// Writes items one after another from `y`, the top, on; wraps before an item that does not fit, and inside one that
-/// is wider than a line. Answers where the next line would begin.
+/// Writes items one after another from `y`, the top, on; wraps before an item that does not fit, and inside one that is
+/// wider than a line. Returns the y at which the next line would begin.
 pub(crate) fn flow(canvas: &mut PaperCanvas<'_>, width: f64, y: f64, items: &[Unbroken]) -> f64 {
     flow_at(canvas, Point::new(0.0, y), width, items)
 }
 
-/// The same from a top left corner on.
+/// As [`flow`], from a top left corner on.
 pub(crate) fn flow_at(
     canvas: &mut PaperCanvas<'_>,
     corner: Point,
@@ -65,7 +66,7 @@ pub(crate) fn sentence(color: Color, text: impl Into<String>) -> Unbroken {
 
 struct NotePlace {
     left: f64,
-    /// From the left.
+    /// The distance of the next text from the left end of the line.
     x: f64,
     y: f64,
     width: f64,
@@ -100,7 +101,7 @@ impl NotePlace {
         }
     }
 
-    /// As many words as fit on this line, at least one word on an empty line.
+    /// The text split after the words that fit on this line, at least one word on an empty line.
     fn split<'t>(&self, canvas: &PaperCanvas<'_>, of: Type, text: &'t str) -> (&'t str, &'t str) {
         let room = self.width - self.x + 0.01;
         if canvas.width(text.trim_end(), of) <= room {

@@ -1,4 +1,4 @@
-//! A page with one figure: the ladder from nodes to groups to refusal, and what stands below the drawing.
+//! A page with one figure: with nodes, else with groups, else refused; and the notes below the drawing.
 
 use super::band::{Axis, clock, names};
 use super::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
@@ -18,10 +18,10 @@ use crate::draw::text::Fonts;
 /// The shortest time axis in millimetres on which anything can be seen.
 const SHORTEST_AXIS: f64 = 15.0;
 
-/// About so many boxes fit on a page.
+/// The number of boxes that fit on a page, about.
 pub(crate) const FITTING: usize = 40;
 
-/// What a page is made of.
+/// The parts of a page.
 pub(crate) struct FigureSheet<'a> {
     pub(crate) source: &'a FigureSource<'a>,
     pub(crate) fonts: &'a Fonts,
@@ -30,7 +30,7 @@ pub(crate) struct FigureSheet<'a> {
 }
 
 impl<'a> FigureSheet<'a> {
-    /// The figure and what the user should know of it.
+    /// The figure and its remarks for the user.
     pub(crate) fn draw(&self) -> Result<(Scene, Vec<String>)> {
         match self.options.kind {
             FigureKind::Lives => self.lives(),
@@ -43,7 +43,7 @@ impl<'a> FigureSheet<'a> {
         PaperCanvas::new(self.fonts, self.sizes, PX_PER_MM)
     }
 
-    /// The title of the page: what it is, and of which bag.
+    /// The title of the page: its kind and the bag's name.
     pub(crate) fn title(&self, what: &str) -> String {
         let bags = &self.source.mission.bags;
         match bags.first() {
@@ -86,7 +86,7 @@ impl<'a> FigureSheet<'a> {
         Ok((scene, remarks))
     }
 
-    /// The page of some lives, whatever its height.
+    /// The page of some lives, of any height; `None` where it is too narrow.
     fn lives_page(&self, lives: &LivesFigure<'_>) -> Option<Scene> {
         let width = self.options.width_mm;
         let mut canvas = self.canvas();
@@ -114,7 +114,7 @@ impl<'a> FigureSheet<'a> {
         Some(canvas.into_scene(Size::new(width, y + 0.3), self.title(what)))
     }
 
-    /// Why it does not fit, and which namespace would.
+    /// The error of a figure that does not fit, with a namespace that would.
     fn too_high(&self, lives: &LivesFigure<'_>) -> Error {
         let canvas = self.canvas();
         let width = self.options.width_mm;
@@ -168,13 +168,13 @@ pub(crate) fn filter_that_fits(tracks: &[Track], most: usize, flag: &str, word: 
     }
 }
 
-/// The namespace below the root that a name is in, if it is in one.
+/// The outermost namespace of a name, if it is in one.
 fn top_space(name: &str) -> Option<&str> {
     let end = name.get(1..)?.find('/')?;
     name.get(..=end)
 }
 
-/// Why there is nothing to draw: filters leave nothing, or the bag tells of no node.
+/// The error of a figure with nothing to draw: filters leave nothing, or no node of the bag is known.
 pub(crate) fn nothing(source: &FigureSource<'_>) -> Error {
     if source.shown_topics().next().is_some() && source.knows_no_node() {
         return Error::usage(
@@ -230,7 +230,8 @@ fn incident_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     lives.incidents.iter().enumerate().map(item).collect()
 }
 
-/// What is folded where no column tells it, and what has no letter.
+/// The notes below the legend: the members of folded rows where no column tells them, and the number of incidents
+/// without a letter.
 fn lives_notes(lives: &LivesFigure<'_>, is_told: bool) -> Vec<Unbroken> {
     let mut items = Vec::new();
     for row in lives.rows.iter().filter(|_| !is_told) {

@@ -1,4 +1,4 @@
-//! One step as a panel: its boxes by what became of them, its arrows, its words.
+//! One step as a panel: its boxes by their fates, its arrows, its words.
 
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::notes::{Unbroken, flow_at, sentence};
@@ -8,10 +8,10 @@ use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
 
-/// Room inside a panel.
+/// The room inside a panel's border in millimetres.
 pub(crate) const INSIDE: f64 = 1.3;
 
-/// What became of a box.
+/// The fate of a box in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
     Began,
@@ -29,7 +29,7 @@ pub(crate) struct PanelBox {
 }
 
 impl PanelBox {
-    /// Whether the namespace has a line of its own: where it is long, or stands for several names.
+    /// Whether the namespace has a line of its own: because it is long, or that of several names.
     fn has_head(&self) -> bool {
         match self.space.as_str() {
             "" => false,
@@ -38,7 +38,7 @@ impl PanelBox {
         }
     }
 
-    /// The room it takes.
+    /// Its size in millimetres.
     pub(crate) fn size(&self, canvas: &PaperCanvas<'_>) -> Size {
         let names = self
             .lines
@@ -55,7 +55,7 @@ impl PanelBox {
     }
 }
 
-/// A panel laid out, from its own corner.
+/// A panel laid out, its top left corner at (0, 0).
 pub(crate) struct Panel {
     /// Its number and its words.
     pub(crate) heading: (String, String),
@@ -67,9 +67,9 @@ pub(crate) struct Panel {
     pub(crate) placed: Option<PlacedPanel>,
     pub(crate) notes: Vec<(Color, String)>,
     pub(crate) height: f64,
-    /// How much of it the notes take.
+    /// The height of the notes in millimetres.
     pub(crate) foot: f64,
-    /// How many nodes live before or after the step and are not drawn.
+    /// The number of nodes that live before or after the step and are not drawn.
     pub(crate) undrawn: usize,
 }
 
@@ -158,7 +158,7 @@ fn boxed(canvas: &mut PaperCanvas<'_>, look: &PanelBox, rect: Rect) {
     }
 }
 
-/// A disc with a plus or a minus at a corner.
+/// Draws a disc with a plus or a minus at a corner.
 fn badge(canvas: &mut PaperCanvas<'_>, at: Point, fate: Fate, color: Color) {
     canvas.disc(at, 0.75, color, &Stroke::default());
     let sign = Stroke::solid(ink::PAPER, 0.26);

@@ -1,9 +1,9 @@
-//! Parts of a drawing that nothing links: told apart, and put side by side on shelves.
+//! Parts of a drawing without links between them: found, and put side by side on shelves.
 
 use crate::base::geometry::{Point, Size};
 use crate::layout::{Link, Plan};
 
-/// The room between parts.
+/// The room between parts in millimetres.
 pub(crate) const PARTED: f64 = 3.0;
 
 /// The corners of parts on shelves, the highest parts first, and the size of all.

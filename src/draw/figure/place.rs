@@ -1,4 +1,5 @@
-//! Boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed afterwards.
+//! The places of boxes and arrows inside a width: our own layout tried at several tightnesses, labels placed
+//! afterwards.
 
 use super::canvas::{PaperCanvas, Type, ink};
 use super::labels::{self, Room, Spot};
@@ -11,13 +12,14 @@ use crate::layout::{Engine, Layout, LayoutOptions, Orientation, Plan, Route, lay
 /// Pixels of the layout engine per millimetre: its gaps are fixed in pixels, so more of them are tighter drawings. The
 /// tightest comes first: where it is too wide, all are.
 const TIGHTNESS: [f64; 5] = [12.0, 9.0, 6.5, 4.8, 3.6];
-/// So many times too wide is too wide at every tightness; a little may be luck, for the engine has several ways.
+/// The factor over the width from which on a drawing is too wide at every tightness; below it the engine, which has
+/// several ways, may still find one that fits.
 const HOPELESS: f64 = 1.25;
-/// The shortest arrow in millimetres, less what the engine leaves around a label: it shows where it goes.
+/// The shortest arrow in millimetres that shows its direction, minus the room that the engine leaves around a label.
 const SHORTEST: f64 = 3.4;
 /// The height of the page that the engine is to fill, in widths: low.
 const ASPECT: f64 = 0.45;
-/// Pieces that a curve is measured in.
+/// The number of pieces in which a curve is measured.
 const PIECES: u32 = 8;
 /// A drawing in millimetres, its top left corner at (0, 0).
 #[derive(Clone, Debug)]
@@ -27,16 +29,16 @@ pub(crate) struct PlacedPanel {
     pub(crate) clusters: Vec<Rect>,
     pub(crate) routes: Vec<Vec<Point>>,
     curves: Vec<Route>,
-    /// The middle of each label that found room, and which of its alternatives did.
+    /// The spot of each label; `None` for one without room.
     pub(crate) labels: Vec<Option<Spot>>,
     pub(crate) left_out: usize,
-    /// How many labels stand on or near an arrow that is not theirs.
+    /// The number of labels on or near an arrow that is not theirs.
     pub(crate) unclear: usize,
 }
 
-/// The lowest drawing of a plan, in millimetres, that is at most `width` wide and keeps its labels; `None` where all are
-/// wider. Parts that nothing links are laid out each by itself and put side by side. `labels` holds, per link, what may
-/// be written on it, the best first.
+/// The lowest drawing of a plan, in millimetres, that is at most `width` wide and keeps its labels; `None` where all
+/// are wider. Parts without links between them are laid out each by itself and put side by side. `labels` holds, per
+/// link, the sizes of the texts that may be written on it, the best first.
 pub(crate) fn place(
     plan: &Plan,
     labels: &[Vec<Size>],
@@ -81,14 +83,15 @@ pub(crate) fn place(
     Some(whole)
 }
 
-/// A drawing for every part, by place among its candidates, and where it stands.
+/// A choice of a drawing for every part, by place among its candidates, and the corner of each.
 struct Arrangement {
     cost: f64,
     parts: Vec<(usize, Point)>,
     size: Size,
 }
 
-/// Ways to take one candidate of every part: for each of the largest part the others beside it, where they fit.
+/// Ways to take one candidate of every part: for each candidate of the largest part, the others chosen to fit beside
+/// it.
 fn choices(tried: &[Vec<PlacedPanel>], width: f64) -> Option<Vec<Vec<usize>>> {
     let area = |all: &Vec<PlacedPanel>| all.iter().map(|p| p.size.w * p.size.h).fold(0.0, f64::max);
     let order = |a: &usize, b: &usize| area(&tried[*a]).total_cmp(&area(&tried[*b])).then(b.cmp(a));
@@ -112,7 +115,7 @@ fn choices(tried: &[Vec<PlacedPanel>], width: f64) -> Option<Vec<Vec<usize>>> {
     Some(ways)
 }
 
-/// What a label costs that is left out, or near a foreign arrow, in millimetres of height.
+/// The cost of a label that is left out, and of one near a foreign arrow, in millimetres of height.
 const LOST: f64 = 3.0;
 const UNCLEAR: f64 = 2.0;
 /// The share of labels, one in so many, that may be left out before each more costs as much as `EXCESS`.
@@ -219,7 +222,7 @@ impl PlacedPanel {
         }
     }
 
-    /// Takes in a part.
+    /// Adds the places of a part.
     fn take(&mut self, part: &MapPart, placed: Self) {
         for (at, rect) in part.vertices.iter().zip(placed.boxes) {
             self.boxes[*at] = rect;
@@ -241,7 +244,7 @@ impl PlacedPanel {
         self.unclear += placed.unclear;
     }
 
-    /// What its labels cost.
+    /// The cost of its labels, in millimetres of height.
     fn faults(&self) -> f64 {
         self.left_out as f64 * LOST + self.unclear as f64 * UNCLEAR
     }

@@ -1,4 +1,4 @@
-//! Which rows a figure of lives has and in which order: the staircase, namespaces, what is folded.
+//! The rows of a figure of lives and their order: the staircase, namespaces, folded rows.
 
 use std::collections::BTreeSet;
 
@@ -8,11 +8,11 @@ use crate::base::name::{last_part, namespace};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 
-/// Starts at most this share of the mission apart, one in so many, are one burst.
+/// The part of the mission, one in this many, up to which starts count as one burst.
 const BURST: i64 = 66;
-/// Ends are compared on a grid of one in so many parts.
+/// The number of parts of the mission that make the grid on which ends are compared.
 const END: i64 = 33;
-/// So many rows that live throughout are folded.
+/// The least number of rows that live throughout and are folded.
 const FEWEST_FOLDED: usize = 3;
 
 /// One row of the figure.
@@ -37,7 +37,7 @@ impl FigureRow {
     }
 }
 
-/// All rows in order. What `incidents` and `handovers` point at stays open.
+/// All rows in order. The tracks of `incidents` and `handovers` are not folded.
 pub(crate) fn rows(
     tracks: &[Track],
     whole: Span,
@@ -111,7 +111,7 @@ fn is_throughout(track: &Track, whole: Span) -> bool {
     life.span.start.since(whole.start) <= nanos / 20 && !life.ends && steady
 }
 
-/// By burst of start, then by end, the latest first, then by name.
+/// The tracks sorted by burst of start, then by end, the latest first, then by name.
 fn in_order(tracks: &[Track], whole: Span, mut own: Vec<usize>) -> Vec<usize> {
     own.sort_by_key(|at| (tracks[*at].start(), *at));
     let (near, grid) = (whole.nanos() / BURST, (whole.nanos() / END).max(1));
@@ -140,7 +140,7 @@ fn in_order(tracks: &[Track], whole: Span, mut own: Vec<usize>) -> Vec<usize> {
     bursts.concat()
 }
 
-/// What a folded row says: `8 nodes throughout`.
+/// The label of a folded row: `8 nodes throughout`.
 pub(crate) fn folded_label(tracks: &[Track], all: &[usize]) -> String {
     let word = match all.first().and_then(|at| tracks[*at].topic) {
         Some(_) => "topic",

@@ -1,4 +1,4 @@
-//! What a figure is drawn from: the mission, what of it is shown, and whether its phases have names.
+//! The source of a figure: the mission, the parts of it that are shown, and whether its phases have names.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,14 +12,15 @@ use crate::mission::ledger::Phase;
 use crate::mission::phases::knows_publishers;
 use crate::view::NameFilter;
 
-/// The mission as figures see it: roles, without housekeeping, recorders and what filters leave out.
+/// The mission as figures see it: by roles, without housekeeping, recorders, and nodes and topics that filters leave
+/// out.
 pub(crate) struct FigureSource<'a> {
     pub(crate) mission: &'a Mission,
     /// Roles with their nodes.
     pub(crate) roles: BTreeMap<Arc<str>, Vec<NodeId>>,
     /// Per topic, whether it is shown.
     topics: Vec<bool>,
-    /// Per node, what it publishes on shown topics.
+    /// Per node, its publications on shown topics.
     published: Vec<Vec<EdgeId>>,
     /// Per publication, whether it is ever latched.
     latched: Vec<bool>,
@@ -30,7 +31,7 @@ pub(crate) struct FigureSource<'a> {
 }
 
 impl<'a> FigureSource<'a> {
-    /// What passes both filters.
+    /// The source of the nodes and topics that pass both filters.
     pub(crate) fn new(
         mission: &'a Mission,
         nodes: &NameFilter,
@@ -73,7 +74,7 @@ impl<'a> FigureSource<'a> {
         }
     }
 
-    /// The time of the whole.
+    /// The time of the whole mission.
     pub(crate) fn span(&self) -> Span {
         let whole = self.mission.activity.span();
         if whole.nanos() > 0 {
@@ -97,7 +98,8 @@ impl<'a> FigureSource<'a> {
         self.topics.get(topic as usize) == Some(&true)
     }
 
-    /// Whether everybody is on this topic, so that arrows and lists of it say nothing: transforms, diagnostics, bonds.
+    /// Whether nearly every node uses this topic, so that arrows and lists of it say nothing: transforms, diagnostics,
+    /// bonds.
     pub(crate) fn is_hub(&self, topic: TopicId) -> bool {
         let last = last_part(self.topic(topic));
         matches!(last, "tf" | "tf_static" | "bond") || last.starts_with("diagnostics")
@@ -124,8 +126,8 @@ impl<'a> FigureSource<'a> {
         own
     }
 
-    /// When a publication carried messages. One that is ever latched stands for its node by its message, and is not
-    /// busy: it has no such time.
+    /// The times at which a publication carried messages. One that is ever latched stands for its node by its message,
+    /// and is not busy: it has no such time.
     pub(crate) fn sending(&self, edge: EdgeId) -> Vec<Span> {
         let activity = &self.mission.activity;
         if self.latched.get(edge as usize) == Some(&true) {
@@ -141,7 +143,7 @@ impl<'a> FigureSource<'a> {
         self.runs(is_active)
     }
 
-    /// When a topic carried messages.
+    /// The times at which a topic carried messages.
     pub(crate) fn topic_sending(&self, topic: TopicId) -> Vec<Span> {
         let activity = &self.mission.activity;
         if let Some(exact) = activity.sending.topics.get(topic as usize) {
@@ -154,7 +156,7 @@ impl<'a> FigureSource<'a> {
         self.runs(counts)
     }
 
-    /// Until when a topic's last message is kept for whoever comes late; `None` if it is not.
+    /// The time until which a topic's last message is kept for late subscribers; `None` if it is not.
     pub(crate) fn topic_kept(&self, topic: TopicId) -> Option<Stamp> {
         let cells = self.mission.activity.cells.iter();
         let mut kept = cells.filter(|cell| {
@@ -205,14 +207,14 @@ impl<'a> FigureSource<'a> {
         runs
     }
 
-    /// The number of the phase, 0.., that a moment lies in.
+    /// The number of the phase that a moment lies in, counted from 0.
     pub(crate) fn phase_at(&self, at: Stamp) -> usize {
         let next = self.phases.partition_point(|p| p.span.start <= at);
         next.saturating_sub(1)
     }
 }
 
-/// Spans put together where they overlap or are at most `gap` nanoseconds apart.
+/// The spans, sorted, with those joined that overlap or are at most `gap` nanoseconds apart.
 pub(crate) fn merged(mut spans: Vec<Span>, gap: i64) -> Vec<Span> {
     spans.sort_unstable_by_key(|s| (s.start, s.end));
     let mut out: Vec<Span> = Vec::new();

@@ -1,4 +1,5 @@
-//! Steps: one panel per phase boundary, only what began, what ended, what changed hands, and who is linked to it.
+//! Steps: one panel per phase boundary, with only the nodes that began or ended, the topics that changed hands, and the
+//! nodes linked to them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -22,28 +23,29 @@ use crate::draw::scene::Scene;
 use crate::layout::{Link, Outline, Plan, Vertex, engine};
 use crate::mission::phases::{Configuration, cells_of};
 
-/// How many steps are shown unless some are asked for.
+/// The number of steps shown unless some are asked for.
 const SHOWN: usize = 6;
-/// More changed nodes than this are drawn as groups.
+/// The largest number of changed nodes that are drawn one by one; more are drawn as groups.
 const ONE_BY_ONE: usize = 8;
 /// The most names in a box.
 const NAMED: usize = 4;
-/// So many ways to put panels into columns are followed; all of those of nine panels in three columns.
+/// The largest number of ways to put panels into columns that are followed: enough for all those of nine panels in
+/// three columns.
 const MOST_WAYS: usize = 729;
-/// Room between two panels.
+/// The room between two panels in millimetres.
 const BETWEEN: f64 = 2.0;
 
-/// What panels are made from.
+/// The source of panels.
 struct Studio<'s> {
     sheet: &'s FigureSheet<'s>,
     tracks: Vec<Track>,
     talks: Talks<'s>,
     found: Vec<Configuration>,
-    /// How many panels stand side by side.
+    /// The number of panels side by side.
     columns: usize,
 }
 
-/// The figure.
+/// The figure and its remarks.
 pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     let tracks = of_nodes(sheet.source);
     if tracks.is_empty() {
@@ -93,7 +95,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
 }
 
 impl Studio<'_> {
-    /// How much a boundary changes.
+    /// The weight of a boundary, larger for one that changes more.
     fn weight(&self, k: usize) -> usize {
         let phase = &self.sheet.source.phases[k];
         (phase.nodes_added + phase.nodes_removed) as usize * 4 + self.handed(k).len()
@@ -258,7 +260,7 @@ impl Studio<'_> {
         all
     }
 
-    /// Adds the groups that are linked to what changed; answers by box the member that is linked most.
+    /// Adds the groups that are linked to what changed; returns, by box, the member that is linked most.
     fn neighbours(
         &self,
         k: usize,
@@ -306,8 +308,8 @@ impl Studio<'_> {
         linked
     }
 
-    /// The arrows at what changed: those of the phase before for what ended, of the phase after for what began; and
-    /// those of the topics that changed hands.
+    /// The arrows at changed nodes: those of the phase before for nodes that ended, of the phase after for nodes that
+    /// began; and those of the topics that changed hands.
     fn talks(
         &self,
         k: usize,
@@ -347,7 +349,8 @@ impl Studio<'_> {
         all
     }
 
-    /// The namespace that most boxes are in, which is then said once: none if it is the root, or that of one box.
+    /// The namespace that most boxes are in, which the panel then says once; `None` if it is the root, or that of one
+    /// box.
     fn home(&self, boxes: &[(Fate, Vec<usize>)]) -> Option<&str> {
         let mut spaces: BTreeMap<&str, usize> = BTreeMap::new();
         for first in boxes.iter().filter_map(|(_, members)| members.first()) {
@@ -422,7 +425,7 @@ impl Studio<'_> {
         place(&plan, &rooms, width, engine("layered").ok()?)
     }
 
-    /// All panels in columns, in order of time, and what is left out.
+    /// All panels in columns, in order of time, and a note of what is left out.
     fn page(&self, panels: &[Panel], left: usize) -> Scene {
         let sheet = self.sheet;
         let mut canvas = sheet.canvas();

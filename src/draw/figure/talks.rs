@@ -1,4 +1,4 @@
-//! Who talks to whom: arrows from publisher to subscriber, one per pair, with the topics on it.
+//! Arrows from publisher to subscriber, one per pair, with the topics on it.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::graph::{EdgeState, TopicId};
 pub(crate) struct Talk {
     pub(crate) from: usize,
     pub(crate) to: usize,
-    /// With their rates while they are sent, the fastest first.
+    /// The topics with their rates in messages per second while they are sent, the fastest first.
     pub(crate) topics: Vec<(TopicId, f64)>,
     /// Whether all of them are known by inference only.
     pub(crate) is_inferred: bool,
@@ -26,8 +26,8 @@ impl Talk {
         self.topics.iter().map(|(_, hz)| hz).sum()
     }
 
-    /// What a label may say, the best first: the fastest `most` topics and how many more, one of them on two lines, on
-    /// one line.
+    /// The texts that a label may have, the best first, each as lines: the fastest `most` topics and the number of the
+    /// others, then fewer topics down to one, at last all on one line.
     pub(crate) fn labels(&self, source: &FigureSource<'_>, most: usize) -> Vec<Vec<String>> {
         let mut names: Vec<String> = Vec::new();
         for (topic, _) in &self.topics {

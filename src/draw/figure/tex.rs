@@ -1,4 +1,4 @@
-//! A figure for `LaTeX`: the line that includes it, and a caption that says what is drawn.
+//! A figure for `LaTeX`: the lines that include it, and a caption that says what is drawn.
 
 use super::band::{clock, title};
 use super::source::FigureSource;
@@ -69,7 +69,7 @@ fn capital(text: &str) -> String {
     })
 }
 
-/// Text in which `LaTeX` sees no command; signs of ours become theirs.
+/// The text with everything escaped that `LaTeX` would take for a command; our signs become those of `LaTeX`.
 fn escaped(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars() {

@@ -1,4 +1,4 @@
-//! The rows of a figure of lives: when each node or topic was there, when it sent and how busily.
+//! The rows of a figure of lives: the times at which each node or topic was there and sent, and how busily.
 
 use std::sync::Arc;
 
@@ -8,20 +8,21 @@ use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::graph::{NodeId, TopicId};
 
-/// A silence below this, in nanoseconds or one in so many parts of the mission, does not interrupt a bar.
+/// The length from which on a silence interrupts a bar: in nanoseconds, and as one in so many parts of the mission.
 const SILENCE: (i64, i64) = (4_000_000_000, 83);
-/// A step of a rate costs one octave held for one part in so many of the mission.
+/// The price of a step of a rate: as much as an octave held for one in this many parts of the mission.
 const STEP: f64 = 20.0;
-/// A step holds for at least one part in so many.
+/// The least time that a step holds: one in this many parts of the mission.
 const SHORTEST_STEP: usize = 25;
-/// Who is first seen within so many nanoseconds, or one part in so many of the mission, was there before.
+/// The time from the start within which a node first seen counts as there before: in nanoseconds, and as one in so many
+/// parts of the mission.
 const PRESENT: (i64, i64) = (1_000_000_000, 330);
-/// Who ends in the last fiftieth was cut off by the recording.
+/// The last part of the mission, one in this many: a node that ends in it was cut off by the end of the recording.
 const CUT: i64 = 50;
-/// So many messages make a rate; cells are put together until they hold them.
+/// The number of messages that make a rate; cells are put together until they hold as many.
 const ENOUGH: f64 = 6.0;
 
-/// One life of a row.
+/// One life of a row: a time in which it was there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackLife {
     pub(crate) span: Span,
@@ -41,7 +42,7 @@ pub(crate) struct SendingBar {
     pub(crate) share: f64,
 }
 
-/// One row.
+/// One row of a figure of lives.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Track {
     /// The full name: a role, or a topic.
@@ -50,7 +51,7 @@ pub(crate) struct Track {
     pub(crate) topic: Option<TopicId>,
     pub(crate) lives: Vec<TrackLife>,
     pub(crate) bars: Vec<SendingBar>,
-    /// Messages per second while it sends; `None` where it never does, or nobody knows.
+    /// Messages per second while it sends; `None` where it never does, or where that is not known.
     pub(crate) hz: Option<f64>,
 }
 

@@ -1,7 +1,7 @@
 //! The whole mission as one animated SVG: the graph once, and per changing element the classes it goes through.
 //!
-//! It runs inside `<img>`. Whoever asks for less motion gets a still of everything that ever was, because the rules for
-//! the classes hold only where motion is welcome; a reader that knows no animation shows the busiest window.
+//! It runs inside `<img>`. A user who asks for less motion gets a still of everything that ever was, because the rules
+//! for the classes hold only without that wish; a reader without animations shows the busiest window.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,17 +16,17 @@ use crate::mission::ledger::Phase;
 use crate::view::runs::{ElementRuns, Runs, at};
 use crate::view::{Frame, View};
 
-/// With more changed windows than this, what changed is not written in words.
+/// The largest number of changed windows for which the changes are written in words.
 const MOST_CAPTIONS: usize = 24;
-/// So many phrases are written out at most; the rest is counted.
+/// The largest number of phrases that are written out; the rest is counted.
 const MOST_PHRASES: usize = 4;
-/// How wide a letter of a caption is, at most, in pixels.
+/// The largest width of a letter of a caption, in pixels.
 const LETTER: f64 = 7.0;
-/// A rate that changes more often than this is not written: a text for each value would outweigh the graph.
+/// The largest number of values of a rate that is written: a text for each of more would be larger than the graph.
 const MOST_VALUES: usize = 40;
-/// Around the graph.
+/// The margin around the graph in pixels.
 const MARGIN: f64 = 12.0;
-/// Above and below the graph.
+/// The room above and below the graph in pixels.
 const TOP: f64 = 76.0;
 const BOTTOM: f64 = 62.0;
 
@@ -55,16 +55,16 @@ pub(crate) fn write(
 
 struct Play<'a> {
     view: &'a View,
-    /// None where there is only one.
+    /// The phases; none where there is only one.
     phases: &'a [Phase],
     runs: &'a Runs,
     union: &'a Union,
     style: &'a Style,
     title: &'a str,
     windows: usize,
-    /// The window shown where nothing moves.
+    /// The window that is shown where nothing moves.
     still: u32,
-    /// How long one round takes.
+    /// The length of one round in seconds.
     seconds: f64,
 }
 
@@ -149,7 +149,7 @@ impl Play<'_> {
         }
     }
 
-    /// An animation of the class over these values; nothing where there is only one.
+    /// Writes an animation of the class over these values; nothing where there is only one.
     fn classes(&self, xml: &mut Xml, steps: &[(u32, String)]) {
         if steps.len() < 2 {
             return;
@@ -212,7 +212,7 @@ impl Play<'_> {
         }
     }
 
-    /// What changed in each window, as much as its line holds.
+    /// Writes the changes of each window, as many as fit on its line.
     fn captions(&self, xml: &mut Xml, width: f64) {
         let told = |f: &&Frame| !f.headlines.is_empty();
         if self.view.frames.iter().filter(told).count() > MOST_CAPTIONS {
@@ -230,7 +230,7 @@ impl Play<'_> {
         }
     }
 
-    /// A text that is seen from one window to before another.
+    /// Writes a text that is seen from one window up to another, without that one.
     fn while_shown(
         &self,
         xml: &mut Xml,
@@ -252,7 +252,7 @@ impl Play<'_> {
         xml.text(text).close().raw("\n");
     }
 
-    /// The classes of what is seen from some windows to before others, in order.
+    /// The classes, in order, of an element that is seen from some windows up to others, without those.
     fn shown(&self, times: &[(usize, usize)], class: &str) -> Vec<(u32, String)> {
         let window = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
         let mut steps = vec![(0, class.to_owned())];
@@ -267,7 +267,7 @@ impl Play<'_> {
         steps
     }
 
-    /// What changed when, and where in the mission the picture is.
+    /// Writes the timeline: the changes at their times, and the place of the picture in the mission.
     fn timeline(&self, xml: &mut Xml, width: f64, height: f64) {
         let style = &self.style.timeline;
         let (left, wide, y) = (16.0, width - 32.0, height - 26.0);
@@ -307,7 +307,7 @@ impl Play<'_> {
         xml.close().raw("\n");
     }
 
-    /// The phases as boxes on the axis.
+    /// Writes the phases as boxes on the axis.
     fn band(&self, xml: &mut Xml, (left, wide): (f64, f64), y: f64) {
         let (Some(first), Some(last)) = (self.view.frames.first(), self.view.frames.last()) else {
             return;
@@ -332,7 +332,7 @@ impl Play<'_> {
         }
     }
 
-    /// The time at every quarter of an axis that begins at `left`.
+    /// Writes the time at every quarter of an axis that begins at `left`.
     fn ticks(&self, xml: &mut Xml, (left, wide): (f64, f64), y: f64) {
         let (Some(first), Some(last)) = (self.view.frames.first(), self.view.frames.last()) else {
             return;
@@ -364,7 +364,7 @@ struct AnimatedElement<'a> {
 }
 
 impl AnimatedElement<'_> {
-    /// What its live text says from which window to before which, where it says something.
+    /// The values of its live text, each with its first window and the one after its last, without empty texts.
     fn values(&self, tells_changes: bool) -> Vec<(usize, usize, u32)> {
         let list = match (tells_changes, self.life.lifecycles.is_empty()) {
             (true, _) => &self.life.turns,
@@ -403,7 +403,7 @@ impl ElementLook for AnimatedElement<'_> {
         String::new()
     }
 
-    /// A text for each value, seen in its windows; none where that would be too many.
+    /// Writes a text for each value, seen in its windows; none where that would be too many.
     fn live(&self, xml: &mut Xml, (x, y): (i64, i64), tells_changes: bool) {
         let values = self.values(tells_changes);
         let is_one = matches!(values[..], [(_, to, _)] if to == self.play.windows);

@@ -1,5 +1,5 @@
-//! The graph of a whole mission as one compact drawing without colours: what a window shows is said by classes, whose
-//! rules follow from the style. The player's page and the animated SVG are painted with it.
+//! The graph of a whole mission as one compact drawing without colours: classes say how elements look in a window, and
+//! their rules follow from the style. The player's page and the animated SVG are painted with it.
 
 mod css;
 
@@ -16,12 +16,12 @@ use crate::draw::style::Style;
 use crate::view::runs::word;
 use crate::view::{Counts, Frame, Mark, View};
 
-/// How much is written.
+/// The amount of detail that is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ClassDetail {
-    /// Coordinates to a tenth of a pixel, not whole pixels.
+    /// Whether coordinates are to a tenth of a pixel, not to whole pixels.
     pub is_fine: bool,
-    /// Names, as attributes and for hovering.
+    /// Whether names are written, as attributes and for hovering.
     pub has_names: bool,
 }
 
@@ -34,11 +34,11 @@ pub(crate) struct Classes<'a> {
     detail: ClassDetail,
 }
 
-/// What stands inside the group of an element before and after its drawing.
+/// The parts of an element's group that depend on the window: its class, its live text and more.
 pub(crate) trait ElementLook {
     /// The words of its class attribute, after `node`, `topic` or `edge`.
     fn class(&self) -> String;
-    /// What its live text says.
+    /// The words of its live text.
     fn text(&self) -> String;
     /// Writes more elements inside it, such as animations.
     fn more(&self, _xml: &mut Xml) {}
@@ -81,7 +81,7 @@ impl<'a> Classes<'a> {
         xml.close();
     }
 
-    /// The boxes around namespaces.
+    /// Writes the boxes around namespaces.
     pub(crate) fn spaces(&self, xml: &mut Xml) {
         for space in &self.union.spaces {
             xml.open("g").attribute("class", "namespace");
@@ -90,7 +90,7 @@ impl<'a> Classes<'a> {
         }
     }
 
-    /// The arrow at this place of the view.
+    /// Writes the arrow at this place of the view.
     pub(crate) fn arrow(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, arrow) = (&self.union.arrows[at], &self.view.arrows[at]);
         let name = |id: u32| &*self.view.items[id as usize].name;
@@ -99,7 +99,7 @@ impl<'a> Classes<'a> {
         self.element(xml, part, &what, &ends, look, 0.8);
     }
 
-    /// The item at this place of the view.
+    /// Writes the item at this place of the view.
     pub(crate) fn item(&self, xml: &mut Xml, at: usize, look: &dyn ElementLook) {
         let (part, item) = (&self.union.items[at], &self.view.items[at]);
         self.element(
@@ -153,7 +153,7 @@ impl<'a> Classes<'a> {
         xml.close().raw("\n");
     }
 
-    /// Shapes and texts; of an element with its latch before its first text, and its live text as its last.
+    /// Writes shapes and texts; of an element with its latch before its first text, and its live text as its last.
     fn pieces(
         &self,
         xml: &mut Xml,
@@ -238,7 +238,7 @@ impl<'a> Classes<'a> {
     }
 }
 
-/// The badge of a mark under the mark's word as its id, without colours, and seen only where styles are.
+/// Writes the badge of a mark under the mark's word as its id, without colours, and seen only with a style sheet.
 pub(crate) fn badge_shapes(xml: &mut Xml, style: &Style, mark: Mark) {
     xml.open("g")
         .attribute("id", word(mark))
@@ -253,7 +253,7 @@ pub(crate) fn badge_shapes(xml: &mut Xml, style: &Style, mark: Mark) {
     xml.close();
 }
 
-/// A badge's shape, to a tenth of a pixel.
+/// Writes a badge's shape, to a tenth of a pixel.
 fn fine(xml: &mut Xml, form: &Form, class: &str) {
     match form {
         Form::Ellipse(r) => {
@@ -274,7 +274,7 @@ fn fine(xml: &mut Xml, form: &Form, class: &str) {
     }
 }
 
-/// Rounds to whole pixels; what is no number becomes 0.
+/// Rounds to whole pixels; a value that is not a finite number becomes 0.
 fn whole(value: f64) -> i64 {
     units(value, 1)
 }
@@ -294,7 +294,7 @@ fn decimal(units: i64, parts: i64) -> String {
     }
 }
 
-/// Path data as short as it gets: steps from point to point, lines where a curve is straight.
+/// The shortest path data: steps from point to point, lines where a curve is straight.
 fn path(steps: &[Step], parts: i64) -> String {
     let mut pen = ClassPen {
         out: String::new(),
@@ -329,7 +329,7 @@ fn path(steps: &[Step], parts: i64) -> String {
 
 struct ClassPen {
     out: String,
-    /// In units.
+    /// The end of the last step, in units.
     here: (i64, i64),
     parts: i64,
     last: char,
@@ -402,8 +402,8 @@ impl ClassPen {
     }
 }
 
-/// How many headlines each window tells, as paths in a box `wide` and 60 high, at the windows' times: what came above
-/// the line in the middle, what went below it, what changed on the ground.
+/// Writes the number of headlines of each window as paths in a box `wide` and 60 high, at the windows' times: what came
+/// above the line in the middle, what went below it, what changed at the bottom.
 pub(crate) fn bars(xml: &mut Xml, view: &View, wide: f64) {
     type CountOf = fn(&Counts) -> usize;
     let counts: [(&str, f64, f64, CountOf); 3] = [

@@ -1,7 +1,7 @@
 //! The viewed graph as DOT text: laid out, as `rqt_graph` saves and loads it, or plain, for Graphviz to lay out.
 //!
-//! Names, shapes and attributes are those of `rqt_graph`'s `dotcode.py` and `qt_dotgraph`'s `pydotfactory.py`; what
-//! `dot_to_qt.py` cannot load is never written.
+//! Names, shapes and attributes are those of `rqt_graph`'s `dotcode.py` and `qt_dotgraph`'s `pydotfactory.py`; nothing
+//! is written that `dot_to_qt.py` cannot load.
 
 mod names;
 mod plain;
@@ -19,14 +19,14 @@ use crate::view::{ItemKind, Mark, SeenWindow, Showing, Shown, View};
 
 /// The font size of `qt_dotgraph`, in points; one point is one pixel of ours.
 const FONT: f64 = 11.0;
-/// It draws with the system's sans, which may run wider than ours.
+/// The factor by which texts may be wider there: it draws with the system's sans, not with our font.
 const SLACK: f64 = 1.15;
 /// The height of nodes and topics, Graphviz's half inch.
 const HEIGHT: f64 = 36.0;
 /// The height of a line of text.
 const LINE: f64 = 15.0;
 
-/// A view with what every DOT file of it shares: unique ids and, for the profile `rqt`, one layout.
+/// A view with the parts that every DOT file of it shares: unique ids and, for the profile `rqt`, one layout.
 #[derive(Clone, Debug)]
 pub(crate) struct DotView<'a> {
     elements: &'a Elements,
@@ -63,7 +63,7 @@ impl<'a> DotView<'a> {
         self
     }
 
-    /// One window, or the [`union`] of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
+    /// One window, or the [`union`](crate::view::union::union()) of all, in the profile `rqt` if it is laid out, else in the profile `plain`.
     /// Only the latter shows the `title`.
     pub(crate) fn write(&self, seen: &SeenWindow, title: &str) -> String {
         match &self.layout {
@@ -72,7 +72,7 @@ impl<'a> DotView<'a> {
         }
     }
 
-    /// What proves an item or arrow.
+    /// The words of the evidence for an item or arrow.
     fn evidence(&self, members: &[Element]) -> String {
         let all = self.elements;
         let of = |element: &Element| match element {
@@ -100,7 +100,7 @@ impl<'a> DotView<'a> {
         inhabited
     }
 
-    /// The colour of a change; `None` for what stayed as it was.
+    /// The colour of a change; `None` for an element that stayed as it was.
     fn colour(&self, shown: &Shown) -> Option<String> {
         let change = match shown.mark? {
             Mark::Added => &self.style.added,
@@ -111,7 +111,8 @@ impl<'a> DotView<'a> {
     }
 }
 
-/// The line of an arrow: solid for what is known, dashed for what is inferred or gone, dotted for what is silent.
+/// The line of an arrow: solid for one that is known, dashed for one that is inferred or gone, dotted for one that is
+/// silent.
 fn line(shown: &Shown) -> &'static str {
     use crate::evidence::Degree;
     match (shown.mark, shown.degree, shown.state) {

@@ -22,20 +22,20 @@ use crate::draw::text::Fonts;
 const PT_PER_PX: f64 = 0.75;
 /// Points per millimetre.
 const PT_PER_MM: f64 = 72.0 / 25.4;
-/// How far the controls of a quarter of a circle lie from its ends, in radii.
+/// The distance of the controls of a quarter of a circle from its ends, in radii.
 const QUARTER: f64 = 0.552_284_75;
 /// A page and its entry in the outline.
 pub(crate) struct PdfPage {
-    /// What is on it.
+    /// The drawing on the page.
     pub(crate) scene: Scene,
-    /// What the outline calls it.
+    /// Its entry in the outline.
     pub(crate) entry: String,
 }
 
 /// The document as a file's bytes. Pages are drawn as they come, so that only their vectors are held.
 ///
 /// # Errors
-/// What the writer of PDF refuses, in its own words.
+/// The reason for which the writer of PDF refuses it, in its own words.
 pub(crate) fn write(
     sheets: impl Iterator<Item = PdfPage>,
     fonts: &Fonts,
@@ -90,10 +90,10 @@ fn point(p: Point) -> geom::Point {
     geom::Point::from_xy(f(p.x), f(p.y))
 }
 
-/// What draws scenes on a page.
+/// The pen that draws scenes on a page.
 struct PdfPen<'a> {
     fonts: &'a Fonts,
-    /// In the order of [`Fonts::files`].
+    /// The fonts in the order of [`Fonts::files`]; `None` for one that cannot be read.
     faces: Vec<Option<Font>>,
 }
 

@@ -20,9 +20,9 @@ use crate::draw::text::Fonts;
 /// A picture of opaque pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pixels {
-    /// Pixels from left to right, 1...
+    /// Pixels from left to right, ≥ 1.
     pub width: u32,
-    /// Pixels from top to bottom, 1...
+    /// Pixels from top to bottom, ≥ 1.
     pub height: u32,
     /// Red, green, blue and 255 for each pixel, row by row from the top.
     pub rgba: Vec<u8>,
@@ -32,8 +32,8 @@ pub struct Pixels {
 const MOST_SIDE: f64 = 65_535.0;
 /// The most pixels in a picture: 256 MB of memory.
 const MOST_PIXELS: f64 = 64e6;
-/// How many drawn groups are kept twice over, so that a later frame need not read their SVG again: more than a page
-/// holds, few enough for 20 MB.
+/// The number of drawn groups that are kept twice over, so that a later frame need not read their SVG again: more than
+/// a page holds, few enough for 20 MB.
 const MOST_KEPT: usize = 1000;
 
 /// A group, read once: its tree and the tiles of the page that it may touch.
@@ -49,7 +49,7 @@ pub struct Painter {
     kept: RwLock<Kept>,
 }
 
-/// Drawn groups by their SVG: those of late, and those that were of late before them.
+/// Drawn groups by their SVG: the recent ones, and those that were recent before them.
 #[derive(Default)]
 struct Kept {
     new: HashMap<String, Arc<RasterGroup>>,
@@ -196,7 +196,7 @@ impl PixelSheet {
     }
 }
 
-/// The colour as a background pixel: white where it is none.
+/// The colour as a background pixel: white for [`Color::NONE`].
 fn opaque(color: Color) -> [u8; 4] {
     let [r, g, b] = color.rgb().unwrap_or([255; 3]);
     [r, g, b, 255]

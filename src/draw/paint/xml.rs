@@ -1,10 +1,10 @@
-//! Tags that cannot be forgotten open and text that cannot be forgotten raw: what writes every SVG of ours.
+//! The writer of every SVG of ours: it closes all tags and escapes all text.
 
 use std::fmt::{self, Display, Write as _};
 
 use crate::base::words::is_invisible;
 
-/// XML under way. Values and texts are escaped as they are written; tags close themselves in order.
+/// XML being written. Values and texts are escaped as they are written; tags close themselves in order.
 #[derive(Debug, Default)]
 pub(crate) struct Xml {
     out: String,
@@ -15,7 +15,7 @@ pub(crate) struct Xml {
 }
 
 impl Xml {
-    /// Nothing yet, with room for so many bytes.
+    /// Empty XML with room for so many bytes.
     pub(crate) fn with_capacity(bytes: usize) -> Self {
         Self {
             out: String::with_capacity(bytes),
@@ -44,14 +44,14 @@ impl Xml {
         self
     }
 
-    /// Text inside the tag that is open.
+    /// Writes text inside the tag that is open.
     pub(crate) fn text(&mut self, text: &str) -> &mut Self {
         self.end_start();
         escape(&mut self.out, text);
         self
     }
 
-    /// The same of our own making, as it is: style sheets, and line ends for readers of the source.
+    /// Writes text of our own without escapes: style sheets, and line ends for readers of the source.
     pub(crate) fn raw(&mut self, text: &str) -> &mut Self {
         self.end_start();
         self.out.push_str(text);
@@ -80,7 +80,7 @@ impl Xml {
         self
     }
 
-    /// A tag with text and no attributes; nothing where the text is empty.
+    /// Writes a tag with text and no attributes; nothing where the text is empty.
     pub(crate) fn leaf(&mut self, tag: &'static str, text: &str) -> &mut Self {
         if !text.is_empty() {
             self.open(tag).text(text).close();
@@ -104,7 +104,7 @@ impl Xml {
     }
 }
 
-/// Escapes what is formatted into it.
+/// A writer that escapes all text formatted into it.
 struct Escaped<'a>(&'a mut String);
 
 impl fmt::Write for Escaped<'_> {
@@ -114,8 +114,8 @@ impl fmt::Write for Escaped<'_> {
     }
 }
 
-/// `text` for use between tags and in attributes; what XML cannot hold is spelled out, and what would hide or turn round
-/// the page's own text is written as a number.
+/// `text` for use between tags and in attributes; characters that XML cannot hold are spelled out, and those that would
+/// hide or turn round the page's own text are written as a number.
 fn escape(out: &mut String, text: &str) {
     for c in text.chars() {
         match c {
@@ -137,11 +137,11 @@ fn escape(out: &mut String, text: &str) {
     }
 }
 
-/// A number in whole units of 1/`parts`, without trailing zeros; what is no number is 0.
+/// A number in whole units of 1/`parts`, without trailing zeros; 0 for a value that is not finite.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decimal {
     value: f64,
-    /// 10 or 100.
+    /// The number of units per 1: 10 or 100.
     parts: i64,
 }
 
@@ -155,7 +155,7 @@ pub(crate) fn hundredth(value: f64) -> Decimal {
     Decimal { value, parts: 100 }
 }
 
-/// `value` in whole units of 1/`parts` (1 to 100); what is no number becomes 0.
+/// `value` in whole units of 1/`parts` (1 to 100); 0 for a value that is not finite.
 pub(crate) fn units(value: f64, parts: i64) -> i64 {
     let value = if value.is_finite() {
         value.clamp(-1e7, 1e7)

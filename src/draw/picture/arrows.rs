@@ -12,17 +12,17 @@ use crate::draw::text::{Fonts, Weight};
 use crate::layout::Route;
 use crate::view::{Arrow, Mark, Shown};
 
-/// Straight pieces that a curve is measured in.
+/// The number of straight pieces in which a curve is measured.
 const PIECES: u32 = 10;
 
-/// What arrows are drawn with.
+/// The style, the fonts and the scale that arrows are drawn with.
 pub(crate) struct Arrows<'a> {
     pub(crate) style: &'a Style,
     pub(crate) fonts: &'a Fonts,
     pub(crate) fit: GraphFit,
 }
 
-/// Where the parts of one arrow stand on the page, the same in every frame.
+/// The places of the parts of one arrow on the page, the same in every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ArrowPath {
     pub(crate) id: String,
@@ -34,7 +34,7 @@ pub(crate) struct ArrowPath {
     label: Option<Point>,
     /// The middle of its badge.
     pub(crate) badge: Point,
-    /// Where its badge may stand without covering its label; the first is the best.
+    /// The places where its badge does not cover its label; the first is the best.
     pub(super) spots: Vec<Point>,
     /// Its length in pixels, about.
     pub(crate) length: f64,

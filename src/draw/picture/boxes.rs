@@ -11,17 +11,17 @@ use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
 use crate::view::{Attendance, Item, ItemKind, Mark, Shown};
 
-/// The opacity of a namespace in which nothing is.
+/// The opacity of a namespace in which nothing is there.
 const EMPTY: f64 = 0.35;
 
-/// What boxes are drawn with.
+/// The style, the fonts and the scale that boxes are drawn with.
 pub(crate) struct Boxes<'a> {
     pub(crate) style: &'a Style,
     pub(crate) fonts: &'a Fonts,
     pub(crate) fit: GraphFit,
 }
 
-/// What is the same of an item in every window.
+/// The parts of an item that are the same in every window.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ItemBox {
     pub(crate) id: String,
@@ -72,7 +72,7 @@ impl Boxes<'_> {
         group
     }
 
-    /// Who of several equal namespaces is there: a chip for each, filled while it is, in the colour of what happened.
+    /// The chips of several equal namespaces: one for each, filled while it is there, in the colour of its change.
     pub(crate) fn roll(&self, space: &Space, place: Rect, id: &str, who: &[Attendance]) -> Group {
         let style = self.style;
         let size = style.cluster.size;
@@ -192,7 +192,7 @@ impl Boxes<'_> {
         group
     }
 
-    /// The middle of what hangs on a box and its font size: over the lower edge, clear of the name, and at most as far
+    /// The middle of the pendant of a box and its font size: over the lower edge, clear of the name, and at most as far
     /// down as boxes are apart.
     fn below(&self, place: Rect) -> (Point, f64) {
         let size = self.style.edge.size * self.fit.scale * 0.95;
@@ -202,7 +202,7 @@ impl Boxes<'_> {
         )
     }
 
-    /// The words of what hangs on a box, without the pill.
+    /// The words of the pendant of a box, without the pill.
     pub(crate) fn pendant_text(&self, place: Rect, text: &str) -> Text {
         let (below, size) = self.below(place);
         Text {
@@ -281,7 +281,7 @@ impl Boxes<'_> {
         ));
     }
 
-    /// The bar at the left of a box whose last message is kept for whoever comes late.
+    /// The bar at the left of a box whose last message is kept for late subscribers.
     fn latch_bar(&self, place: Rect, body: &Body) -> Form {
         let width = self.style.latched.bar * self.fit.scale;
         let inset = body.width * self.fit.pen / 2.0;
@@ -325,7 +325,7 @@ impl Boxes<'_> {
     }
 }
 
-/// Where the badge of a box may stand, on its outline: at its top right if it can.
+/// The places on the outline of a box where its badge may stand, the best first: at its top right.
 pub(super) fn corners(kind: ItemKind, place: Rect, scale: f64) -> [Point; 4] {
     let middle = place.centre();
     let (x, y) = match kind {
@@ -335,7 +335,7 @@ pub(super) fn corners(kind: ItemKind, place: Rect, scale: f64) -> [Point; 4] {
     [(x, -y), (-x, -y), (x, y), (-x, y)].map(|(x, y)| Point::new(middle.x + x, middle.y + y))
 }
 
-/// The attributes of an element, and the places in the ledger of what is told of it in this window.
+/// The attributes of an element, with the places in the ledger of its headlines in this window.
 pub(crate) fn told(
     mut data: Vec<(&'static str, String)>,
     shown: &Shown,
@@ -347,7 +347,7 @@ pub(crate) fn told(
     data
 }
 
-/// `node added active measured`: what it is, what happened to it, how alive, how well known.
+/// The class words of an element, `node added active measured`: its kind, its mark, its state, its degree.
 pub(crate) fn class(what: &str, shown: &Shown) -> String {
     let mut words = vec![what];
     words.extend(shown.mark.map(Mark::class));

@@ -1,4 +1,4 @@
-//! The words on the picture: chips, and what an element is.
+//! The words on the picture: chips, and facts about an element.
 
 use crate::base::words::{count, rate, rate_change, rate_of};
 use crate::view::{Counts, Shown};
@@ -18,7 +18,7 @@ pub(crate) fn chips(counts: &Counts) -> [(String, usize); 3] {
     ]
 }
 
-/// `+1 node +2 topics`: nodes, topics and edges.
+/// The words of one chip, from the numbers of nodes, topics and edges: `+1 node +2 topics`.
 fn chip(sign: char, numbers: [usize; 3]) -> String {
     let mut parts = Vec::new();
     for (n, word) in numbers.into_iter().zip(["node", "topic", "edge"]) {
@@ -29,7 +29,7 @@ fn chip(sign: char, numbers: [usize; 3]) -> String {
     parts.join(" ")
 }
 
-/// `1 handed over, 2 restarted`: what changed without coming or going.
+/// The words for changes other than beginnings and ends: `1 handed over, 2 restarted`.
 fn changed(counts: &Counts) -> String {
     let parts = [
         (
@@ -45,7 +45,7 @@ fn changed(counts: &Counts) -> String {
     told.map(|(_, words)| words).collect::<Vec<_>>().join(", ")
 }
 
-/// What happened inside a folded namespace: `+1 −4 nodes, 1 restarted`.
+/// The words for changes inside a folded namespace: `+1 −4 nodes, 1 restarted`.
 pub(crate) fn inside(counts: &Counts) -> String {
     let pair = |came: usize, went: usize, word: &str| match (came, went) {
         (0, 0) => String::new(),
@@ -63,7 +63,7 @@ pub(crate) fn inside(counts: &Counts) -> String {
     told.collect::<Vec<_>>().join(", ")
 }
 
-/// What happened on a bundle, in few characters: `+4 −3 ±2`, what came, went and changed.
+/// The changes of a bundle in few characters: `+4 −3 ±2`, the numbers of those that came, went and changed.
 pub(crate) fn came_and_went(counts: &Counts) -> String {
     let parts = [
         ('+', counts.came()),
@@ -86,7 +86,7 @@ pub(crate) fn rate_in(shown: &Shown) -> Option<String> {
     Some(if shown.each > 1 { text + " each" } else { text })
 }
 
-/// What is known of an element in this window: `active, measured, 50 Hz`.
+/// The facts about an element in this window: `active, measured, 50 Hz`.
 pub(crate) fn facts(shown: &Shown) -> String {
     let mut parts = vec![
         shown.state.word().to_owned(),

@@ -1,5 +1,4 @@
-//! The life lines in the strip below the graph: who lived when, with phases, starts, stops and hand-overs at their
-//! true places.
+//! The life lines in the strip below the graph, with phases, starts, stops and hand-overs at their true places.
 
 use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
@@ -8,7 +7,7 @@ use crate::draw::figure::tracks::SendingBar;
 use crate::draw::scene::{Form, Group, Shape, Step, Stroke, line};
 use crate::draw::style::{Color, Style};
 
-/// Where the course is drawn, and what a moment's place is.
+/// The strip in which the course is drawn, with the place of each moment.
 pub(crate) struct CourseStrip<'a> {
     pub(crate) style: &'a Style,
     pub(crate) plot: Rect,
@@ -16,7 +15,7 @@ pub(crate) struct CourseStrip<'a> {
     pub(crate) unit: f64,
 }
 
-/// The share of a row that its bar takes: when it hardly sends, and how much more when it sends most.
+/// The share of a row that its bar takes: when it hardly sends, and the part added when it sends most.
 const BAR: (f64, f64) = (0.5, 0.4);
 /// The width of a start and of an end.
 const TICK: f64 = 1.6;
@@ -40,7 +39,7 @@ impl CourseStrip<'_> {
         }
     }
 
-    /// What was sent in a time, as one shape.
+    /// The bars of sending in a time, as one shape.
     pub(crate) fn bars(&self, course: &Course, time: Span, color: Color) -> Shape {
         let pitch = self.pitch(course);
         let mut steps = Vec::new();

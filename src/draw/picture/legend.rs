@@ -1,4 +1,4 @@
-//! What the signs mean: one row, or more on a narrow page, with only the signs that occur.
+//! The legend: the meaning of the signs that occur, in one row, or more on a narrow page.
 
 use super::arrows::arrow_head;
 use super::badge::badge;
@@ -127,7 +127,7 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         .collect()
 }
 
-/// How wide a sign is, before its words.
+/// The width of a sign, before its words.
 const SIGN: f64 = 24.0;
 const GAP: f64 = 6.0;
 const AFTER: f64 = 14.0;
@@ -257,7 +257,7 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
     }
 }
 
-/// An element that stands for all of its kind.
+/// A sample element in this state.
 fn shown(state: State, degree: Degree, mark: Option<Mark>) -> Shown {
     Shown {
         mark,

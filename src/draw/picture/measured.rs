@@ -1,4 +1,4 @@
-//! What to lay out: every label at its widest, every namespace that gets a box.
+//! The plan to lay out: every label at its widest, every namespace that gets a box.
 
 use super::chips;
 use crate::base::geometry::Size;
@@ -10,17 +10,17 @@ use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::showing::both;
 use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Showing, Shown, View};
 
-/// The widest that a name is drawn; longer ones are shortened in their middle.
+/// The largest width of a name in pixels; longer ones are shortened in their middle.
 const WIDEST: f64 = 230.0;
 /// The height of a line of text over its font size.
 pub(crate) const LINE: f64 = 1.22;
 /// The height of a pill, and its width beyond its text, over the font size.
 pub(crate) const PILL_HEIGHT: f64 = 1.5;
 pub(crate) const PILL_PAD: f64 = 1.2;
-/// How much a subscription's rate must differ from its topic's to be written beside it.
+/// The least relative difference of a subscription's rate from its topic's for it to be written beside it.
 const OWN_RATE: f64 = 0.15;
 
-/// How a box is labelled.
+/// The label of a box.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Label {
     /// The name as it is drawn.
@@ -34,8 +34,7 @@ pub(crate) struct Label {
 }
 
 impl Label {
-    /// The smaller line in a window of which there is nothing to say but what is said of all windows, or that no message
-    /// came.
+    /// The smaller line in a window without news of the box: the one of all windows, or that no message came.
     pub(crate) fn silence(&self, shown: &Shown, tells: Tells) -> String {
         let speaks = self.second && self.fixed.is_empty() && tells == Tells::Rates;
         match (shown.mark, shown.state) {
@@ -47,7 +46,7 @@ impl Label {
     }
 }
 
-/// What stands in the place of a rate where no message came.
+/// The text in the place of a rate where no message came.
 const NO_MESSAGE: &str = "no msg";
 
 /// A namespace with a box around its members.
@@ -57,7 +56,7 @@ pub(crate) struct Space {
     pub(crate) name: String,
     /// Its title: the part inside the namespace around it.
     pub(crate) title: String,
-    /// What tells equal namespaces apart that are drawn as this one; empty for a single one.
+    /// The indices of the equal namespaces drawn as this one; empty for a single one.
     pub(crate) replicas: Vec<String>,
 }
 
@@ -76,9 +75,9 @@ pub(crate) fn roll(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
     space.replicas.iter().map(chip).collect()
 }
 
-/// More equal namespaces than this are only counted.
+/// The largest number of equal namespaces with a chip each; more are only counted.
 const MOST_CHIPS: usize = 32;
-/// The text of a chip over that of the title.
+/// The font size of a chip over that of the title.
 pub(crate) const CHIP_TEXT: f64 = 0.8;
 
 /// The labels of a view, and the plan that follows from them.
@@ -271,10 +270,10 @@ fn widen(most: &mut Option<f64>, width: f64) {
     *most = Some(most.map_or(width, |m: f64| m.max(width)));
 }
 
-/// Which rates a box tells itself, because no arrow does.
+/// The rates that a box tells itself because no arrow does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tells {
-    /// None: it is no topic.
+    /// None: it is not a topic.
     Nothing,
     /// Those of the whole topic that changed: several publish it, whose arrows tell the rest.
     Changes,
@@ -282,7 +281,8 @@ pub(crate) enum Tells {
     Rates,
 }
 
-/// What each item tells of its rate: a topic all, unless several publishers share it; then only what changed of it.
+/// The rates that each item tells: all those of a topic, unless several publishers share it; then only those that
+/// changed.
 pub(crate) fn tells(view: &View) -> Vec<Tells> {
     let mut senders = vec![0_usize; view.items.len()];
     for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
@@ -307,7 +307,7 @@ fn told_by_arrows(view: &View) -> Vec<bool> {
     view.arrows.iter().map(told).collect()
 }
 
-/// What an arrow says in a window, and whether on a pill because it changed.
+/// The text of an arrow in a window, and whether it stands on a pill because it changed.
 pub(crate) fn arrow_label(
     arrow: &Arrow,
     shown: &Shown,
@@ -360,7 +360,7 @@ pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
     }
 }
 
-/// What hangs on a box for one window: the rate that changed, where neither an arrow nor its smaller line tells it.
+/// The pendant of a box in one window: the rate that changed, where neither an arrow nor its smaller line tells it.
 pub(crate) fn pendant(shown: &Shown, tells: Tells) -> Option<String> {
     let (before, now) = shown.rates.filter(|_| tells == Tells::Changes)?;
     Some(words::rate_change(before, now))
@@ -392,7 +392,7 @@ fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
     }
 }
 
-/// `5 nodes, 12 topics`.
+/// The number of nodes and topics in a box: `5 nodes, 12 topics`.
 fn members(item: &Item) -> String {
     let count = |is: fn(&Element) -> bool| item.members.iter().filter(|m| is(m)).count();
     let nodes = count(|m| matches!(m, Element::Node(_)));

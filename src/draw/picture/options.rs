@@ -1,4 +1,4 @@
-//! Which paint an element gets: what changed counts more than how alive it is, and that more than how well it is known.
+//! The paint of an element: its mark counts more than its state, and that more than its degree.
 
 use crate::draw::scene::Stroke;
 use crate::draw::style::{Body, Change, Color, Style};
@@ -127,7 +127,7 @@ pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
     }
 }
 
-/// Thicker for higher rates, by their logarithm.
+/// The width of an arrow: thicker for higher rates, by their logarithm.
 fn width_of(style: &Style, hz: Option<f64>) -> f64 {
     let hz = hz.filter(|hz| hz.is_finite()).unwrap_or(0.0).max(0.0);
     let edge = &style.edge;

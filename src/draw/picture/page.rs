@@ -1,4 +1,4 @@
-//! The page: which part is title, caption, graph, legend and timeline, and how the graph is scaled into its part.
+//! The page: its parts for title, caption, graph, legend and timeline, and the scale of the graph in its part.
 
 use super::PageOptions;
 use crate::base::geometry::{Point, Rect, Size};
@@ -6,10 +6,10 @@ use crate::draw::style::Style;
 
 /// The page that furniture lengths are given for.
 const STANDARD: Size = Size::new(1280.0, 720.0);
-/// The largest that the graph is drawn, over its natural size.
+/// The largest scale of the graph, over its natural size.
 const LARGEST: f64 = 1.35;
 
-/// Where everything on the page stands, at the same place in every frame.
+/// The places of everything on the page, the same in every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PageFrame {
     pub(crate) size: Size,
@@ -23,7 +23,7 @@ pub(crate) struct PageFrame {
     pub(crate) timeline: Rect,
 }
 
-/// How the graph is brought into its part of the page.
+/// The scale and the place of the graph in its part of the page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GraphFit {
     pub(crate) scale: f64,
@@ -33,7 +33,7 @@ pub(crate) struct GraphFit {
 }
 
 impl PageFrame {
-    /// The page that is wished for, with `rows` rows of legend.
+    /// The page of these options, with `rows` rows of legend.
     pub(crate) fn new(
         style: &Style,
         options: &PageOptions,
@@ -77,7 +77,8 @@ impl PageFrame {
         }
     }
 
-    /// The largest scale at which a layout of this size fits, and where its corner goes so that it stands in the middle.
+    /// The largest scale at which a layout of this size fits, and the place of its corner, so that it stands in the
+    /// middle.
     pub(crate) fn fit(&self, layout: Size) -> GraphFit {
         let (w, h) = (layout.w.max(1.0), layout.h.max(1.0));
         let scale = (self.graph.w / w)

@@ -1,11 +1,11 @@
-//! Room for badges: the corner of a box, or the part of an arrow, where least else runs under the badge.
+//! Room for badges: the corner of a box, or the part of an arrow, where the badge covers least.
 
 use super::arrows::ArrowPath;
 use super::boxes::{ItemBox, corners};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::view::ItemKind;
 
-/// Moves all badges of this radius to where they cover no line and no other box, as far as there is such a place.
+/// Moves all badges of this radius to places where they cover no line and no other box, as far as there are any.
 pub(super) fn place_badges(
     (kinds, cards): (&[ItemKind], &mut [ItemBox]),
     tracks: &mut [ArrowPath],
@@ -74,7 +74,7 @@ fn around(points: &[Point]) -> Rect {
     all.reduce(|a, b| a.union(&b)).unwrap_or_default()
 }
 
-/// How far a point is from the line between two others.
+/// The distance of a point from the line between two others.
 fn apart(p: Point, a: Point, b: Point) -> f64 {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let length = (dx * dx + dy * dy).max(1e-9);

@@ -9,7 +9,7 @@ use crate::draw::scene::{Form, Piece, Shape};
 use crate::view::testing::mission;
 use crate::view::{ViewOptions, view};
 
-/// What a mission of this description looks like, in this style.
+/// Calls `then` with the picture of a mission of this description, in this style.
 fn with_picture<T>(
     windows: &[&str],
     style: &str,

@@ -1,4 +1,5 @@
-//! The strip at the bottom: who lived when (else how busy each window is), where changes are, and where we are.
+//! The strip at the bottom: life lines (or messages per second where there are none), the changes, and the place of the
+//! window.
 
 use super::course::CourseStrip;
 use super::page::PageFrame;
@@ -15,7 +16,7 @@ use crate::view::{Frame, View};
 
 /// A bar stands for one window, or for several where there are more windows than room.
 struct TimelineBar {
-    /// From the start of its first window to the start of the next bar's, or to the end.
+    /// Its time: from the start of its first window to the start of the next bar's, or to the end.
     span: Span,
     /// Messages per second.
     rate: f64,
@@ -27,14 +28,14 @@ pub(crate) struct Timeline<'a> {
     page: PageFrame,
     fonts: &'a Fonts,
     bars: Vec<TimelineBar>,
-    /// Windows per bar, 1...
+    /// Windows per bar, ≥ 1.
     per_bar: usize,
-    /// Where bars stand.
+    /// The rectangle of the bars.
     plot: Rect,
-    /// What the axis covers.
+    /// The time that the axis covers.
     span: Span,
     busiest: f64,
-    /// Who lived when; bars are drawn where nobody knows.
+    /// The life lines; bars are drawn where there are none.
     course: Option<Course>,
 }
 
@@ -80,7 +81,7 @@ impl<'a> Timeline<'a> {
         }
     }
 
-    /// The same with life lines in place of bars, if there are any.
+    /// The same strip with life lines in place of bars, if there are any.
     pub(crate) fn with(mut self, course: Option<Course>) -> Self {
         self.course = course.filter(|c| !c.rows.is_empty());
         self
@@ -95,7 +96,7 @@ impl<'a> Timeline<'a> {
         }
     }
 
-    /// What is the same in every frame: ground, all bars, marks, axis.
+    /// The groups that are the same in every frame: ground, all bars, marks, axis.
     pub(crate) fn ground(&self, view: &View) -> Vec<Group> {
         let style = &self.style.timeline;
         let mut bars = Group::named("timeline");
@@ -120,7 +121,8 @@ impl<'a> Timeline<'a> {
         groups
     }
 
-    /// What moves: the bars up to the window at place `k`, and the head over exactly its time.
+    /// The groups that change from frame to frame: the bars up to the window at place `k`, and the head over exactly
+    /// its time.
     pub(crate) fn head(&self, k: usize, frame: &Frame) -> Vec<Group> {
         let style = &self.style.timeline;
         let at = k / self.per_bar;
@@ -151,7 +153,7 @@ impl<'a> Timeline<'a> {
         vec![past, head]
     }
 
-    /// Where a moment lies on the axis.
+    /// The x of a moment on the axis.
     fn x(&self, at: Stamp) -> f64 {
         self.strip().x(at)
     }
@@ -185,7 +187,8 @@ impl<'a> Timeline<'a> {
     }
 
     /// Signs at the times at which something came, changed or went: three lanes, one for each. Signs that would cover
-    /// each other are one, as far as they belong to one window; each knows its window and for how many it stands.
+    /// each other are one, as far as they belong to one window; each knows its window and the number of headlines it
+    /// stands for.
     fn marks(&self, view: &View) -> Vec<Group> {
         let mut groups = Vec::new();
         let radius = LANE * 0.42 * self.page.unit;
@@ -229,7 +232,7 @@ impl<'a> Timeline<'a> {
         group
     }
 
-    /// Round times as far as they do not come too near to the last, which is the end.
+    /// The axis with round times, as far as they do not come too near to the last, which is the end.
     fn axis(&self) -> Group {
         let mut group = Group::named("axis");
         let size = self.style.timeline.size * self.page.unit;
@@ -285,7 +288,7 @@ impl TimelineBar {
     }
 }
 
-/// In which lane a headline stands: what came, changed, went.
+/// The lane of a headline: 0 for what came, 1 for what changed, 2 for what went.
 fn lane_of(kind: Kind) -> usize {
     match kind {
         Kind::Started | Kind::Appeared => 0,
@@ -294,7 +297,7 @@ fn lane_of(kind: Kind) -> usize {
     }
 }
 
-/// A plus for what came, a diamond for what changed, a minus for what went, as on the badges.
+/// The sign of a lane: a plus for what came, a diamond for what changed, a minus for what went, as on the badges.
 pub(crate) fn mark(lane: usize, c: Point, r: f64) -> Form {
     let at = |x: f64, y: f64| Point::new(c.x + x * r, c.y + y * r);
     match lane {

@@ -1,4 +1,5 @@
-//! The bar on top and the line below it: which bag, which window, what time, how many changes, and which in words.
+//! The bar on top and the line below it: the bag, the window, its time, the number of changes, and the changes in
+//! words.
 
 use super::page::PageFrame;
 use super::{PageOptions, chips};
@@ -17,11 +18,11 @@ pub(crate) struct Title<'a> {
     name: String,
     /// The left edges and widths of the chips for what came, went and changed.
     chips: [(f64, f64); 3],
-    /// Where the words on the left must end.
+    /// The x at which the words on the left must end.
     end: f64,
-    /// How wide the widest phase is.
+    /// The width of the widest phase.
     phase: f64,
-    /// What is said where nothing happened.
+    /// The text for a window in which nothing changed.
     none: &'static str,
 }
 
@@ -81,7 +82,7 @@ impl<'a> Title<'a> {
         }
     }
 
-    /// The bar without what changes from frame to frame.
+    /// The bar without the parts that change from frame to frame.
     pub(crate) fn ground(&self) -> Group {
         let mut group = Group::named("title");
         let (style, bar) = (&self.style.title, self.page.title);
@@ -100,7 +101,7 @@ impl<'a> Title<'a> {
         group
     }
 
-    /// The line under the name: which window, which part of the mission.
+    /// The line under the name: the window and its part of the mission.
     pub(crate) fn window(&self, view: &View, frame: &Frame) -> Group {
         let mut group = Group::named("window");
         let start = view
@@ -145,8 +146,8 @@ impl<'a> Title<'a> {
         group
     }
 
-    /// What is seen where two missions are compared, in the place of the window's time; how much differs, but for the
-    /// first of several windows, which is A alone.
+    /// The line where two missions are compared, in the place of the window's time: the side that is seen, and the
+    /// number of differences, but for the first of several windows, which is A alone.
     pub(crate) fn compared(&self, frame: &Frame, windows: usize) -> Vec<Group> {
         let is_alone = windows > 1 && frame.index == 0;
         let mut group = Group::named("window");
@@ -207,7 +208,7 @@ impl<'a> Title<'a> {
         group
     }
 
-    /// What came, went and changed, in numbers; each at its own place.
+    /// The chips with the numbers of what came, went and changed, each at its own place.
     pub(crate) fn chips(&self, frame: &Frame) -> Group {
         let mut group = Group::named("chips");
         let chip = &self.style.chip;
@@ -235,7 +236,7 @@ impl<'a> Title<'a> {
         group
     }
 
-    /// A chip that ends at `right`.
+    /// Draws a chip that ends at `right`.
     fn chip(&self, group: &mut Group, text: &str, right: f64, paint: (Color, Color)) {
         let unit = self.page.unit;
         let size = self.style.chip.size * unit;
@@ -327,10 +328,10 @@ impl<'a> Title<'a> {
     }
 }
 
-/// What the windows of a comparison show.
+/// The titles of the windows of a comparison.
 pub(crate) const SIDES: [&str; 2] = ["A alone", "B against A"];
 
-/// Without fractions of a second where the time is a second or more, as on a clock.
+/// The time without fractions of a second where it is a second or more, as on a clock.
 pub(crate) fn whole(nanos: i64) -> i64 {
     const MILLI: i64 = 1_000_000;
     let second = 1000 * MILLI;

@@ -1,15 +1,15 @@
-//! From one window to the next in stages, by opacity alone: what goes, what changes, what comes.
+//! The way from one window to the next in stages, by opacity alone: ending elements, changed ones, new ones.
 
 use std::collections::BTreeMap;
 
 use crate::draw::scene::{Fade, Group, Scene};
 
-/// Which part of the way each stage takes.
+/// The part of the way that each stage takes, from 0 to 1: ending elements, changed ones, new ones.
 const GOING: (f64, f64) = (0.0, 0.4);
 const CHANGING: (f64, f64) = (0.3, 0.7);
 const COMING: (f64, f64) = (0.6, 1.0);
 
-/// The scene `phase` (0..1) of the way from `before` to `after`.
+/// The scene at `phase` (above 0 and below 1) of the way from `before` to `after`.
 pub(crate) fn tween(before: &Scene, after: Scene, phase: f64) -> Scene {
     let mut old: BTreeMap<&str, &Group> =
         before.groups.iter().map(|g| (g.id.as_str(), g)).collect();
@@ -39,7 +39,8 @@ pub(crate) fn tween(before: &Scene, after: Scene, phase: f64) -> Scene {
     Scene { groups, ..after }
 }
 
-/// The new look appears over the old one, and then the old one vanishes: at no time does anything shine through both.
+/// Adds the old and the new look of a group: the new one appears over the old one, and then the old one vanishes, so
+/// that nothing ever shines through both.
 fn cross_fade(groups: &mut Vec<Group>, before: &Group, after: &Group, part: f64) {
     let mut old = before.clone();
     old.id.push_str("..before");
@@ -57,12 +58,12 @@ fn push(groups: &mut Vec<Group>, group: &Group, opacity: f64) {
     }
 }
 
-/// Titles, chips, captions and the play-head are already those of the new window.
+/// Whether it is a title, a chip, a caption or the play-head, which are at once those of the new window.
 fn is_furniture(group: &Group) -> bool {
     group.data.is_empty()
 }
 
-/// How much of a stage is done.
+/// The part of a stage that is done, 0..=1.
 fn part(stage: (f64, f64), phase: f64) -> f64 {
     ((phase - stage.0) / (stage.1 - stage.0)).clamp(0.0, 1.0)
 }

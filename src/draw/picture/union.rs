@@ -1,4 +1,5 @@
-//! The union of all windows, drawn once in the layout's own pixels, for pages where classes say what each window shows.
+//! The union of all windows, drawn once in the layout's own pixels, for pages on which classes set the look of each
+//! window.
 
 use std::collections::BTreeSet;
 
@@ -38,19 +39,20 @@ pub struct UnionElement {
     pub is_live: bool,
     /// Whether that text is shown only in windows in which its rate changed.
     pub tells_changes: bool,
-    /// Where an item stands; empty for an arrow.
+    /// The place of an item; empty for an arrow.
     pub rect: Rect,
     /// Its name where the font of the drawing lacks some of it, for readers that have more fonts.
     pub name: Option<String>,
     /// The bar at its left that says that its last message is kept, if it ever is.
     pub latch: Option<Form>,
-    /// Where its badge stands.
+    /// The middle of its badge.
     pub badge: Point,
     /// The marks that it carries a badge for in some window.
     pub marks: BTreeSet<Mark>,
 }
 
-/// The rate of an element in a window as it is drawn, after what an arrow between nodes carries; empty for none.
+/// The rate of an element in a window as it is drawn, after the topics that an arrow between nodes carries; empty for
+/// none.
 pub fn rate_label(shown: &Shown, arrow: Option<&Arrow>) -> String {
     let rate = chips::rate_in(shown).unwrap_or_default();
     match arrow.map(|arrow| (&arrow.kind, arrow.carries(shown))) {
@@ -69,7 +71,7 @@ pub fn sign(style: &Style, mark: Mark) -> Group {
 }
 
 impl Picture<'_> {
-    /// How it looks.
+    /// The style of the picture.
     pub fn style(&self) -> &Style {
         self.measured.style
     }
@@ -79,7 +81,7 @@ impl Picture<'_> {
         self.measured.options.title()
     }
 
-    /// Everything that is ever in the picture.
+    /// The union of all windows of the picture.
     pub fn union(&self) -> Union {
         let (measured, layout) = (&self.measured, &self.layout);
         let fit = GraphFit {
@@ -185,7 +187,7 @@ impl Picture<'_> {
     }
 }
 
-/// An element of which nothing is to be told but, perhaps, a rate.
+/// An element without news, with or without a rate.
 fn plain(hz: Option<f64>) -> Shown {
     Shown {
         hz,

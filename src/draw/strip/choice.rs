@@ -1,16 +1,16 @@
-//! Which windows a film strip shows.
+//! The choice of windows that a film strip shows.
 
 use crate::base::error::{Error, Result};
 use crate::view::{Counts, View};
 
-/// Which windows stand on the strip.
+/// The windows of a strip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice {
     /// Columns and rows: the first window and those that change most.
     Grid(usize, usize),
     /// The first window and all that show a change, at most a dozen.
     Changes,
-    /// These, by index.
+    /// These windows, by index.
     Windows(Vec<usize>),
 }
 
@@ -34,7 +34,7 @@ impl Choice {
             (_, Some(grid), _) => Ok(grid),
             (_, _, Some(windows)) => Ok(Self::Windows(windows)),
             _ => Err(Error::usage(
-                format!("`{text}` is no choice of windows"),
+                format!("`{text}` is not a choice of windows"),
                 "give `--strip` columns and rows (`3x2`), `changes`, or windows (`0,4,9`)",
             )),
         }

@@ -1,6 +1,6 @@
-//! What C++ code declares: rclcpp and roscpp, actions, message filters, image transport, transforms.
+//! Declarations in C++ code: rclcpp and roscpp, actions, message filters, image transport, transforms.
 //!
-//! Macros are not expanded and headers not included: what a file says by itself is nearly all there is to say.
+//! Macros are not expanded and headers not included: a single file nearly always says enough.
 
 mod look;
 mod made;
@@ -16,8 +16,8 @@ use super::texts::TextValues;
 use crate::evidence::syntax::{Language, Node, Parsed, line, walk};
 use names::Aliases;
 
-/// Words of which a file that declares anything has at least one; others are not parsed. Classes count, for a node may
-/// derive from them.
+/// Words at least one of which stands in every file that declares something; other files are not parsed. Classes count,
+/// for a node may derive from them.
 const TELLING: &[&str] = &[
     "class ",
     "struct ",
@@ -29,7 +29,7 @@ const TELLING: &[&str] = &[
     "publisher",
 ];
 
-/// Reads a file; nothing for one that is too tangled.
+/// Reads a file; empty if it is too deeply nested.
 pub(super) fn read(text: &str) -> FileCode {
     if !TELLING.iter().any(|word| text.contains(word)) {
         return FileCode::default();
@@ -59,11 +59,11 @@ pub(super) fn read(text: &str) -> FileCode {
 
 struct CppReader<'a> {
     parsed: &'a Parsed,
-    /// How many expressions were looked at for their texts.
+    /// The number of expressions whose texts were looked up.
     work: Cell<usize>,
     names: Aliases,
     texts: TextValues<'a>,
-    /// Node handles with the namespace that they stand for.
+    /// Node handles with their namespaces.
     handles: BTreeMap<String, String>,
     /// Variables with their types.
     members: BTreeMap<String, Node<'a>>,
@@ -72,12 +72,12 @@ struct CppReader<'a> {
     classes: Vec<Class>,
     /// The place of each class.
     places: BTreeMap<String, usize>,
-    /// Where the classes around the element end, with their places.
+    /// The ends of the classes around the element, with the places of the classes.
     open: Vec<(usize, usize)>,
 }
 
 impl<'a> CppReader<'a> {
-    /// Visits every element, with `open` telling the classes around it.
+    /// Visits every element, with `open` holding the classes around it.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
         self.open.clear();
         let root = self.parsed.root();
@@ -111,7 +111,7 @@ impl<'a> CppReader<'a> {
         &mut self.classes[at]
     }
 
-    /// The class that an element defines, or a function of which it defines: `void Foo::run() {…}`.
+    /// The class that an element defines, or whose function it defines: `void Foo::run() {…}`.
     fn class_of(&self, node: Node<'a>) -> Option<&'a str> {
         match node.kind() {
             "class_specifier" | "struct_specifier" => {

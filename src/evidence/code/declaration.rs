@@ -1,24 +1,24 @@
-//! What source code declares: publishers, subscribers, nodes and their names, each with the place where it stands.
+//! Declarations in source code: publishers, subscribers, nodes and their names, each with its place.
 
 use std::collections::BTreeMap;
 
 use crate::base::words;
 
-/// What a node does with a topic.
+/// The role of a node on a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Role {
     Publishes,
     Subscribes,
 }
 
-/// What a call makes.
+/// The kind of thing that a call makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Made {
     Publisher,
     Subscriber,
-    /// Waits for one message.
+    /// A call that waits for one message.
     Moment,
-    /// A publisher of images with its compressed sisters.
+    /// A publisher of images with the compressed topics beside it.
     ImagePublisher,
     CameraPublisher,
     CameraSubscriber,
@@ -39,9 +39,9 @@ pub(crate) struct Declaration {
     pub(crate) role: Role,
     /// The topic as written: `/x`, `x` in the node's namespace, `~/x` below the node; `None` if the code does not tell.
     pub(crate) topic: Option<String>,
-    /// Types that may be meant, as `package/Name`; several only behind imports of everything.
+    /// The possible types, as `package/Name`; several only behind imports of everything.
     pub(crate) types: Vec<String>,
-    /// 1..
+    /// The line, ≥ 1.
     pub(crate) line: usize,
     /// The call in short: `create_publisher(String, 'chatter')`.
     pub(crate) text: String,
@@ -53,24 +53,24 @@ pub(crate) struct Declaration {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Class {
     pub(crate) name: String,
-    /// The names of what it derives from, without namespaces.
+    /// The names of its base classes, without namespaces.
     pub(crate) bases: Vec<String>,
-    /// What it calls its node.
+    /// The names that it gives to its node.
     pub(crate) node_names: Vec<String>,
     pub(crate) declarations: Vec<Declaration>,
-    /// The classes that may be made here, with the name that a new one is given where it stands at the call.
+    /// The classes that may be made here, with the name given to the new one in the call, if any.
     pub(crate) mentions: BTreeMap<String, Option<String>>,
-    /// Whether the class itself stands here, not only functions of it.
+    /// Whether the class itself is defined here, not only functions of it.
     pub(crate) is_defined: bool,
     /// Whether it writes bags.
     pub(crate) is_recorder: bool,
     /// Whether it logs.
     pub(crate) logs: bool,
-    /// 1..
+    /// The line, ≥ 1.
     pub(crate) line: usize,
 }
 
-/// What a source file holds.
+/// The content of a source file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct FileCode {
     /// The code outside classes first.
@@ -79,7 +79,7 @@ pub(crate) struct FileCode {
     pub(crate) imports: BTreeMap<String, String>,
 }
 
-/// A call that makes something: its topic and types as far as the code tells.
+/// A call that makes something: its topic and types as far as the code shows.
 #[derive(Clone, Debug)]
 pub(super) struct Call {
     pub(super) made: Made,
@@ -90,7 +90,7 @@ pub(super) struct Call {
 }
 
 impl Call {
-    /// The publishers and subscribers that it amounts to.
+    /// The resulting publishers and subscribers.
     pub(super) fn declarations(&self) -> Vec<Declaration> {
         use Role::{Publishes, Subscribes};
         let one = |role, below: &str, change: &dyn Fn(&str) -> String| {
@@ -185,8 +185,8 @@ impl Call {
     }
 }
 
-/// The type that the parts of a name mean, as `package/Name`: `std_msgs msg String`, `std_msgs String`. `None` for names
-/// that hold no package.
+/// The type named by these parts, as `package/Name`: `std_msgs msg String`, `std_msgs String`. `None` for names without
+/// a package.
 pub(super) fn type_of(parts: &[&str]) -> Option<String> {
     let parts: Vec<&str> = parts.iter().copied().filter(|p| !p.is_empty()).collect();
     let [.., package, name] = parts[..] else {
@@ -201,7 +201,8 @@ pub(super) fn type_of(parts: &[&str]) -> Option<String> {
     Some(type_key(&format!("{package}/{name}")))
 }
 
-/// A type's name as it is compared: `std_msgs/msg/String` is `std_msgs/String`, and the old type of `/tf` is the new one.
+/// A type's name in the form for comparisons: `std_msgs/msg/String` is `std_msgs/String`, and the old type of `/tf` is
+/// the new one.
 pub(crate) fn type_key(type_name: &str) -> String {
     if type_name == "tf/tfMessage" {
         return "tf2_msgs/TFMessage".to_owned();

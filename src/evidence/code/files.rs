@@ -1,4 +1,4 @@
-//! The files of a workspace that tell something: found without following links, bounded in number and bytes.
+//! The relevant files of a workspace, found without following links, bounded in number and bytes.
 
 use std::fs;
 use std::io::Read as _;
@@ -9,12 +9,12 @@ use crate::base::error::{Error, Result};
 /// A file of the workspace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct SourceFile {
-    /// Below the workspace, with slashes.
+    /// The path below the workspace, with slashes.
     pub(super) path: String,
     pub(super) text: String,
 }
 
-/// What a file is, by its name.
+/// The kind of a file, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum FileKind {
     Python,
@@ -26,7 +26,7 @@ pub(super) enum FileKind {
     Cmake,
     /// `setup.py` or `setup.cfg`
     Setup,
-    /// A program without an ending, which may be Python.
+    /// A program without a file extension, which may be Python.
     Script,
 }
 
@@ -39,10 +39,10 @@ pub(super) const MOST_FILES: usize = 50_000;
 /// The most text that is read, in bytes: ten times the largest workspace seen.
 pub(super) const MOST_BYTES: usize = 200 << 20;
 
-/// Folders inside folders deeper than this are not entered.
+/// The deepest nesting of folders that is entered.
 const DEEPEST: usize = 40;
 
-/// Folders that hold what is built, fetched or hidden.
+/// Folders that hold built, fetched or hidden files.
 const SKIPPED: &[&str] = &[
     "build",
     "install",
@@ -53,7 +53,7 @@ const SKIPPED: &[&str] = &[
     "site-packages",
 ];
 
-/// Files, and whether there were more than may be read.
+/// Files, and whether there were more than the limits allow.
 #[derive(Debug, Default)]
 pub(super) struct Files {
     pub(super) list: Vec<SourceFile>,
@@ -62,7 +62,7 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Takes a file in, if there is room.
+    /// Adds a file if there is room.
     pub(super) fn add(&mut self, path: String, bytes: &[u8]) {
         if self.list.len() >= MOST_FILES || self.bytes + bytes.len() > MOST_BYTES {
             self.is_cut = true;
@@ -78,7 +78,7 @@ impl Files {
     }
 }
 
-/// What a path below the workspace is; `None` for what tells nothing or lies where nothing is looked for.
+/// The kind of the file at a path below the workspace; `None` for irrelevant files and skipped folders.
 pub(super) fn kind(path: &str) -> Option<FileKind> {
     let (folders, name) = path.rsplit_once('/').unwrap_or(("", path));
     if folders.split('/').any(is_skipped) || name.starts_with('.') {
@@ -106,21 +106,21 @@ fn is_launch_name(folders: &str, name: &str) -> bool {
         || name.split('.').next_back() == Some("xml") && folders.split('/').any(|f| f == "launch")
 }
 
-/// Whether a folder is not looked into.
+/// Whether a folder is skipped.
 fn is_skipped(folder: &str) -> bool {
     SKIPPED.contains(&folder) || folder.starts_with('.') || folder.contains("venv")
 }
 
-/// Whether a program without an ending begins like one in Python.
+/// Whether a program without a file extension begins like one in Python.
 fn is_python(bytes: &[u8]) -> bool {
     let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
     first.starts_with(b"#!") && first.windows(6).any(|w| w == b"python")
 }
 
-/// The files below a folder as they lie there. Links are not followed, and nothing but regular files is opened.
+/// The files below a folder in the working tree. Links are not followed, and nothing but regular files is opened.
 ///
 /// # Errors
-/// If the folder itself cannot be read; what cannot be read inside is left out.
+/// If the folder itself cannot be read; unreadable files inside are left out.
 pub(super) fn of_folder(folder: &Path) -> Result<Files> {
     fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut files = Files::default();
@@ -161,7 +161,7 @@ pub(super) fn of_folder(folder: &Path) -> Result<Files> {
     Ok(files)
 }
 
-/// The bytes of a file that is not too long.
+/// The bytes of a file; `None` if it is too long or cannot be read.
 fn read(path: &Path) -> Option<Vec<u8>> {
     let file = fs::File::open(path).ok()?;
     if file.metadata().ok()?.len() > LONGEST {

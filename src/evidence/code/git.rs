@@ -1,9 +1,9 @@
-//! The code of the recording's day out of git: the one place that runs a program, and why.
+//! The code of the recording's day from git: the one place that runs a program.
 //!
-//! Code changes between a recording and the day somebody looks at it; with the code of the day two thirds more edges are
-//! found. Git's own program reads the objects, for packs, alternates and object formats are its business. It is asked
-//! which commit, which files, and for their bytes, by commands that run no hook, filter, pager or file-system monitor, ask
-//! nobody and fetch nothing. It inherits the environment, less what would point it at another repository.
+//! Code changes between a recording and its analysis; with the code of the day two thirds more edges are found. Git's
+//! own program reads the objects, which knows packs, alternates and object formats. It is asked for the commit, the
+//! files and their bytes, by commands that run no hook, filter, pager or file-system monitor, prompt for nothing and
+//! fetch nothing. It inherits the environment, without variables that would point it at another repository.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;
@@ -14,18 +14,18 @@ use super::files::{FileKind, Files, LONGEST, MOST_FILES, kind};
 use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 
-/// What git knows of a folder.
+/// The result of asking git for a folder.
 pub(super) enum Checkout {
-    /// The files of a commit, and which one it is, in words.
+    /// The files of a commit, with its description in words.
     Commit { files: Files, words: String },
-    /// The files as they lie are to be read, with what is to be said about that.
+    /// The files in the working tree are to be read, with a note about that, if any.
     Lying { note: Option<String> },
 }
 
-/// Commits of the day after a recording count too: who records changes first and commits afterwards.
+/// Commits up to this many seconds after a recording count too: recorders often change first and commit afterwards.
 const DAY: i64 = 86_400;
 
-/// The files of the version that is wanted; `end` is the recording's end.
+/// The files of the wanted version; `end` is the recording's end.
 ///
 /// # Errors
 /// If a commit that was asked for is not there.
@@ -111,7 +111,7 @@ fn unknown(folder: &Path, name: &str, reason: &str) -> Error {
     )
 }
 
-/// A git command that touches nothing and asks nobody.
+/// A git command that changes nothing and prompts for nothing.
 fn git(folder: &Path, words: &[&str]) -> Command {
     let mut command = Command::new("git");
     command.arg("-C").arg(folder);
@@ -154,7 +154,7 @@ fn git(folder: &Path, words: &[&str]) -> Command {
 /// The most bytes of an answer: the paths of half a million files.
 const LONGEST_ANSWER: u64 = 64 << 20;
 
-/// What git answers, without the new line at its end; else its first complaint.
+/// The output of a git command, without the new line at its end; else its first complaint.
 fn ask(folder: &Path, words: &[&str]) -> std::result::Result<String, String> {
     let answer = git(folder, words)
         .output()
@@ -197,7 +197,7 @@ fn of_commit(folder: &Path, commit: &str, prefix: &str) -> Option<Files> {
     Some(files)
 }
 
-/// The path and the object of a file that tells something: `100644 blob <id> <size>\t<path>`.
+/// The path and the object of a relevant file: `100644 blob <id> <size>\t<path>`.
 fn entry(line: &[u8]) -> Option<(String, String)> {
     let line = std::str::from_utf8(line).ok()?;
     let (about, path) = line.split_once('\t')?;

@@ -1,9 +1,9 @@
-//! What the code offers beyond the nodes that the bag names: the only place that can be meant (`--infer source`), and why
-//! other places are not drawn.
+//! Edges from code whose nodes the bag does not name: the only possible place of an edge (`--infer source`), and the
+//! reasons why other places are not drawn.
 //!
-//! A topic of exactly this name and type that one place of the whole workspace publishes (or subscribes) is that place's
-//! in 135 of 141 cases (96 %), if its node declares mostly topics that were recorded, and no launch file, log record or
-//! known publisher speaks against it. Where several places can be meant 27 % are right.
+//! A topic of exactly this name and type that one place of the whole workspace publishes (or subscribes) is that
+//! place's in 135 of 141 cases (96 %), if its node declares mostly topics that were recorded, and no launch file, log
+//! record or known publisher speaks against it. Where several places are possible, 27 % are right.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,17 +16,17 @@ use crate::evidence::claim::{Degree, Name};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 use crate::evidence::topology::launch::join;
 
-/// Why a place is not drawn.
+/// The reason why a place is not drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum NotDrawn {
     SeveralPlaces,
-    /// What else its node would do is another's as likely, so that it may not have run.
+    /// The other topics of its node fit another place as well, so that it may not have run.
     Disputed,
     KnownPublisher,
     OtherLaunchFile,
     FewTopics,
     WouldHaveLogged,
-    /// Nothing speaks against it, but the bag does not name the node and nobody asked.
+    /// Nothing contradicts it, but the bag does not name the node and `--infer source` is not given.
     NotNamed,
 }
 
@@ -48,14 +48,14 @@ impl NotDrawn {
 struct Candidate<'a> {
     node: String,
     found: Match<'a>,
-    /// How many of the topics that its node declares are recorded, and how many there are.
+    /// The number of recorded topics of its node, and the number of all its topics.
     share: (usize, usize),
 }
 
-/// What is known of places that are not drawn: each in words, with its reason.
+/// The places that are not drawn: the reason, and the place in words.
 pub(super) type Undrawn = Vec<(NotDrawn, String)>;
 
-/// What the bag tells.
+/// Facts of the bag.
 pub(super) struct BagTopics<'a> {
     pub(super) recorded: &'a RecordedTopics,
     /// Programs whose nodes the bag names.
@@ -66,7 +66,7 @@ pub(super) struct BagTopics<'a> {
     pub(super) logged: bool,
 }
 
-/// Adds the only places that can be meant, if that was asked for; tells which places were not drawn and why.
+/// Adds the only possible places if asked for; returns the places that were not drawn, with the reasons.
 pub(super) fn conclude(
     code: &Code,
     known: &mut Conclusions<'_>,
@@ -115,8 +115,8 @@ pub(super) fn conclude(
     (edges, undrawn)
 }
 
-/// Every recorded topic of every node that the workspace may start and the bag does not name; of tests only if they are
-/// all there is.
+/// Every recorded topic of every node that the workspace may start and the bag does not name; of tests only if there is
+/// nothing else.
 fn candidates<'a>(code: &'a Code, bag: &BagTopics<'_>) -> Vec<Candidate<'a>> {
     let mut all = Vec::new();
     for instance in code
@@ -206,7 +206,7 @@ fn is_launched_by(instance: &Instance, launches: &BTreeSet<&str>) -> bool {
         .is_some_and(|(path, _)| launches.contains(path.as_str()))
 }
 
-/// What speaks against an edge; `None` if nothing does.
+/// The reason against an edge; `None` if there is none.
 fn reason(
     candidates: &[&Candidate<'_>],
     known: &Conclusions<'_>,

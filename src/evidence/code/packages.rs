@@ -1,4 +1,4 @@
-//! Packages of a workspace and their programs: which files or which class an executable is made of.
+//! Packages of a workspace and their programs: the files or the class of each executable.
 
 use std::collections::BTreeMap;
 
@@ -8,17 +8,17 @@ use super::files::{FileKind, SourceFile, kind};
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Package {
     pub(super) name: String,
-    /// Its folder below the workspace, with a slash at the end; empty at the top.
+    /// The folder below the workspace, with a slash at the end; empty at the top.
     pub(super) folder: String,
     pub(super) programs: BTreeMap<String, Program>,
 }
 
-/// What an executable is made of.
+/// The code of an executable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Program {
     /// Source files, below the workspace.
     Files(Vec<String>),
-    /// A component, by its class without namespaces.
+    /// A component, given by its class without namespaces.
     Class(String),
 }
 
@@ -64,7 +64,7 @@ fn folder(path: &str) -> &str {
     path.rfind('/').map_or("", |at| &path[..=at])
 }
 
-/// `'name = package.module:function'` in `setup.py` and `setup.cfg`.
+/// The entry points `'name = package.module:function'` in `setup.py` and `setup.cfg`.
 fn entry_points(text: &str, folder: &str) -> Vec<(String, Program)> {
     let pieces = text.split(['\n', '\'', '"', ',']);
     let entry = |piece: &str| {
@@ -159,7 +159,7 @@ fn located(here: &str, source: &str) -> String {
     format!("{here}{source}")
 }
 
-/// The files that `src/*.cpp` means, relative to `here`.
+/// The files that match `src/*.cpp`, relative to `here`.
 fn glob(pattern: &str, here: &str, paths: &[&str]) -> Vec<String> {
     let Some((start, end)) = pattern.split_once('*') else {
         return vec![pattern.to_owned()];
@@ -175,7 +175,7 @@ fn glob(pattern: &str, here: &str, paths: &[&str]) -> Vec<String> {
         .collect()
 }
 
-/// A word with its variables put in, lists taken apart; what is not known stays as written.
+/// A word with its variables replaced and lists split; unknown variables stay as written.
 fn put_in(word: &str, variables: &BTreeMap<String, String>, left: &mut usize) -> Vec<String> {
     let mut done = String::new();
     let mut rest = word;
@@ -200,7 +200,7 @@ fn put_in(word: &str, variables: &BTreeMap<String, String>, left: &mut usize) ->
         .collect()
 }
 
-/// Every `command(words …)`, comments left out.
+/// Every `command(words …)`, without comments.
 fn commands(text: &str) -> Vec<(&str, Vec<&str>)> {
     let mut found = Vec::new();
     let mut rest = text;
@@ -224,7 +224,7 @@ fn commands(text: &str) -> Vec<(&str, Vec<&str>)> {
     found
 }
 
-/// Where the parenthesis that is open at the start closes.
+/// The place of the parenthesis that closes the one open at the start.
 fn closing(text: &str) -> usize {
     let mut open = 1_usize;
     let end = text.char_indices().find(|(_, c)| {

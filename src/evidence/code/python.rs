@@ -1,4 +1,4 @@
-//! What Python code declares: rclpy and rospy, actions, message filters, transforms, of Python 2 and 3.
+//! Declarations in Python code: rclpy and rospy, actions, message filters, transforms, of Python 2 and 3.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use super::declaration::{Call, Class, FileCode, Made, short, type_of};
 use super::texts::{DEEPEST, LONGEST, TextValues, most_work};
 use crate::evidence::syntax::{Language, Node, Parsed, children, line, walk};
 
-/// Reads a file; nothing for one that is too tangled.
+/// Reads a file; empty if it is too deeply nested.
 pub(super) fn read(text: &str) -> FileCode {
     let Some(parsed) = Parsed::new(Language::Python, text.to_owned()) else {
         return FileCode::default();
@@ -31,20 +31,20 @@ pub(super) fn read(text: &str) -> FileCode {
 
 struct PythonReader<'a> {
     parsed: &'a Parsed,
-    /// How many expressions were looked at for their texts.
+    /// The number of expressions whose texts were looked up.
     work: Cell<usize>,
-    /// Names and what they stand for in full: `String` for `std_msgs.msg.String`.
+    /// Imported names and their full names: `std_msgs.msg.String` for `String`.
     imports: BTreeMap<String, String>,
-    /// Modules of which everything is imported.
+    /// Modules whose names are all imported.
     wildcards: Vec<String>,
     texts: TextValues<'a>,
     classes: Vec<Class>,
-    /// Where the classes around the element end, with their places.
+    /// The ends of the classes around the element, with the places of the classes.
     open: Vec<(usize, usize)>,
 }
 
 impl<'a> PythonReader<'a> {
-    /// Visits every element, with `open` telling the classes around it.
+    /// Visits every element, with `open` holding the classes around it.
     fn visit_all(&mut self, visit: fn(&mut Self, Node<'a>)) {
         self.open.clear();
         let mut next = 1;
@@ -79,7 +79,7 @@ impl<'a> PythonReader<'a> {
         &mut self.classes[at]
     }
 
-    /// First pass: classes, imports, and what names stand for.
+    /// First pass: classes, imports, and values of names.
     fn look(&mut self, node: Node<'a>) {
         match node.kind() {
             "class_definition" => self.define(node),
@@ -205,7 +205,7 @@ impl<'a> PythonReader<'a> {
         }
     }
 
-    /// Names of nodes, logging, and bags that are written.
+    /// Reads names of nodes, logging, and bags that are written.
     fn remark(&mut self, name: &str, object: &str, full: &str, given: &CallArguments<'a>) {
         let is_init = name == "__init__"
             && (object.starts_with("super(") || object == "Node" || object.ends_with(".Node"));
@@ -224,7 +224,7 @@ impl<'a> PythonReader<'a> {
         self.class().logs |= name == "get_logger" || full.starts_with("rospy.log");
     }
 
-    /// The name that a call calls, and what stands before its dot.
+    /// The called name, and the object before its dot.
     fn called(&self, call: Node<'a>) -> (&'a str, &'a str) {
         let Some(function) = call.child_by_field_name("function") else {
             return ("", "");
@@ -256,7 +256,7 @@ impl<'a> PythonReader<'a> {
         given
     }
 
-    /// A name with its first part put in full.
+    /// A name with its first part replaced by the full name.
     fn full(&self, name: String) -> String {
         let (first, rest) = name.split_once('.').unwrap_or((&name, ""));
         match self.imports.get(first) {
@@ -319,7 +319,7 @@ impl<'a> PythonReader<'a> {
         self.string_at(node, 0).filter(|text| text.len() <= LONGEST)
     }
 
-    /// The text that an expression stands for.
+    /// The text of an expression, as far as it is known.
     fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
         self.work.set(self.work.get() + 1);
         if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {
@@ -389,7 +389,7 @@ impl<'a> CallArguments<'a> {
     }
 }
 
-/// What a call makes, by its name and its name in full.
+/// The thing that a call makes, by its name and its full name.
 fn made(name: &str, full: &str) -> Option<Made> {
     let module = full.split('.').next().unwrap_or_default();
     Some(match (name, module) {

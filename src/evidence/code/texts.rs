@@ -1,22 +1,22 @@
-//! What names and parameters stand for in a source file, as far as they stand for one thing only.
+//! The values of names and parameters in a source file, where each has only one.
 
 use std::collections::BTreeMap;
 
 use crate::evidence::syntax::Node;
 
-/// The longest text that is put together, in bytes: longer than any topic.
+/// The longest text that is assembled, in bytes: longer than any topic.
 pub(super) const LONGEST: usize = 1000;
 
-/// Names that stand for names further than this are not followed.
+/// The most steps from name to name that are followed.
 pub(super) const DEEPEST: usize = 8;
 
 /// The most expressions that are looked at for the texts of a file of this many bytes: code written by hand needs a
-/// tenth, and whoever lets names stand for each other over and over gets no further than in reading the file.
+/// tenth, and names that refer to each other over and over cost no more than reading the file.
 pub(super) fn most_work(bytes: usize) -> usize {
     1000 + bytes
 }
 
-/// Names with the expressions that they are given; a name that is given several is not known.
+/// Names with the expressions assigned to them; a name with several has no known value.
 #[derive(Debug, Default)]
 pub(super) struct TextValues<'a> {
     names: BTreeMap<String, Option<Node<'a>>>,
@@ -24,12 +24,12 @@ pub(super) struct TextValues<'a> {
 }
 
 impl<'a> TextValues<'a> {
-    /// Takes down that a name is given a value.
+    /// Notes that a name is given a value.
     pub(super) fn set(&mut self, name: &str, value: Node<'a>) {
         put(&mut self.names, name, value);
     }
 
-    /// Takes down that a parameter has a default.
+    /// Notes that a parameter has a default.
     pub(super) fn set_parameter(&mut self, name: &str, value: Node<'a>) {
         put(&mut self.parameters, name, value);
     }

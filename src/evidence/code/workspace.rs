@@ -1,5 +1,5 @@
-//! All of a workspace together: whose class a name means, what belongs to a node, which nodes its programs and launch
-//! files start.
+//! All of a workspace together: the classes that names refer to, the parts of each node, and the nodes that its
+//! programs and launch files start.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use super::declaration::{Class, Declaration, FileCode};
 use super::packages::{Package, Program, package_of};
 use crate::evidence::topology::launch::LaunchedNode;
 
-/// What was read of a workspace.
+/// The content of a workspace.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
     pub(super) packages: Vec<Package>,
@@ -27,13 +27,13 @@ pub(super) struct CodeFile {
     pub(super) code: FileCode,
 }
 
-/// A class of a file, or the code outside its classes: file, place.
+/// The place of a class, or of the code outside classes: file, place in the file.
 type ClassPlace = (usize, usize);
 
 /// A declaration with its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FileDeclaration {
-    /// Below the workspace.
+    /// The path below the workspace.
     pub(crate) path: String,
     pub(crate) declaration: Declaration,
 }
@@ -41,16 +41,16 @@ pub(crate) struct FileDeclaration {
 /// A node that the workspace may start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Instance {
-    /// Its name without namespace.
+    /// The name without namespace.
     pub(crate) name: String,
-    /// Its namespace, where a launch file gives one; empty at the root.
+    /// The namespace, where a launch file gives one; empty at the root.
     pub(crate) namespace: Option<String>,
     pub(crate) remaps: Vec<(String, String)>,
     /// The launch file and the line that start it.
     pub(crate) launched: Option<(String, usize)>,
-    /// What tells it from other programs of the same node name: the file and the class.
+    /// The file and the class, which tell it from other programs of the same node name.
     pub(crate) program: (String, String),
-    /// What its program declares.
+    /// The declarations of its program.
     pub(crate) declared: Arc<[FileDeclaration]>,
     /// Whether it only belongs to tests.
     pub(crate) is_test: bool,
@@ -67,17 +67,17 @@ struct CodeNode {
     logs: bool,
 }
 
-/// Classes that make a class that derives from them a node.
+/// Base classes that make a class a node.
 const NODES: &[&str] = &["LifecycleNode", "ManagedNode", "Node", "Nodelet"];
 
 /// The most parts that one node may be made of.
 const MOST_PARTS: usize = 300;
 
-/// The most declarations of one node, and of all nodes together: a hundred times what the largest robots have.
+/// The most declarations of one node, and of all nodes together: a hundred times those of the largest robots.
 const MOST_DECLARED: usize = 1000;
 const MOST_OF_ALL: usize = 500_000;
 
-/// A name of more classes than this says nothing outside its own file.
+/// The most classes that may share a name; a more common name counts only in its own file.
 const MOST_NAMESAKES: usize = 500;
 
 /// The most programs that launch files may start.
@@ -122,7 +122,7 @@ impl Workspace {
         all
     }
 
-    /// Every declaration of files that are no tests, whoever it belongs to.
+    /// Every declaration of files that do not belong to tests, whatever its node.
     pub(super) fn places(&self) -> Vec<FileDeclaration> {
         let files = self.files.iter().filter(|file| !is_test(&file.path));
         let declared = files.flat_map(|file| {
@@ -135,7 +135,7 @@ impl Workspace {
         declared.collect()
     }
 
-    /// Every node that may be started, as written and as launched.
+    /// Every node that may be started, as in the code and as in launch files.
     pub(super) fn instances(&self) -> Vec<Instance> {
         let mut all = Vec::new();
         let mut declared = 0;
@@ -225,7 +225,7 @@ impl Workspace {
         own.map(|part| self.class_node(part)).into_iter().collect()
     }
 
-    /// The nodes that a program of these files starts: that of its own code, and the classes of nodes that it makes.
+    /// The nodes that a program of these files starts: the one of its own code, and the node classes that it makes.
     fn nodes_of(&self, files: &[usize]) -> Vec<CodeNode> {
         let mut nodes: Vec<CodeNode> = self.free_node(files).into_iter().collect();
         let free = files.iter().map(|file| (*file, 0)).collect();
@@ -292,7 +292,7 @@ impl Workspace {
                 .collect::<Vec<_>>()
         };
         CodeNode {
-            // A text that is no name of a node was given for something else.
+            // A text that is not a name of a node was given for something else.
             names: names
                 .into_iter()
                 .filter(|n| !n.is_empty() && !n.contains(char::is_whitespace))
@@ -308,8 +308,8 @@ impl Workspace {
         }
     }
 
-    /// The parts that belong to the node of these parts, sorted: its bases, and the classes that it makes and that are no
-    /// nodes themselves. Those that are come second.
+    /// The parts that belong to the node of these parts, sorted: its bases, and the classes that it makes and that are
+    /// not nodes themselves. Those that are nodes come second.
     fn belonging(&self, parts: Vec<ClassPlace>) -> (Vec<ClassPlace>, Vec<ClassPlace>) {
         let mut open = parts;
         let (mut own, mut others) = (BTreeSet::new(), BTreeSet::new());
@@ -337,8 +337,8 @@ impl Workspace {
         (own.iter().copied().collect(), defined.collect())
     }
 
-    /// The parts of the class that a name means in a file: of this file, of the module that it is imported from, of this
-    /// package, or the only one in the workspace.
+    /// The parts of the class that a name refers to in a file: of this file, of the module that it is imported from, of
+    /// this package, or the only one in the workspace.
     fn meant(&self, name: &str, file: usize) -> Vec<ClassPlace> {
         let Some(all) = self.by_name.get(name) else {
             return Vec::new();
@@ -377,7 +377,7 @@ impl Workspace {
         chosen.map(|part| self.parts(part)).unwrap_or_default()
     }
 
-    /// A class with the functions of it that stand in other files of its package.
+    /// A class with those of its functions that stand in other files of its package.
     fn parts(&self, part: ClassPlace) -> Vec<ClassPlace> {
         let package = self.file(part).package;
         let others = self
@@ -390,7 +390,7 @@ impl Workspace {
         std::iter::once(part).chain(others.copied()).collect()
     }
 
-    /// Whether a class is a node, by what it derives from.
+    /// Whether a class is a node, by its base classes.
     fn is_node(&self, part: ClassPlace, depth: usize) -> bool {
         depth < 8
             && self.class(part).bases.iter().any(|base| {
@@ -411,7 +411,7 @@ impl Workspace {
     }
 }
 
-/// The one thing there is; `None` for none or several.
+/// The only item; `None` for none or several.
 fn only<T>(mut all: impl Iterator<Item = T>) -> Option<T> {
     let first = all.next();
     if all.next().is_none() { first } else { None }

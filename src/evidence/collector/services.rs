@@ -9,13 +9,13 @@ use crate::evidence::claim::{Claim, Name};
 /// A service whose calls were recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Service {
-    /// The service's name.
+    /// The name.
     pub name: Arc<str>,
     /// Requests: the larger number of those sent by clients and those received by servers.
     pub requests: u64,
     /// Replies: the larger number of those sent and those received.
     pub replies: u64,
-    /// How many clients called it.
+    /// The number of clients that called it.
     pub clients: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Every source, fed with single messages.
+//! Tests of every source with single messages.
 
 use super::*;
 use crate::bag::Encoding;
@@ -82,7 +82,7 @@ impl Payload {
     }
 }
 
-/// A collector that has heard one message of a connection, with what it wanted of it.
+/// A collector that has read one message of a connection, with the payload that it wanted.
 pub(super) fn hear(
     topic: &str,
     kind: &str,
@@ -116,7 +116,7 @@ pub(super) fn hear(
     (collector, want)
 }
 
-/// What one message claims, a line each, sorted.
+/// The claims of one message, a line each, sorted.
 pub(super) fn claims(
     topic: &str,
     kind: &str,

@@ -1,4 +1,4 @@
-//! The sources of ROS 2, fed with single messages.
+//! Tests of the sources of ROS 2 with single messages.
 
 use super::tests::{Payload, claims, hear};
 

@@ -8,12 +8,12 @@ use std::fmt;
 use crate::bag::Encoding;
 use crate::base::time::Stamp;
 
-/// A payload that does not hold what was asked of it.
+/// The error of a payload that does not have the expected content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Malformed {
-    /// Where, in bytes from the payload's start.
+    /// The place, in bytes from the payload's start.
     pub at: usize,
-    /// What should stand there.
+    /// The expected content.
     pub expected: &'static str,
 }
 
@@ -23,7 +23,7 @@ impl fmt::Display for Malformed {
     }
 }
 
-/// What every reading function returns.
+/// The result of every reading function.
 pub(crate) type PayloadResult<T> = std::result::Result<T, Malformed>;
 
 /// A place in a payload.
@@ -31,7 +31,7 @@ pub(crate) type PayloadResult<T> = std::result::Result<T, Malformed>;
 pub(crate) struct PayloadCursor<'a> {
     data: &'a [u8],
     at: usize,
-    /// Where alignment counts from; `None` where nothing is aligned (ROS 1).
+    /// The place from which alignment counts; `None` where nothing is aligned (ROS 1).
     origin: Option<usize>,
     big_endian: bool,
 }
@@ -86,7 +86,7 @@ impl<'a> PayloadCursor<'a> {
         self.origin.is_some()
     }
 
-    /// Bytes left.
+    /// The number of bytes left.
     pub(crate) fn remaining(&self) -> usize {
         self.data.len() - self.at
     }
@@ -103,7 +103,7 @@ impl<'a> PayloadCursor<'a> {
         Ok(())
     }
 
-    /// The error for `expected` here.
+    /// The error for `expected` at this place.
     pub(crate) fn wrong(&self, expected: &'static str) -> Malformed {
         Malformed {
             at: self.at,
@@ -192,7 +192,7 @@ impl<'a> PayloadCursor<'a> {
         self.big_endian
     }
 
-    /// The next string; bytes that are no UTF-8 are an error.
+    /// The next string; bytes that are not UTF-8 are an error.
     pub(crate) fn string(&mut self) -> PayloadResult<&'a str> {
         let text = self.text()?;
         std::str::from_utf8(text).map_err(|_| self.wrong("text in UTF-8"))
@@ -217,7 +217,7 @@ impl<'a> PayloadCursor<'a> {
         self.bytes(len).map(drop)
     }
 
-    /// The length of the next sequence, whose elements take `least` bytes or more each.
+    /// The length of the next sequence, whose elements take at least `least` bytes each.
     pub(crate) fn length(&mut self, least: usize) -> PayloadResult<usize> {
         let count = self.u32()? as usize;
         if count.saturating_mul(least.max(1)) > self.remaining() {

@@ -1,4 +1,4 @@
-//! Whether a connection's messages have a layout that we know: by type, and by definition or hash.
+//! Known message layouts, recognised by type, and by definition or hash.
 
 use crate::bag::{Connection, Encoding};
 
@@ -6,23 +6,23 @@ use crate::bag::{Connection, Encoding};
 pub(crate) struct MessageLayout {
     /// The type, without ROS 2's `/msg`: `rosgraph_msgs/Log`. A star at its start stands for anything.
     pub(crate) type_name: &'static str,
-    /// Its md5 sum in ROS 1, looked at where the definition is missing; empty in ROS 2.
+    /// The type's md5 sum in ROS 1, used where the definition is missing; empty in ROS 2.
     pub(crate) md5: &'static str,
-    /// The encoding it is for.
+    /// The encoding that it is for.
     pub(crate) encoding: Encoding,
-    /// The fields of the message and of all messages inside it, as [`outline`] writes them; none if the reader looks
+    /// The fields of the message and of all messages inside it, as [`outline`] writes them; empty if the reader looks
     /// at the definition itself.
     pub(crate) fields: &'static [(&'static str, &'static str)],
 }
 
-/// How well a connection fits a layout.
+/// The degree to which a connection fits a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LayoutFit {
     /// It has another type or encoding.
     OtherType,
     /// It has the type, but not its fields.
     OtherFields,
-    /// It is the layout, as far as the bag tells.
+    /// It has the layout, as far as the bag tells.
     Same,
 }
 
@@ -47,7 +47,7 @@ pub(crate) const LOG: MessageLayout = MessageLayout {
     ],
 };
 
-/// The same before 2011.
+/// `rosgraph_msgs/Log` before 2011.
 pub(crate) const OLD_LOG: MessageLayout = MessageLayout {
     type_name: "roslib/Log",
     ..LOG
@@ -111,13 +111,13 @@ impl MessageLayout {
     }
 }
 
-/// Definitions in OMG IDL are not taken apart.
+/// Whether a definition is in OMG IDL, which is not parsed.
 fn is_idl(definition: &str) -> bool {
     definition.contains("module ") && definition.contains("struct ")
 }
 
-/// The messages in a definition, the outermost first: last part of the name, then `type name` of each field with `;`
-/// between. Comments, constants, defaults, bounds and packages are left out; all types of one byte are `byte`.
+/// The messages in a definition, the outermost first: the last part of the name, then `type name` of each field,
+/// separated by `;`. Comments, constants, defaults, bounds and packages are left out; all types of one byte are `byte`.
 pub(crate) fn outline(definition: &str) -> Vec<(String, String)> {
     let mut messages = vec![(String::new(), String::new())];
     for line in definition.lines() {

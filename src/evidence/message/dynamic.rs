@@ -9,7 +9,7 @@ pub(crate) enum MessageValue {
     Text(String),
     /// An unsigned number of one byte.
     Byte(u8),
-    /// Any other number, with its value if it is a whole number.
+    /// Any other number, with its value if it is a whole one.
     Number(Option<i128>),
     List(Vec<Self>),
     /// Fields by name.
@@ -42,16 +42,16 @@ impl MessageValue {
     }
 }
 
-/// Messages inside messages deeper than this are hostile.
+/// The deepest nesting of messages; deeper ones are hostile.
 const DEEPEST: usize = 12;
 
-/// Types that definitions use without spelling them out.
+/// Types that definitions use without defining them.
 const BUILT_IN: [(&str, &str); 2] = [
     ("Time", "int32 sec;uint32 nanosec"),
     ("Duration", "int32 sec;uint32 nanosec"),
 ];
 
-/// A definition, ready to take messages apart.
+/// A parsed definition.
 #[derive(Clone, Debug)]
 pub(crate) struct MessageSchema(Vec<(String, String)>);
 
@@ -75,16 +75,16 @@ impl MessageSchema {
         holds.then_some(schema)
     }
 
-    /// A schema of ours: the message's fields under the empty name, then those of the messages inside it.
+    /// A built-in schema: the message's fields under the empty name, then those of the messages inside it.
     pub(crate) fn of_fields(fields: &[(&str, &str)]) -> Self {
         let own = |(name, fields): &(&str, &str)| ((*name).to_owned(), (*fields).to_owned());
         Self(fields.iter().map(own).collect())
     }
 
-    /// Takes a whole payload apart.
+    /// Parses a whole payload.
     ///
     /// # Errors
-    /// If it has another layout, or nothing is known about a type in it.
+    /// If it has another layout, or a type in it is unknown.
     pub(crate) fn read(&self, payload: &mut PayloadCursor<'_>) -> PayloadResult<MessageValue> {
         let fields = self.0.first().map_or("", |(_, fields)| fields);
         let value = self.fields(payload, fields, 0)?;

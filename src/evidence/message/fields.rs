@@ -1,5 +1,5 @@
-//! Messages taken apart into the columns of a table: a column per field, those of messages inside named with dots, and
-//! a list for each array around a field.
+//! Messages as columns of a table: a column per field, with dots in the names of nested fields, and a list for each
+//! array around a field.
 //!
 //! A payload is read by the definition in its bag (<http://wiki.ros.org/msg>,
 //! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>). Arrays of bytes are bytes. Times are two
@@ -14,12 +14,12 @@ use crate::bag::{Connection, Encoding};
 use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn};
 use definition::{Array, Definition, Field};
 
-/// Messages inside messages deeper than this are hostile.
+/// The deepest nesting of messages; deeper ones are hostile.
 const DEEPEST: usize = 16;
-/// More columns than this are hostile: messages in use have some hundred.
+/// The most columns; more are hostile: messages in use have some hundred.
 const MOST_COLUMNS: usize = 2000;
 
-/// What a field that is no message holds.
+/// The type of a field that is not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Primitive {
     /// A number or a truth value, and its size in bytes.
@@ -38,15 +38,15 @@ enum DecodeStep {
         count: Array,
         columns: Range<usize>,
         level: usize,
-        /// The fewest bytes that an element takes.
+        /// The smallest number of bytes of an element.
         least: usize,
         element: Vec<Self>,
     },
-    /// CDR writes a message without fields as one byte.
+    /// A message without fields, which CDR writes as one byte.
     Nothing,
 }
 
-/// A definition, ready to take messages apart.
+/// A parsed definition, ready to decode messages.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Decoder {
     encoding: Encoding,
@@ -60,7 +60,7 @@ impl Decoder {
     /// The decoder of a connection's messages.
     ///
     /// # Errors
-    /// Why its messages cannot be decoded.
+    /// The reason why its messages cannot be decoded.
     pub(crate) fn new(connection: &Connection) -> Result<Self, String> {
         if let Encoding::Other(name) = &connection.encoding {
             return Err(format!("they are encoded as `{name}`"));
@@ -96,7 +96,7 @@ impl Decoder {
         })
     }
 
-    /// Adds a payload's values to the columns from `first` on. Where that fails they are left half-filled.
+    /// Adds a payload's values to the columns from `first` on. On failure they are left half-filled.
     ///
     /// # Errors
     /// If the payload has another layout.
@@ -114,17 +114,17 @@ impl Decoder {
     }
 }
 
-/// A plan being made.
+/// A decoding plan under construction.
 struct DecodePlan<'a> {
     definition: &'a Definition,
     is_cdr: bool,
     columns: Vec<(String, ColumnKind, usize)>,
-    /// How many fields were visited.
+    /// The number of fields visited.
     fields: usize,
 }
 
 impl DecodePlan<'_> {
-    /// The steps of a message inside `levels` lists, and the fewest bytes that it takes.
+    /// The steps of a message inside `levels` lists, and the smallest number of its bytes.
     fn message(
         &mut self,
         message: usize,
@@ -190,7 +190,7 @@ impl DecodePlan<'_> {
         Ok((vec![list], bytes(least)))
     }
 
-    /// A field, or an element of its array.
+    /// Adds the steps of a field, or of an element of its array.
     fn one(
         &mut self,
         message: usize,
@@ -280,7 +280,7 @@ fn run(
     Ok(())
 }
 
-/// How many elements an array has; never more than the payload has room for.
+/// The number of elements of an array; never more than the payload has room for.
 fn many(payload: &mut PayloadCursor<'_>, count: Array, least: usize) -> Result<usize, Malformed> {
     match count {
         Array::Told => payload.length(least),

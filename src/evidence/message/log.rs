@@ -1,4 +1,4 @@
-//! A log record of ROS 1 (`rosgraph_msgs/Log`) or ROS 2 (`rcl_interfaces/msg/Log`): who logs what, from which file.
+//! A log record of ROS 1 (`rosgraph_msgs/Log`) or ROS 2 (`rcl_interfaces/msg/Log`): its logger, text and source file.
 
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
 
@@ -8,7 +8,7 @@ pub(crate) struct LogRecord<'a> {
     /// The full name of the node, or of the logger, which is a node or a part of one.
     pub(crate) logger: String,
     pub(crate) text: &'a str,
-    /// The source file as the compiler or interpreter names it, folders and all.
+    /// The path of the source file as the compiler or interpreter names it.
     pub(crate) file: &'a str,
 }
 
@@ -43,7 +43,7 @@ impl<'a> LogRecord<'a> {
         Ok(Self { logger, text, file })
     }
 
-    /// The file's own name.
+    /// The source file's name without folders.
     pub(crate) fn file_name(&self) -> &'a str {
         self.file.rsplit(['/', '\\']).next().unwrap_or(self.file)
     }

@@ -1,4 +1,4 @@
-//! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): whose parameters were declared or set.
+//! Parameter events of ROS 2 (`rcl_interfaces/msg/ParameterEvent`): parameters of a node that were declared or set.
 
 use crate::bag::Encoding;
 use crate::evidence::message::cursor::{PayloadCursor, PayloadResult};
@@ -28,16 +28,16 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Parameter<'a> {
     pub(crate) name: &'a str,
-    /// Its value, if that is a truth value.
+    /// The value, if it is a truth value.
     pub(crate) truth: Option<bool>,
 }
 
-/// What happened to a node's parameters.
+/// A change of a node's parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ParameterEvent<'a> {
     /// The node's full name; empty if the writer named none.
     pub(crate) node: &'a str,
-    /// The new and the changed ones.
+    /// The new and the changed parameters.
     pub(crate) set: Vec<Parameter<'a>>,
 }
 
@@ -62,7 +62,7 @@ impl<'a> ParameterEvent<'a> {
     }
 }
 
-/// `rcl_interfaces/msg/ParameterType`: the number of truth values.
+/// `rcl_interfaces/msg/ParameterType`: the number of the type of truth values.
 const BOOL: u8 = 1;
 
 fn parameter<'a>(payload: &mut PayloadCursor<'a>) -> PayloadResult<Parameter<'a>> {

@@ -1,4 +1,4 @@
-//! What claims say at their word, and when: signs, and ends by what takes them back.
+//! Claims taken literally, with their times: signs, and ends by claims that revoke them.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ impl Conclusions<'_> {
         facts.into_iter().map(times).collect()
     }
 
-    /// What the claims say without any rule: nodes, topics, publications and subscriptions.
+    /// Adds the proofs that the claims state without any rule: nodes, topics, publications and subscriptions.
     pub(crate) fn take_at_their_word(&mut self) {
         let endings = self.endings();
         let refusals = self.refusals();
@@ -56,7 +56,7 @@ impl Conclusions<'_> {
         }
     }
 
-    /// When somebody was refused who wanted to subscribe.
+    /// The times at which subscriptions were refused.
     fn refusals(&mut self) -> BTreeMap<ElementKey, Vec<Stamp>> {
         let mut refusals: BTreeMap<ElementKey, Vec<Stamp>> = BTreeMap::new();
         for fact in self.facts.list.clone() {
@@ -69,7 +69,7 @@ impl Conclusions<'_> {
         refusals
     }
 
-    /// When something was taken back, and when snapshots were taken.
+    /// The times at which claims were revoked, and those of snapshots.
     fn endings(&mut self) -> BTreeMap<Claim, Vec<Stamp>> {
         let mut endings: BTreeMap<Claim, Vec<Stamp>> = BTreeMap::new();
         for fact in self.facts.list.clone() {
@@ -84,7 +84,7 @@ impl Conclusions<'_> {
         endings
     }
 
-    /// When a claim was made, and when it was taken back, sorted.
+    /// The times at which a claim was made, and at which it was revoked, sorted.
     fn signs_and_ends(
         &mut self,
         fact: &ClaimRecord,
@@ -116,7 +116,7 @@ impl Conclusions<'_> {
     }
 }
 
-/// A client is refused so soon after it connected, in nanoseconds: both are logged in one go.
+/// The longest time from a client's connection to its refusal, in nanoseconds: both are logged together.
 const REFUSED_NS: i64 = 1_000_000_000;
 
 /// Whether a connection made at `time` was refused at once.
@@ -125,7 +125,7 @@ fn is_refused(time: Stamp, refusals: &[Stamp]) -> bool {
     refusals.iter().any(soon)
 }
 
-/// The snapshots that tell of an absence: of each run without the claim the first and the last. Both lists are sorted.
+/// The snapshots that show an absence: the first and the last of each run without the claim. Both lists are sorted.
 fn absences(signs: &[Stamp], snapshots: &[Stamp]) -> Vec<Stamp> {
     let mut absent = Vec::new();
     let mut from = 0;

@@ -1,4 +1,4 @@
-//! What is known not to be there: edges that a complete list of a node's would name, and does not.
+//! Edges known not to exist: a complete list of a node's edges would name them, and does not.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,16 +7,16 @@ use crate::base::time::Span;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Name};
 
-/// Complete lists of what nodes publish and subscribe, as far as somebody gives them.
+/// Complete lists of the topics that nodes publish and subscribe, as far as there are any.
 #[derive(Debug, Default)]
 pub(crate) struct Closed {
-    /// By node: all that a rospy node names as its own, or all that a snapshot of the graph shows of a node.
+    /// By node: all topics that a rospy node names as its own, or all that a snapshot of the graph shows of a node.
     all: BTreeMap<Name, BTreeSet<Name>>,
-    /// By node: all that a roscpp node publishes.
+    /// By node: all topics that a roscpp node publishes.
     published: BTreeMap<Name, BTreeSet<Name>>,
-    /// Nodes whose lists were heard again long after the first: a list made at a node's start may lack what comes later.
+    /// Nodes whose lists were repeated long after the first: a list made at a node's start may lack later topics.
     settled: BTreeSet<Name>,
-    /// Topics whose every message names its publisher, with all of these.
+    /// Topics whose every message names its publisher, with all these publishers.
     told: BTreeMap<Name, BTreeSet<Name>>,
 }
 
@@ -69,7 +69,7 @@ impl Closed {
         self.told.retain(|topic, _| !untold.contains(topic));
     }
 
-    /// Whether every message of a topic names its publisher, and none this one.
+    /// Whether every message of a topic names its publisher, and this node is never named.
     pub(crate) fn headers_deny(&self, what: ElementKey) -> bool {
         match what {
             ElementKey::Publish(node, topic) => lacks(&self.told, topic, node),
@@ -77,7 +77,7 @@ impl Closed {
         }
     }
 
-    /// Whether a complete list that was heard long after its node's start leaves this edge out.
+    /// Whether a complete list that was made long after its node's start leaves this edge out.
     pub(crate) fn settled_lists_deny(&self, what: ElementKey) -> bool {
         let node = match what {
             ElementKey::Publish(node, _) | ElementKey::Subscribe(_, node) => node,
@@ -86,7 +86,7 @@ impl Closed {
         self.settled.contains(&node) && self.lists_deny(what)
     }
 
-    /// Whether some complete list leaves this edge out; nothing is known against nodes and topics.
+    /// Whether some complete list leaves this edge out; false for nodes and topics.
     pub(crate) fn lists_deny(&self, what: ElementKey) -> bool {
         match what {
             ElementKey::Publish(node, topic) => {
@@ -98,10 +98,10 @@ impl Closed {
     }
 }
 
-/// A node has made its connections so long after its start, in nanoseconds.
+/// The time after a node's start at which it has made its connections, in nanoseconds.
 const SETTLED_NS: i64 = 5_000_000_000;
 
-/// Whether there is a list of this, without that member.
+/// Whether there is a list for `of` without `member`.
 fn lacks(lists: &BTreeMap<Name, BTreeSet<Name>>, of: Name, member: Name) -> bool {
     lists.get(&of).is_some_and(|list| !list.contains(&member))
 }

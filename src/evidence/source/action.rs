@@ -51,7 +51,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// The node in the id of a goal, `/client-N-time`.
+/// The node in a goal's id `/client-N-time`.
 fn client(id: &str) -> Option<&str> {
     let (rest, time) = id.rsplit_once('-')?;
     let (node, number) = rest.rsplit_once('-')?;
@@ -59,11 +59,11 @@ fn client(id: &str) -> Option<&str> {
     (node.starts_with('/') && digits(number) && digits(time)).then_some(node)
 }
 
-/// What the server sends and takes, and what a client sends.
+/// The suffixes of the topics that a server publishes; a client publishes the others.
 const SENDS: [&str; 3] = ["status", "feedback", "result"];
 const TAKES: [&str; 2] = ["goal", "cancel"];
 
-/// The parts of an action that a bag holds or somebody names, by the action's name.
+/// The parts of an action that a bag holds or a source names, by the action's name.
 type Actions = BTreeMap<String, BTreeMap<&'static str, Name>>;
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
@@ -79,7 +79,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// Draws all edges that follow from those known.
+/// Adds all edges that follow from the known ones.
 fn tie(
     source: SourceId,
     known: &mut Conclusions<'_>,

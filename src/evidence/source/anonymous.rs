@@ -1,10 +1,11 @@
-//! The start inside an anonymous name: rospy appends its process and the milliseconds since 1970, roscpp the nanoseconds.
+//! The start time inside an anonymous name: rospy appends its process and the milliseconds since 1970, roscpp the
+//! nanoseconds.
 
 use crate::base::role::start;
 use crate::evidence::claim::{Degree, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
-/// A node that started longer before the recording than this was named by a clock that was not set.
+/// The longest time from a start in a name to the recording, in nanoseconds; with a longer one the clock was not set.
 const LONGEST_NS: i64 = 30 * 86_400_000_000_000;
 
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {

@@ -1,9 +1,9 @@
-//! ROS 1 connection headers and MCAP channel metadata: who publishes each message (`callerid`).
+//! ROS 1 connection headers and MCAP channel metadata: the publisher of each message (`callerid`).
 
 use crate::evidence::claim::{Degree, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Reliability, Validity};
 
-/// Every stream proves its topic, and its publisher as far as that is believed.
+/// Every stream proves its topic, and its publisher as far as its name is reliable.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let streams = known.streams;
     for (at, stream) in streams.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Contracts of well-known nodes: what a node of a known package publishes and subscribes under its default names, as
-//! `contracts.csv` lists it. It counts where the bag names the node and has the topic with that type.
+//! Contracts of well-known nodes: the topics that a node of a known package publishes and subscribes under its default
+//! names, as `contracts.csv` lists it. It counts where the bag names the node and has the topic with that type.
 //!
 //! A row with source files is for nodes whose log records come from one of them, by its name or, if the row names none,
 //! whatever they are called; a node of that name that logs from other files only is another program.
@@ -19,7 +19,7 @@ use crate::evidence::proof::{Conclusions, ElementKey};
 
 const TABLE: &str = include_str!("contracts.csv");
 
-/// Keeps the file that a node logs from.
+/// Keeps the source file that a node logs from.
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
@@ -38,7 +38,7 @@ pub(crate) fn read(
 struct Contract {
     /// The node's own name, without a namespace; empty for any.
     node: String,
-    /// The source files that it logs from; none if that is not known.
+    /// The source files that it logs from; empty if not known.
     files: Vec<String>,
     /// The version of ROS, `1` or `2`; empty for either.
     ros: String,
@@ -46,16 +46,16 @@ struct Contract {
     /// As a node names it: `scan` in its namespace, `~/map` below its name, `/tf` for all.
     topic: String,
     kind: String,
-    /// Whether nobody else publishes this type.
+    /// Whether no other program publishes this type.
     owns: bool,
     package: String,
-    /// Where the row stands in the table, 1...
+    /// The line of the row in the table, ≥ 1.
     line: usize,
-    /// The address of the code that says so.
+    /// The address of the code that shows it.
     says: String,
 }
 
-/// The rows of the table; what is no row is left out.
+/// The rows of the table; malformed rows are left out.
 fn contracts() -> Vec<Contract> {
     let rows = csv::records(TABLE).unwrap_or_default();
     rows.into_iter()
@@ -117,7 +117,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// Draws the publishers of a topic, unless there would be more than the bag says there were.
+/// Adds the publishers of a topic, unless there would be more than the bag counts.
 fn publish(source: SourceId, known: &mut Conclusions<'_>, topic: Name, nodes: &[(Name, Contract)]) {
     let all: BTreeSet<Name> = known
         .publishers(topic)
@@ -151,13 +151,13 @@ fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
 pub(crate) struct Owners(Vec<Contract>);
 
 impl Owners {
-    /// As the table tells.
+    /// Reads the table.
     pub(crate) fn new() -> Self {
         Self(contracts().into_iter().filter(|c| c.owns).collect())
     }
 
-    /// The node that publishes messages of this type, as it is called by default: in the namespace in which it would
-    /// publish `topic`.
+    /// The default name of the node that publishes messages of this type: in the namespace in which it would publish
+    /// `topic`.
     pub(crate) fn node(&self, kind: &str, topic: &str) -> Option<String> {
         let row = self.0.iter().find(|c| c.kind == kind)?;
         let space = topic.strip_suffix(row.topic.as_str());
@@ -180,7 +180,7 @@ fn files(known: &Conclusions<'_>) -> BTreeMap<Name, BTreeSet<Arc<str>>> {
     files
 }
 
-/// Whether a row is about a node of this name that logs from these files.
+/// Whether a row applies to a node of this name that logs from these files.
 fn is_meant(contract: &Contract, node: &str, files: Option<&BTreeSet<Arc<str>>>) -> bool {
     let own = |files: &BTreeSet<Arc<str>>| contract.files.iter().any(|f| files.contains(&**f));
     match (contract.node.is_empty(), contract.files.is_empty()) {
@@ -190,7 +190,7 @@ fn is_meant(contract: &Contract, node: &str, files: Option<&BTreeSet<Arc<str>>>)
     }
 }
 
-/// A topic's full name as a node means it by default.
+/// A topic's full name in the default configuration of a node.
 fn resolved(topic: &str, node: &str) -> String {
     match topic.strip_prefix("~/") {
         Some(private) => format!("{node}/{private}"),

@@ -22,7 +22,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
     ],
 };
 
-/// The same in ROS 2.
+/// `diagnostic_msgs/msg/DiagnosticArray` of ROS 2.
 pub(crate) const SHAPE2: MessageLayout = MessageLayout {
     md5: "",
     encoding: Encoding::Cdr,
@@ -73,7 +73,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// The node in the name of a status, without its first slash; `None` if what stands before the colon is no name.
+/// The node in the name of a status, without its first slash; `None` if the text before the colon is not a name.
 fn node(name: &str) -> Option<&str> {
     let (node, _) = name.split_once(": ")?;
     let node = node.trim_start_matches('/');
@@ -84,7 +84,7 @@ fn node(name: &str) -> Option<&str> {
     node.split('/').all(part).then_some(node)
 }
 
-/// Names in statuses count where the header does not tell who publishes them.
+/// Adds publishers by the names in statuses, where the header does not tell the publisher.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let told = |topic| {
         let mut of = known.streams.iter().filter(|s| s.topic == topic);

@@ -14,7 +14,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
     fields: &[],
 };
 
-/// A node as its participant tells: namespace and name.
+/// The nodes of a participant: namespace and name.
 type ParticipantNodes<'a> = Vec<(&'a str, &'a str)>;
 
 pub(crate) fn read(

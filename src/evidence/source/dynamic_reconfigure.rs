@@ -37,12 +37,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// Whether a topic of `node` that `caller` publishes tells of a nodelet, not of a part of the caller.
+/// Whether a topic of `node` that `caller` publishes shows a nodelet, not a part of the caller.
 fn is_nodelet(caller: &str, node: &str) -> bool {
     caller != node && !node.starts_with(&format!("{caller}/"))
 }
 
-/// A node whose topic comes from nobody known publishes it itself.
+/// Adds the publication of a node whose topic has no known publisher.
 fn own(source: SourceId, known: &mut Conclusions<'_>, node: Name, topic: Name) {
     for (at, stream) in known.streams.iter().enumerate() {
         if stream.topic == topic {

@@ -1,5 +1,5 @@
-//! Log texts that repeat a recorded message (`Publishing: 'Hello 3'`, `I heard: [Hello 3]`): the node that logs publishes
-//! or subscribes that topic, by its own words and by who was first.
+//! Log texts that repeat a recorded message (`Publishing: 'Hello 3'`, `I heard: [Hello 3]`): the node that logs
+//! publishes or subscribes that topic, by its own words and by the order of text and message.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -13,25 +13,25 @@ use crate::evidence::message::log::LogRecord;
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 use crate::evidence::texts::{LoggedText, ShownValue};
 
-/// Fewer different values than this are chance; numbers are more often equal than words.
+/// The fewest different values that are not chance; numbers are more often equal than words.
 const FEWEST: usize = 3;
 const FEWEST_NUMBERS: usize = 5;
-/// A text and the message that it repeats lie no further apart.
+/// The longest time between a text and the message that it repeats, in nanoseconds.
 const NEAR_NS: i64 = 1_000_000_000;
 const NEAR_NUMBERS_NS: i64 = 200_000_000;
-/// Of a hundred texts of one form so many must repeat a message.
+/// The share, in per cent, of the texts of one form that must repeat a message.
 const SHARE: usize = 80;
-/// Shorter words are in too many texts.
+/// The shortest word that counts, in bytes; shorter ones are in too many texts.
 const SHORTEST: usize = 3;
-/// Payloads longer than this hold no text that somebody logs.
+/// The longest payload that is searched, in bytes; longer ones hold no text that nodes log.
 const LONGEST: usize = 1024;
-/// Of one message no more values than this are kept.
+/// The most values that are kept of one message.
 const MOST_VALUES: usize = 4;
-/// Forms of texts that are looked at more closely.
+/// The most forms of texts that are examined closely.
 const MOST_FORMS: usize = 4096;
-/// Forms of texts that are kept at all.
+/// The most forms of texts that are kept.
 const MOST_KEPT: usize = 1 << 14;
-/// Messages compared with one text.
+/// The most messages that are compared with one text.
 const MOST_NEAR: usize = 64;
 
 /// Keeps the text of a log record.
@@ -65,7 +65,8 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, schema: &MessageSchema, payloa
     }
 }
 
-/// How to take the messages of a connection apart; `None` for those that hold no words or numbers of their own.
+/// The schema for taking the messages of a connection apart; `None` for those that hold no words or numbers of their
+/// own.
 pub(crate) fn schema(type_name: &str, definition: Option<&str>) -> Option<MessageSchema> {
     let plain = type_name.replacen("/msg/", "/", 1);
     if [
@@ -113,7 +114,7 @@ fn collect(value: &MessageValue, into: &mut Vec<String>) {
 struct Echo {
     values: BTreeSet<Box<str>>,
     texts: BTreeSet<(Stamp, Box<str>)>,
-    /// How often the text came before the message.
+    /// The number of texts that came before their message.
     first: usize,
 }
 
@@ -154,7 +155,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// Everything that could be an echo.
+/// Every possible echo.
 fn echoes(
     known: &Conclusions<'_>,
     said: &[LoggedText],
@@ -195,7 +196,7 @@ fn echoes(
     echoes
 }
 
-/// Where a value stands in a text on its own, not inside a longer word or number.
+/// The place of a value in a text as a word of its own, not inside a longer word or number.
 fn place(text: &str, value: &str) -> Option<Range<usize>> {
     let start = text.find(value)?;
     let end = start + value.len();
@@ -232,7 +233,7 @@ fn is_strong(echo: &Echo, before: &str, after: &str, by_node: &[&str]) -> bool {
     echo.texts.len() * 100 >= form.count() * SHARE
 }
 
-/// What a text says of itself: whether it tells of a message sent, or received.
+/// Whether the words of a text speak of a message sent (`true`) or received (`false`); `None` if of neither or both.
 fn verb(before: &str, after: &str) -> Option<bool> {
     let text = format!("{before} {after}").to_lowercase();
     let has = |words: &[&str]| words.iter().any(|word| text.contains(word));
@@ -241,7 +242,7 @@ fn verb(before: &str, after: &str) -> Option<bool> {
     (sent != received).then_some(sent)
 }
 
-/// The edge that an echo tells of: by the publishers known, else by the verb, else by who was first.
+/// The edge that an echo shows: by the publishers known, else by the verb, else by the order.
 fn end(
     known: &Conclusions<'_>,
     node: Name,

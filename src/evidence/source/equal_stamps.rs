@@ -1,8 +1,8 @@
 //! Data flow, when asked for: a node that publishes messages whose header stamps equal those of an input just before,
 //! again and again, subscribes that input.
 //!
-//! Fails where nodes stamp their output anew, and where sources are triggered together. Where two inputs could be meant
-//! and nothing tells them apart, nothing is said.
+//! Fails where nodes stamp their output anew, and where sources are triggered together. Where two inputs are possible
+//! and nothing tells them apart, no claim is made.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,25 +16,25 @@ use crate::evidence::proof::{Conclusions, ElementKey};
 use crate::evidence::spread::Spread;
 use crate::evidence::times::Timed;
 
-/// Bytes from a payload's start to the end of its first header's stamp, in either encoding, be it behind the length of a
-/// list.
+/// The number of bytes from a payload's start to the end of its first header's stamp, in either encoding, possibly
+/// behind the length of a list.
 pub(crate) const HEAD: usize = 16;
 
-/// Fewer equal stamps than this are chance.
+/// The fewest equal stamps that are not chance.
 const FEWEST: u64 = 10;
-/// Of a hundred messages so many must carry the input's stamp.
+/// The share, in per cent, of messages that must carry the input's stamp.
 const SHARE: u64 = 60;
-/// Of a hundred pairs with equal stamps so many must have the input first.
+/// The share, in per cent, of pairs with equal stamps that must have the input first.
 const ORDERED: u64 = 95;
-/// Inputs with so many of a hundred matches of the best one are as good as it.
+/// The share, in per cent, of the best input's matches from which on an input is as good as it.
 const AS_GOOD: u64 = 97;
-/// More streams than this with one stamp are a clock, not a flow.
+/// The most streams with one stamp; more are a clock, not a flow.
 const MOST_AT_ONCE: usize = 32;
-/// Log times are kept in these units, modulo 2^32.
+/// The unit in which log times are kept, in nanoseconds, modulo 2^32.
 const UNIT_NS: i64 = 10_000;
-/// The longest a node takes to answer, in units (1 s).
+/// The longest time of a node to answer, in units (1 s).
 const ANSWER: i32 = 100_000;
-/// Log records carry the stamps of what they are about.
+/// Log topics, which are left out: log records carry the stamps of the messages they are about.
 const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 /// Lists whose first element begins with a header.
 const LISTS: [&str; 3] = [
@@ -43,7 +43,7 @@ const LISTS: [&str; 3] = [
     "visualization_msgs/MarkerArray",
 ];
 
-/// Whether a connection's messages begin with a header, or with a list of what does, as far as the bag tells.
+/// Whether a connection's messages begin with a header, or with a list of such elements, as far as the bag tells.
 pub(crate) fn is_stamped(connection: &Connection) -> bool {
     if LOGS.contains(&connection.topic.as_str()) {
         return false;
@@ -91,13 +91,13 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, first_bytes: &[u8]) {
     }
 }
 
-/// What equal stamps say about two flows.
+/// The equal stamps of two flows.
 #[derive(Clone, Copy, Debug, Default)]
 struct StampPair {
     equal: u64,
-    /// How often the input came first, and not long before.
+    /// The number of times that the input came first, and not long before.
     before: u64,
-    /// How long before, in seconds.
+    /// The time by which it came first, in seconds.
     lag: Spread,
 }
 
@@ -105,14 +105,14 @@ struct StampPair {
 #[derive(Clone, Debug)]
 struct StampFlow {
     topic: Name,
-    /// Who sends it, if that is known: the nodes, and the role they share.
+    /// The nodes that send it, if known, and the role they share.
     nodes: Vec<Name>,
     role: String,
     kind: String,
     messages: u64,
 }
 
-/// All flows with what their stamps have in common.
+/// All flows with their equal stamps.
 struct Flows {
     all: Vec<StampFlow>,
     /// By output, then input.
@@ -146,7 +146,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// The flow that an output answers, if only one can be meant.
+/// The flow that an output answers, if only one is possible.
 fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize> {
     let flow = &flows.all[output];
     let own = flows.pairs.range((output, 0)..=(output, usize::MAX));
@@ -177,8 +177,8 @@ fn input(known: &Conclusions<'_>, flows: &Flows, output: usize) -> Option<usize>
     best.iter().find(clear).map(|(at, _)| *at)
 }
 
-/// Of flows that one publisher sends with one stamp, the one that is meant: of the output's type, else the only one that
-/// is no `CameraInfo`; `None` if that cannot be told.
+/// The input among flows that one publisher sends with one stamp: the one of the output's type, else the only one that
+/// is not a `CameraInfo`; `None` if that cannot be told.
 fn without_siblings(
     flows: &Flows,
     output: &StampFlow,

@@ -1,4 +1,4 @@
-//! What roscpp logs about its connections: begin and end of subscribers (DEBUG), clients of another type, its own
+//! Log texts of roscpp about its connections: begin and end of subscribers (DEBUG), clients of another type, its own
 //! subscriptions; and the recorder's `Subscribing to`, which dates the moment a topic appeared.
 
 use super::SourceContext;
@@ -42,16 +42,16 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// A subscription that a text tells of.
+/// A subscription in a log text.
 #[derive(Debug, PartialEq, Eq)]
 struct ToldSubscription<'a> {
-    /// Whose; `None`: the one who logs.
+    /// The subscriber; `None`: the node that logs.
     node: Option<&'a str>,
     topic: &'a str,
     how: How,
 }
 
-/// What becomes of a subscription.
+/// The change of a subscription.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum How {
     Begins,
@@ -60,7 +60,7 @@ enum How {
     Ends,
 }
 
-/// The subscription that a text of roscpp tells of.
+/// The subscription in a log text of roscpp.
 fn link(text: &str) -> Option<ToldSubscription<'_>> {
     let between = |from: &str, to: &str| Some(text.split_once(from)?.1.split_once(to)?.0);
     let caller = || between("callerid=[", "]");

@@ -28,7 +28,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// What stands before a topic, what behind it, and whether the speaker publishes it.
+/// The text before a topic, the text behind it, and whether the speaker publishes it.
 const FORMS: &[(&str, &str, bool)] = &[
     // rclcpp and rclpy: the other end is new, so the speaker has this one.
     (
@@ -81,7 +81,7 @@ fn named(text: &str) -> Option<(bool, &str)> {
     (!topic.is_empty() && topic.chars().all(is_name)).then_some((*publishes, topic))
 }
 
-/// Only topics of the bag count: a text may mean a device or a file.
+/// Adds edges only for topics of the bag: a text may mean a device or a file.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (fact, signs, ends) in known.claims(source) {
         let (logger, topic, publishes) = match fact.claim {
@@ -118,7 +118,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// A topic's full name as a node means it.
+/// A topic's full name, from the form in a node's log text.
 fn resolved(topic: &str, node: &str) -> String {
     let space = node.rsplit_once('/').map_or("", |(space, _)| space);
     match topic.strip_prefix('~') {

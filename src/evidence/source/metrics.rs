@@ -47,7 +47,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// The source names itself without its namespace.
+/// Adds the publications of the nodes named in metrics, whose names lack the namespace.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for (fact, signs, ends) in known.claims(source) {
         if let Claim::Reports(node, topic) = fact.claim {

@@ -1,5 +1,5 @@
-//! Messages passed on byte by byte (relay, throttle, mux, drop, republish): whoever publishes the copies subscribes the
-//! topic that had them first.
+//! Messages passed on byte by byte (relay, throttle, mux, drop, republish): the node that publishes the copies
+//! subscribes the topic that had them first.
 //!
 //! Compared are length and the first bytes, by a hash; a content that comes again in its own topic (an empty message, a
 //! constant) says nothing and is counted once.
@@ -14,23 +14,23 @@ use crate::evidence::claim::{Name, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey};
 use crate::evidence::spread::Spread;
 
-/// Fewer equal messages than this are chance.
+/// The fewest equal messages that are not chance.
 const FEWEST: u64 = 10;
-/// Of a hundred different messages of an output so many must be copies.
+/// The share, in per cent, of an output's different messages that must be copies.
 const SHARE: u64 = 90;
-/// How many times as often the input must come first as the output.
+/// The ratio of how often the input comes first to how often the output does, at least.
 const FIRST: u64 = 3;
-/// A content that more flows have at once is a constant.
+/// The most flows that have a content at once; with more it is a constant.
 const MOST_AT_ONCE: usize = 32;
-/// The longest that a message takes to be passed on.
+/// The longest time that a message takes to be passed on, in nanoseconds.
 const RECENT_NS: i64 = 2_000_000_000;
-/// Log records are passed on by a node that is known anyway.
+/// Log topics, which are left out: log records are passed on by a known node.
 const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 
-/// Bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
+/// The number of bytes of a payload that are compared: a header's stamp and the first lines of an image are among them.
 pub(crate) const HEAD: usize = 16 << 10;
 
-/// Keeps the hash of a payload of `size` bytes that begins so. An empty one says nothing.
+/// Keeps the hash of a payload of `size` bytes with this beginning. An empty one says nothing.
 pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
     if beginning.is_empty() {
         return;
@@ -45,22 +45,22 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
     }
 }
 
-/// One topic by one publisher, over all bags.
+/// A flow: a topic and its publisher, over all bags.
 type PayloadFlow = (Name, Option<Name>);
 
-/// What the messages of two flows have in common.
+/// The equal messages of two flows.
 #[derive(Clone, Copy, Debug, Default)]
 struct PayloadPair {
-    /// How often the one had it before the other.
+    /// The number of messages that the one had before the other.
     before: u64,
     lag: Spread,
 }
 
-/// What was found by going through all messages once.
+/// The result of going through all messages once.
 #[derive(Debug, Default)]
 struct Matches {
     pairs: BTreeMap<(usize, usize), PayloadPair>,
-    /// By flow: how many of its different messages were seen before in exactly these other flows.
+    /// By flow: the number of its different messages that were seen before in exactly these other flows.
     origins: BTreeMap<usize, BTreeMap<Vec<usize>, u64>>,
     distinct: BTreeMap<usize, u64>,
 }
@@ -110,7 +110,7 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     let kept = known.facts.payloads.clone();
     let kept = kept.into_iter().filter(|(at, _)| {
         let stream = &known.streams[*at];
-        // What is the only topic of its type is no copy of another.
+        // The only topic of its type is not a copy of another.
         let alike = topics.get(&known.kind(stream.topic));
         !LOGS.contains(&stream.connection.topic.as_str()) && alike.is_some_and(|all| all.len() > 1)
     });
@@ -141,13 +141,13 @@ fn matches(known: &mut Conclusions<'_>) -> (Vec<PayloadFlow>, Matches) {
     (flows, walk.found)
 }
 
-/// The way through all messages.
+/// The pass over all messages.
 #[derive(Debug, Default)]
 struct PayloadWalk {
     found: Matches,
-    /// Contents each flow had so far.
+    /// The contents that each flow had so far.
     seen: HashSet<(usize, u32)>,
-    /// Who had a content lately, and when.
+    /// The flows that had a content lately, with the times.
     recent: HashMap<u32, Vec<(Stamp, usize)>>,
     queue: VecDeque<(Stamp, u32)>,
 }
@@ -219,7 +219,7 @@ fn inputs(
     from.into_iter().filter(is_input).collect()
 }
 
-/// How many different messages of an output one of these inputs had before.
+/// The number of different messages of an output that one of these inputs had before.
 fn copied(matches: &Matches, output: usize, inputs: &[usize]) -> u64 {
     let origins = matches.origins.get(&output).into_iter().flatten();
     origins

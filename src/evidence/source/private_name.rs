@@ -1,4 +1,5 @@
-//! Private names: a topic below a node's own full name is that node's, so it publishes it where nobody else is known to.
+//! Private names: a topic below a node's own full name belongs to the node, so it publishes it where no other publisher
+//! is known.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -56,12 +57,12 @@ fn is_hidden(topic: &str) -> bool {
 /// Nodes by name.
 type NodesByName = BTreeMap<Arc<str>, Name>;
 
-/// The names that other nodes lie below.
+/// The names that are namespaces of other nodes.
 fn spaces(nodes: &NodesByName) -> BTreeSet<&str> {
     nodes.keys().flat_map(|node| above(node)).collect()
 }
 
-/// All that a name lies below, the nearest first, without the root.
+/// The namespaces of a name, the nearest first, without the root.
 fn above(name: &str) -> impl Iterator<Item = &str> {
     let slashes = name.rmatch_indices('/');
     slashes

@@ -1,5 +1,5 @@
 //! Quality of service that ROS 2 recordings keep per topic (`offered_qos_profiles`): publishers at record time, and
-//! whether messages outlive their moment (`transient_local`).
+//! whether messages stay valid after their time (`transient_local`).
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ use crate::base::yaml;
 use crate::evidence::claim::{Claim, Degree, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
-/// What one publisher offers.
+/// The quality of service that one publisher offers.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Offer {
     reliability: &'static str,
@@ -16,7 +16,7 @@ struct Offer {
     history: String,
 }
 
-/// Whether a topic's messages are kept for those who come late.
+/// Whether a topic's messages are kept for late subscribers.
 pub(crate) fn is_transient_local(text: &str) -> bool {
     let offers = offers(text);
     !offers.is_empty() && offers.iter().all(|o| o.durability == "transient_local")
@@ -54,7 +54,7 @@ pub(crate) fn announced(heard: &mut SourceContext<'_>) {
     }
 }
 
-/// A topic with an offer is declared, even if it never carries a message.
+/// Declares every topic with an offer, even without messages.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     for fact in known.facts.list.clone() {
         if let Claim::Quality(topic, _) = fact.claim
@@ -70,7 +70,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// The offers in a text of YAML; none if it is no list of them.
+/// The offers in a text of YAML; empty if it is not a list of them.
 fn offers(text: &str) -> Vec<Offer> {
     match yaml::parse(text) {
         Ok(Value::Array(list)) => list.iter().filter_map(offer).collect(),

@@ -1,5 +1,5 @@
 //! `qos_overrides.<topic>.publisher|subscription.<policy>` in parameter events of ROS 2: rclcpp declares these
-//! parameters when it makes that very publisher or subscription.
+//! parameters when it makes that publisher or subscription.
 
 use std::collections::BTreeSet;
 

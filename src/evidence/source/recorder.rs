@@ -1,4 +1,4 @@
-//! The recorder subscribes everything recorded; views hide it unless asked.
+//! The recorder subscribes every recorded topic; views hide it unless asked.
 
 use std::collections::BTreeSet;
 
@@ -9,10 +9,10 @@ use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::log::LogRecord;
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
 
-/// Where the recorder's source lies, whatever the folder above: of `rosbag` and of `rosbag2_transport`.
+/// The ends of the recorder's source paths: of `rosbag` and of `rosbag2_transport`.
 const FILES: [&str; 2] = ["/src/recorder.cpp", "/rosbag2_transport/recorder.cpp"];
 
-/// A recorder is known by the file its log records come from, whatever it is called.
+/// Recognises a recorder by the file of its log records, whatever its name.
 pub(crate) fn read(
     heard: &mut SourceContext<'_>,
     payload: &mut PayloadCursor<'_>,
@@ -28,7 +28,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// With one recorder among the nodes it is the one that wrote the bag; several cannot be told apart.
+/// Adds the subscriptions of the recorder: a single one among the nodes wrote the bag; several cannot be told apart.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let told = known.facts.list.iter().filter(|fact| fact.source == source);
     let told = told.filter_map(|fact| match fact.claim {

@@ -1,7 +1,7 @@
 //! `/rosgraph` of graph-monitor: the whole graph of ROS 2 over time, each message a snapshot.
 //!
-//! Its definition has moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`), so a message is taken apart by
-//! the definition in the bag, or by the one of ours that it fits exactly.
+//! Its definition has moved and grown (`rosgraph_monitor_msgs`, then `rosgraph_msgs`), so a message is parsed by the
+//! definition in the bag, or by the built-in one that it fits exactly.
 
 use super::SourceContext;
 use crate::bag::Encoding;
@@ -158,7 +158,7 @@ fn endpoint(
     (heard.name(end.text("name")), kind)
 }
 
-/// The graph by the first definition that uses the payload up exactly.
+/// The graph, parsed by the first definition that uses the payload up exactly.
 fn guess(payload: &mut PayloadCursor<'_>) -> cursor::PayloadResult<MessageValue> {
     let fits = |fields: &&[(&str, &str)]| {
         MessageSchema::of_fields(fields)

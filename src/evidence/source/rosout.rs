@@ -1,6 +1,6 @@
 //! Log records of ROS 1: a node is alive, and the topics it names as its own.
 //!
-//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy tells itself by the `.py` of
+//! roscpp lists the topics that the node publishes, rospy also those it subscribes; rospy is recognised by the `.py` of
 //! the file that logged.
 
 use std::collections::BTreeSet;
@@ -70,7 +70,7 @@ pub(crate) fn read(
 }
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
-/// subscription. If nobody is known to publish it, a recorder of all topics knows whether somebody advertises it.
+/// subscription. If no publisher is known, a recorder of all topics shows whether there is one.
 pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     let advertised = advertised(known);
     for (fact, signs, ends) in known.claims(source) {
@@ -103,13 +103,13 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
     }
 }
 
-/// Whether headers tell all publishers of a topic.
+/// Whether headers name all publishers of a topic.
 fn is_told(known: &Conclusions<'_>, topic: Name) -> bool {
     let mut of_topic = known.streams.iter().filter(|s| s.topic == topic);
     of_topic.all(|s| s.publisher.is_some() && s.trust == Reliability::Whole)
 }
 
-/// Whether a node that differs in an anonymous suffix only publishes a topic whose headers do not tell all publishers.
+/// Whether a node that differs only in an anonymous suffix publishes a topic whose headers do not name all publishers.
 fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
     let own = known.text(node);
     let base = role(&own);
@@ -119,8 +119,8 @@ fn has_twin(known: &Conclusions<'_>, node: Name, topic: Name) -> bool {
         && publishers.any(|p| role(&known.text(p)) == base)
 }
 
-/// Whether a node that names `/tf` as its own sends it rather than listens: a listener of tf2 names `/tf_static` too. Asked
-/// only where headers do not tell all publishers.
+/// Whether a node that names `/tf` as its own sends it rather than listens: a listener of tf2 names `/tf_static` too.
+/// Used only where headers do not name all publishers.
 fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool {
     let told = is_told(known, topic);
     let text = known.text(topic);
@@ -139,7 +139,7 @@ fn is_broadcaster(known: &mut Conclusions<'_>, node: Name, topic: Name) -> bool 
     !told && !twin.is_some_and(names)
 }
 
-/// Every topic that a recorder of all topics has seen advertised; `None` if none tells. Such a recorder goes on to
+/// Every topic that a recorder of all topics has seen advertised; `None` without such a recorder. It goes on to
 /// subscribe long after its start; one that was given names does not.
 fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
     let mut topics: BTreeSet<_> = known.streams.iter().map(|s| s.topic).collect();
@@ -157,5 +157,5 @@ fn advertised(known: &mut Conclusions<'_>) -> Option<BTreeSet<Name>> {
     all.then_some(topics)
 }
 
-/// A recorder subscribes the topics that it was told by name sooner than this.
+/// The time within which a recorder subscribes the topics that it was given by name, in nanoseconds.
 const LATE_NS: i64 = 5_000_000_000;

@@ -1,4 +1,4 @@
-//! Log records of ROS 2: a node is alive. Dots stand for slashes; the loggers of a node's parts are folded into it.
+//! Log records of ROS 2: a node is alive. Dots stand for slashes; the loggers of a node's parts count as the node.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub(crate) fn read(
     Ok(())
 }
 
-/// Parts of ROS 2 itself that log below the name of the node they work for.
+/// Parts of ROS 2 itself that log below the name of their node.
 const PARTS: [&str; 5] = [
     "rclcpp",
     "rcl",

@@ -1,4 +1,5 @@
-//! Service introspection (`<service>/_service_event`): requests and replies of a service, and how many clients it has.
+//! Service introspection (`<service>/_service_event`): requests and replies of a service, and the number of its
+//! clients.
 
 use super::SourceContext;
 use crate::bag::Encoding;
@@ -6,7 +7,7 @@ use crate::evidence::claim::{Claim, Degree};
 use crate::evidence::message::cursor::{self, PayloadCursor};
 use crate::evidence::message::definition::MessageLayout;
 
-/// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, whatever follows.
+/// `<service type>_Event`: it begins with `service_msgs/msg/ServiceEventInfo`, with any fields after it.
 pub(crate) const SHAPE: MessageLayout = MessageLayout {
     type_name: "*_Event",
     md5: "",

@@ -1,14 +1,14 @@
-//! Sister namespaces: a node whose twin in another namespace publishes the same topics there, and is known to subscribe
-//! one, subscribes it too.
+//! Sister namespaces: if a node's twin in another namespace publishes the same topics there and is known to subscribe
+//! one, the node subscribes it too.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::evidence::claim::{Name, SourceId};
 use crate::evidence::proof::{Conclusions, ElementKey};
 
-/// Twins publish at least so many topics of their namespace: one alone may be chance.
+/// The fewest topics of their namespace that twins publish: one alone may be chance.
 const FEWEST: usize = 2;
-/// More twins than this are not compared one by one.
+/// The most twins that are compared one by one.
 const MOST: usize = 200;
 
 /// A node with its namespace, and the topics it publishes inside it.
@@ -71,7 +71,7 @@ fn inside(topic: &str, space: &str) -> Option<String> {
     rest.starts_with('/').then(|| rest.to_owned())
 }
 
-/// What `from` subscribes, `to` subscribes as well, if the bag has that topic.
+/// Adds for `to` the subscriptions of `from`, if the bag has the topics.
 fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
     let subscribed = known.subscriptions().filter(|(_, node)| *node == from.node);
     let topics: Vec<Name> = subscribed.map(|(topic, _)| topic).collect();

@@ -1,4 +1,4 @@
-//! `/statistics` of ROS 1: who publishes a topic to whom, counted by the middleware itself.
+//! `/statistics` of ROS 1: the publisher and the subscriber of a topic, counted by the middleware itself.
 
 use super::SourceContext;
 use crate::bag::Encoding;

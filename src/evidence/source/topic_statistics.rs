@@ -1,4 +1,5 @@
-//! `/topic_statistics` of graph-monitor: which node publishes or receives a topic of ROS 2, measured in its middleware.
+//! `/topic_statistics` of graph-monitor: the publishers and subscribers of a topic of ROS 2, measured in its
+//! middleware.
 
 use super::SourceContext;
 use crate::bag::Encoding;
@@ -23,7 +24,7 @@ pub(crate) const SHAPE: MessageLayout = MessageLayout {
     ],
 };
 
-/// The kind of statistic that a publisher takes; all others are a subscriber's.
+/// The kind of statistic that a publisher measures; all others are a subscriber's.
 const PUBLISHED_PERIOD: u8 = 0;
 
 pub(crate) fn read(

@@ -10,9 +10,9 @@ use crate::base::time::Stamp;
 /// One time out of several sequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Timed {
-    /// When.
+    /// The time.
     pub time: Stamp,
-    /// The place of its sequence among those asked for.
+    /// The place of the sequence among those asked for.
     pub series: usize,
     /// The payload's bytes; 0 where not known ([`Stamps::sized`]).
     pub size: u32,
@@ -27,7 +27,7 @@ struct OpenBlock {
 }
 
 impl Stamps {
-    /// Gives all times of some sequences to `each`, sorted by (time, place of the sequence, size).
+    /// Passes all times of some sequences to `each`, sorted by (time, place of the sequence, size).
     ///
     /// # Errors
     /// If the unnamed file cannot be read.
@@ -50,7 +50,7 @@ impl Stamps {
         }
     }
 
-    /// The blocks of these sequences with the places of those, the earliest last.
+    /// The blocks of these sequences with the places of the sequences, the earliest last.
     fn blocks(&self, ids: &[SeriesId]) -> Vec<(usize, StampBlock)> {
         let of = |id: &SeriesId| self.get(*id).map_or(&[][..], |s| &s.blocks);
         let mut all: Vec<_> = ids
@@ -72,7 +72,7 @@ fn enter(series: usize, run: Vec<(Stamp, u32)>) -> Option<OpenBlock> {
     })
 }
 
-/// Gives away the earliest block's stamps as long as no other block, open or waiting, comes before them.
+/// Passes on the earliest block's stamps as long as no other block, open or waiting, comes before them.
 fn drain(
     open: &mut BinaryHeap<Reverse<OpenBlock>>,
     waiting: Option<Stamp>,

@@ -37,9 +37,9 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
             return Err(wrong(line, "the name is empty".to_owned()));
         }
         let list =
-            |cell| python_list(cell).ok_or_else(|| wrong(line, format!("`{cell}` is no list")));
+            |cell| python_list(cell).ok_or_else(|| wrong(line, format!("`{cell}` is not a list")));
         let time = |cell| {
-            seconds(cell).ok_or_else(|| wrong(line, format!("`{cell}` is no number of seconds")))
+            seconds(cell).ok_or_else(|| wrong(line, format!("`{cell}` is not a number of seconds")))
         };
         let (from_ns, to_ns) = (time(start)?, time(end)?);
         if let (Some(from), Some(to)) = (from_ns, to_ns)
@@ -71,7 +71,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     Ok(topology)
 }
 
-/// Seconds as nanoseconds; nothing where the cell is empty.
+/// Seconds as nanoseconds; `Some(None)` for an empty cell.
 #[expect(clippy::option_option, reason = "an empty cell is no error")]
 fn seconds(cell: &str) -> Option<Option<i64>> {
     if ["", "nan", "None"].contains(&cell) {
@@ -152,8 +152,8 @@ mod tests {
     #[test]
     fn a_bad_line_is_named() {
         for (row, told) in [
-            ("a,[/x],,,", "is no list"),
-            ("a,,,soon,", "no number"),
+            ("a,[/x],,,", "is not a list"),
+            ("a,,,soon,", "not a number"),
             (",,,,", "empty"),
             ("a,,,5,4", "before"),
         ] {

@@ -14,11 +14,11 @@ const HINT: &str = "save it from rqt_graph with `Save as DOT`";
 struct DotToken {
     line: usize,
     text: String,
-    /// Whether it is a name or string, not a sign.
+    /// Whether it is a name or string, not a punctuation mark.
     word: bool,
 }
 
-/// What an identifier stands for.
+/// The meaning of an identifier.
 enum Thing {
     Node(String),
     Topic(String),
@@ -78,7 +78,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     Ok(topology)
 }
 
-/// Things by identifier, and edges.
+/// Identifiers with their meanings, and edges.
 type Statements = (
     BTreeMap<String, (usize, Thing)>,
     Vec<(usize, String, String, Attributes)>,
@@ -177,7 +177,7 @@ fn decoded(id: &str) -> String {
     name.replace("__", "/")
 }
 
-/// The words and signs of a text; the line of a string that never ends as an error.
+/// The words and punctuation marks of a text; the line of a string that never ends as an error.
 fn tokens(text: &str) -> Result<Vec<DotToken>, usize> {
     let mut tokens = Vec::new();
     let mut line = 1;
@@ -213,7 +213,7 @@ fn tokens(text: &str) -> Result<Vec<DotToken>, usize> {
     Ok(tokens)
 }
 
-/// A string in quotes: its length in the text, and what it says.
+/// A string in quotes: its length in the text, and its value.
 fn quoted(text: &str) -> Option<(usize, String)> {
     let mut said = String::new();
     let mut escaped = false;

@@ -1,4 +1,4 @@
-//! Launch files of ROS 1 and ROS 2: which nodes they would start, in which namespace, with which topics remapped.
+//! Launch files of ROS 1 and ROS 2: the nodes they would start, with their namespaces and remapped topics.
 //!
 //! Arguments, namespaces, conditions and includes are followed as far as that needs no execution: files of other
 //! packages are looked for beside the file. See <http://wiki.ros.org/roslaunch/XML> and the design article on static
@@ -14,48 +14,48 @@ use super::{NamedElement, Topology, TopologyEntry, place, python, resolved, unus
 use crate::base::budget::LaunchWork;
 use crate::base::error::Result;
 
-/// Files that include each other deeper than this go in circles.
+/// The deepest nesting of includes; deeper ones go in circles.
 const DEEPEST: usize = 16;
 
-/// The work of opening a file, in bytes.
+/// The cost of opening a file, in bytes of work.
 const FILE: usize = 8 << 10;
 
-/// The length that is reckoned with for a launch file of a workspace, in bytes.
+/// The assumed length of a launch file of a workspace, in bytes.
 const OWN_TEXT: usize = 10_000;
 
-/// Groups and files inside each other deeper than this are not followed.
+/// The deepest nesting of groups and files that is followed.
 const NESTED: usize = 200;
 
-/// The work of keeping one thing that a file says, in bytes.
+/// The cost of keeping one entry of a file, in bytes of work.
 const ENTRY: usize = 150;
 
 /// A node that a launch file starts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct LaunchedNode {
-    /// The package of its program.
+    /// The package of the program.
     pub(crate) package: String,
-    /// Its program: an executable, or the class of a component or nodelet.
+    /// The program: an executable, or the class of a component or nodelet.
     pub(crate) program: String,
-    /// Its name without namespace; `None` if only its program knows the name.
+    /// The name without namespace; `None` if only the program knows the name.
     pub(crate) name: Option<String>,
-    /// Its namespace without a slash at the end; empty at the root.
+    /// The namespace without a slash at the end; empty at the root.
     pub(crate) namespace: String,
-    /// Topics and what they become, as written.
+    /// Topics and their new names, as written.
     pub(crate) remaps: Vec<(String, String)>,
-    /// The line that starts it, 1..; 0 where not known.
+    /// The line that starts it, ≥ 1; 0 where not known.
     pub(crate) line: usize,
 }
 
-/// What to do with a condition that only running the file would decide.
+/// The treatment of a condition that only running the file would decide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Undecided {
-    /// What stands under it is left out, and a notice says so.
+    /// The elements under it are left out, and a notice says so.
     LeftOut,
     /// All conditions count as met: every node that the file may start is wanted.
     Taken,
 }
 
-/// What holds at a place in a file.
+/// The settings at a place in a file.
 #[derive(Clone, Debug, Default)]
 struct Scope {
     namespace: String,
@@ -63,7 +63,7 @@ struct Scope {
     remaps: Rc<Vec<(String, String)>>,
 }
 
-/// Reads a launch file with all that it includes.
+/// Reads a launch file with all its includes.
 pub(super) fn read(path: &Path, tree: &Tree) -> Result<Topology> {
     let mut reader = Launch::new(Undecided::LeftOut);
     reader.stack.extend(path.canonicalize().ok());
@@ -75,7 +75,7 @@ pub(super) fn read(path: &Path, tree: &Tree) -> Result<Topology> {
     Ok(reader.topology)
 }
 
-/// Every node that a launch file may start by itself, without what it includes, whatever its conditions say.
+/// Every node that a launch file may start by itself, without its includes, whatever its conditions say.
 pub(crate) fn nodes(path: &Path, tree: &Tree) -> Vec<LaunchedNode> {
     let mut reader = Launch::new(Undecided::Taken);
     // Includes are not followed, and nothing else can fail.
@@ -110,7 +110,7 @@ impl Launch {
         }
     }
 
-    /// The elements inside one, in order; what they change holds for those after them.
+    /// The elements inside one, in order; changes by them hold for those after them.
     fn inside(&mut self, path: &Path, tree: &Tree, scope: &mut Scope) -> Result<()> {
         if self.nested > NESTED {
             self.left_out(path, tree, "it nests too deep");
@@ -167,7 +167,7 @@ impl Launch {
         Ok(())
     }
 
-    /// An attribute with its substitutions put in; `None` if it is missing or only known when the file runs.
+    /// An attribute with its substitutions replaced; `None` if it is missing or only known when the file runs.
     fn value(&mut self, path: &Path, tree: &Tree, scope: &Scope, name: &str) -> Option<String> {
         let arguments = &scope.arguments;
         SubstitutionContext { path, arguments }.substitute(tree.get(name)?, &mut self.budget)
@@ -194,7 +194,7 @@ impl Launch {
         true
     }
 
-    /// Sets an argument. One whose value is not known is not set, so that nothing is made of it.
+    /// Sets an argument. One whose value is not known is not set, so that it stays unknown.
     fn argument(
         &mut self,
         scope: &mut Scope,
@@ -211,7 +211,7 @@ impl Launch {
         }
     }
 
-    /// Charges for what a scope must copy before it may change.
+    /// Charges for the copy of a scope that is about to change.
     fn copied(&mut self, entries: usize) {
         // Refusals are seen where texts are made.
         let _ = self.budget.spend(entries);
@@ -331,7 +331,7 @@ impl Launch {
         done
     }
 
-    /// The arguments that an include hands on.
+    /// The arguments that an include passes on.
     fn passed(&mut self, path: &Path, tree: &Tree, scope: &Scope) -> Rc<BTreeMap<String, String>> {
         let mut passed = match tree.get("pass_all_args") {
             Some(all) if is_true(all) => Rc::clone(&scope.arguments),
@@ -349,7 +349,7 @@ impl Launch {
     }
 }
 
-/// The tree of a launch file of any form; `None` for YAML that is no launch file.
+/// The tree of a launch file of any form; `None` for YAML that is not a launch file.
 pub(crate) fn tree_of(path: &Path, text: &str) -> Result<Option<Tree>> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     match ending.as_deref() {
@@ -359,7 +359,7 @@ pub(crate) fn tree_of(path: &Path, text: &str) -> Result<Option<Tree>> {
     }
 }
 
-/// The file that an include means: as it stands, or beside the including file.
+/// The file that an include names: as it stands, or beside the including file.
 fn located(path: &Path, file: &str) -> Option<PathBuf> {
     let file = Path::new(file);
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -369,7 +369,7 @@ fn located(path: &Path, file: &str) -> Option<PathBuf> {
         .flatten()
 }
 
-/// A name in a namespace; a name that begins with a slash stands for itself.
+/// A name in a namespace; a name that begins with a slash is left as it is.
 pub(crate) fn join(space: &str, name: &str) -> String {
     match name.strip_prefix('/') {
         Some(_) if name.trim_matches('/').is_empty() => String::new(),

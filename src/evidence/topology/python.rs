@@ -1,5 +1,5 @@
-//! Launch files in Python, read and never run: what `generate_launch_description` puts together becomes a tree like that
-//! of the XML form, with `$(…)` for what the launch system would fill in.
+//! Launch files in Python, read and never run: the result of `generate_launch_description` becomes a tree like that of
+//! the XML form, with `$(…)` for values that the launch system would fill in.
 
 mod action;
 mod call;
@@ -17,7 +17,7 @@ use crate::evidence::syntax::{Language, Parsed};
 use evaluator::Evaluator;
 use value::PythonValue;
 
-/// The tag of something that only running the file would tell.
+/// The tag of an element that only running the file would reveal.
 pub(super) const UNREAD: &str = "unread";
 
 const HINT: &str = "a launch file in Python defines `generate_launch_description` and returns a `LaunchDescription`";
@@ -48,8 +48,8 @@ pub(super) fn of_python(path: &Path, text: &str) -> Result<Tree> {
     }
 }
 
-/// The value of a Python expression as a text (`$(eval …)`, `PythonExpression`) in which `names` stand for texts; `None`
-/// if only running it would tell.
+/// The value of a Python expression as a text (`$(eval …)`, `PythonExpression`) in which `names` have these texts;
+/// `None` if only running it would tell.
 pub(super) fn evaluate(expression: &str, names: &BTreeMap<String, String>) -> Option<String> {
     match value(expression, names)? {
         // XML puts quotes around the whole expression.

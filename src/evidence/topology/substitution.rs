@@ -1,4 +1,4 @@
-//! Texts of launch files with their substitutions `$(…)` put in, as far as that needs no execution.
+//! Texts of launch files with their substitutions `$(…)` replaced, as far as that needs no execution.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,17 +9,18 @@ use crate::base::budget::LaunchWork;
 /// The longest text that substitutions may grow to, in bytes: longer than any path.
 pub(super) const LONGEST: usize = 64 << 10;
 
-/// Substitutions inside substitutions deeper than this are hostile.
+/// The deepest nesting of substitutions; deeper ones are hostile.
 const DEEPEST: usize = 16;
 
-/// Where a text stands: what its substitutions may refer to.
+/// The context of a text: the values that its substitutions may refer to.
 pub(super) struct SubstitutionContext<'a> {
     pub(super) path: &'a Path,
     pub(super) arguments: &'a BTreeMap<String, String>,
 }
 
 impl SubstitutionContext<'_> {
-    /// The text with everything put in; `None` if a part of it is only known when the file runs, or it grows too long.
+    /// The text with everything replaced; `None` if a part of it is only known when the file runs, or it grows too
+    /// long.
     pub(super) fn substitute(&self, text: &str, budget: &mut LaunchWork) -> Option<String> {
         self.at_depth(text, budget, 0)
     }
@@ -47,7 +48,7 @@ impl SubstitutionContext<'_> {
         Some(done)
     }
 
-    /// What one substitution stands for, the inner ones put in already.
+    /// The value of one substitution, with the inner ones replaced already.
     fn value(&self, inside: &str) -> Option<String> {
         let (verb, words) = inside
             .split_once(char::is_whitespace)
@@ -88,7 +89,7 @@ impl SubstitutionContext<'_> {
     }
 }
 
-/// Whether the text of a condition means yes, as ROS 1 and ROS 2 read it.
+/// Whether the text of a condition is true, as ROS 1 and ROS 2 read it.
 pub(super) fn is_true(text: &str) -> bool {
     ["true", "1", "yes", "on"].contains(&&*text.trim().to_lowercase())
 }
@@ -106,7 +107,7 @@ fn unquoted(text: &str) -> &str {
     inside('"').or(inside('\'')).unwrap_or(text)
 }
 
-/// Where the parenthesis that is open at the start closes.
+/// The place of the parenthesis that closes the one open at the start.
 fn closing(text: &str) -> Option<usize> {
     let mut open = 1_usize;
     text.char_indices().find_map(|(at, c)| {
@@ -119,7 +120,7 @@ fn closing(text: &str) -> Option<usize> {
     })
 }
 
-/// The folder of a package, looked for among the folders above the file and beside those; its name if not found.
+/// The folder of a package, searched among the folders above the file and beside those; its name if not found.
 fn package(path: &Path, name: &str) -> String {
     let above = path.ancestors().skip(1);
     let found = above

@@ -16,7 +16,7 @@ pub(crate) struct Tree {
     /// Attributes in order.
     pub(super) attributes: Vec<(String, String)>,
     pub(super) children: Vec<Self>,
-    /// Its line, 1..; 0 where not known.
+    /// The line, ≥ 1; 0 where not known.
     pub(super) line: usize,
 }
 
@@ -28,7 +28,7 @@ impl Tree {
     }
 }
 
-/// Elements inside elements deeper than this are hostile.
+/// The deepest nesting of elements; deeper ones are hostile.
 pub(super) const DEEPEST: usize = 64;
 const XML_HINT: &str = "a launch file begins with `<launch>`";
 const YAML_HINT: &str = "a launch file begins with `launch:` and a list";
@@ -57,7 +57,7 @@ pub(super) fn of_xml(path: &Path, text: &str) -> Result<Tree> {
 
 struct XmlLaunch<'a> {
     path: &'a Path,
-    /// Where lines end, in bytes.
+    /// The places where lines end, in bytes.
     lines: Vec<usize>,
 }
 
@@ -105,7 +105,7 @@ pub(super) fn of_yaml(path: &Path, text: &str) -> Result<Option<Tree>> {
     }))
 }
 
-/// `- node: {…}` as an element `node`; the depth is bounded by the reader of YAML.
+/// The elements of a list in YAML: `- node: {…}` is an element `node`; the depth is bounded by the reader of YAML.
 fn entities(value: &Value) -> Vec<Tree> {
     let Value::Object(map) = value else {
         return Vec::new();

@@ -26,12 +26,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Topology> {
     Ok(topology)
 }
 
-/// How many lines that begin alike are looked at for the first of them.
+/// The most lines with the same beginning that are searched for the first one.
 const MOST_ALIKE: usize = 100;
 
 struct TopologyYaml<'a> {
     path: &'a Path,
-    /// The start of every line, behind blanks, dashes and quotes, with the first line that has it, 1...
+    /// The start of every line, after blanks, dashes and quotes, with the first line that has it, ≥ 1.
     lines: BTreeMap<&'a str, usize>,
 }
 
@@ -109,7 +109,7 @@ impl<'a> TopologyYaml<'a> {
         names.ok_or_else(|| {
             self.wrong(
                 node,
-                &format!("the topics of `{node}` are no list of names"),
+                &format!("the topics of `{node}` are not a list of names"),
             )
         })
     }
@@ -125,7 +125,7 @@ impl<'a> TopologyYaml<'a> {
         )]
         let nanos = seconds.map(|s| (s * 1e9) as i64);
         nanos.map_or_else(
-            || Err(self.wrong("start", &format!("`{value}` is no number of seconds"))),
+            || Err(self.wrong("start", &format!("`{value}` is not a number of seconds"))),
             |n| Ok(Some(n)),
         )
     }

@@ -19,10 +19,12 @@ const SIGMAS: f64 = 3.0;
 pub(super) fn differences(a: &Facts<'_>, b: &Facts<'_>, rate_change: f64) -> Vec<Difference> {
     let (ours, theirs) = (nodes(a), nodes(b));
     let mut all: Vec<Difference> = presence("node", &keys(&ours), &keys(&theirs)).collect();
+    // Whether the mission that lacks a node would name it.
+    let lost = |side| all.iter().filter(|one| one.side == side).count();
+    let (in_b, in_a) = (lost(Where::First), lost(Where::Second));
+    let (in_b, in_a) = (b.names_nodes(in_b), a.names_nodes(in_a));
     for one in &mut all {
-        // Whether the mission that lacks the node would name it.
-        let lacking = if one.side == Where::First { b } else { a };
-        one.is_known = lacking.names_nodes();
+        one.is_known = if one.side == Where::First { in_b } else { in_a };
     }
     let (sent, heard) = (topics(a), topics(b));
     all.extend(presence("topic", &keys(&sent), &keys(&heard)));

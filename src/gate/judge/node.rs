@@ -61,7 +61,7 @@ impl Judge<'_> {
 
     pub(super) fn forbidden_nodes(&self, pattern: &Pattern, at: YamlPlace) -> Vec<Finding> {
         let roles = self.facts.nodes(pattern);
-        if roles.is_empty() && !self.facts.names_nodes() {
+        if roles.is_empty() && !self.names_nodes {
             return vec![self.unnamed(FindingKind::NodeForbidden, pattern.as_str(), at)];
         }
         let found = roles.into_iter().map(|(role, nodes)| {
@@ -93,7 +93,7 @@ impl Judge<'_> {
         let roles = self.facts.nodes(pattern);
         let name = pattern.as_str();
         if roles.is_empty() {
-            return match (facts.optional, self.facts.names_nodes()) {
+            return match (facts.optional, self.names_nodes) {
                 (true, _) => Vec::new(),
                 (false, true) => vec![self.missing(pattern, at)],
                 (false, false) => vec![self.unnamed(FindingKind::NodeMissing, name, at)],
@@ -115,14 +115,19 @@ impl Judge<'_> {
                 "a tool merged the senders of this bag",
                 "check the bag as it was recorded",
             )
+        } else if self.facts.is_ros1() {
+            (
+                "the connections of this bag name no senders",
+                "check the bag as it was recorded",
+            )
         } else if self
             .facts
             .roles()
             .any(|(_, nodes)| self.facts.is_sure(nodes))
         {
             (
-                "the connections of this bag name no senders",
-                "check the bag as it was recorded",
+                "this bag names few nodes, as one whose recorder came late",
+                "record /parameter_events from before the nodes start, or /rosgraph",
             )
         } else {
             (

@@ -232,7 +232,7 @@ impl Judge<'_> {
             .copied()
             .collect();
         // A node that is not there reads nothing.
-        let is_absent = roles.is_empty() && self.facts.names_nodes();
+        let is_absent = roles.is_empty() && self.names_nodes;
         if !is_absent && !self.facts.tells_subscribers(&nodes) {
             let says = format!(
                 "cannot tell whether {who} reads {name}: this bag has no evidence of subscribers"

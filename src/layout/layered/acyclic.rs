@@ -1,4 +1,4 @@
-//! Which edges to turn around so that no cycle is left.
+//! The choice of edges to turn around so that no cycle is left.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,8 +65,8 @@ pub(crate) fn by_cluster(edges: &[(usize, usize)], home: &[usize], parent: &[usi
         .collect()
 }
 
-/// What an edge leaves and enters inside the innermost cluster around both of its ends: a vertex `v` or a cluster `c`,
-/// told as `home.len() + c`.
+/// The two things that an edge leaves and enters inside the innermost cluster around both of its ends: each a vertex
+/// `v`, or a cluster `c` given as `home.len() + c`.
 fn parting((from, to): (usize, usize), home: &[usize], parent: &[usize]) -> (usize, usize) {
     let (mut a, mut b) = ((from, home[from]), (to, home[to]));
     while a.1 != b.1 {
@@ -129,14 +129,15 @@ fn greedy_order(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     place
 }
 
-/// What of the vertices that are left comes next, first to last; of several alike the first one.
+/// The rank of a vertex among those that are left, the next one to take first; of equals, the vertex with the smaller
+/// number.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
     /// No edge leaves it.
     Sink(usize),
     /// No edge enters it.
     Source(usize),
-    /// How many more edges leave it than enter it.
+    /// The number of edges that leave it minus the number that enter it.
     Between(Reverse<isize>, usize),
 }
 

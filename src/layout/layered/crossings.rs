@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use crate::layout::{LayerItem, LayerRows, Layers, monotone};
 
-/// What moves as one inside its cluster: an item, or a whole cluster from its top to its bottom border.
+/// A unit that moves as one inside its cluster: an item, or a whole cluster from its top to its bottom border.
 #[derive(Clone, Copy)]
 struct Unit {
     start: usize,
@@ -22,11 +22,11 @@ pub(crate) struct CrossingReducer<'a> {
     pub(crate) rows: LayerRows,
     /// The place of each item in its row.
     place: Vec<usize>,
-    /// Where each item wants to be; NaN for anywhere.
+    /// The wanted place of each item; NaN for one without a wish.
     key: Vec<f64>,
     /// The sorted places of the neighbours of each item, before and after; filled where needed.
     near: Vec<[Vec<usize>; 2]>,
-    /// The clusters met in this sweep, in their order; and where each stands in it.
+    /// The clusters met in this sweep, in their order; and the place of each in it.
     clusters: Vec<usize>,
     turn: Vec<Option<usize>>,
 }
@@ -99,7 +99,7 @@ impl<'a> CrossingReducer<'a> {
         self.rows[rank] = row;
     }
 
-    /// Sorts what stands directly in one cluster by key, and inside what is a cluster itself.
+    /// Sorts the units that stand directly in one cluster by key, and the inside of those that are clusters themselves.
     fn sort(&mut self, items: &mut [usize]) {
         let units = units(self.layers, items);
         let mut keys = Vec::with_capacity(units.len());
@@ -310,7 +310,7 @@ fn bracketed(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<usize> {
     row
 }
 
-/// What moves as one in a stretch of a row.
+/// The units that move as one in a stretch of a row.
 fn units(layers: &Layers, items: &[usize]) -> Vec<Unit> {
     let mut units = Vec::new();
     let mut start = 0;
@@ -333,7 +333,7 @@ fn units(layers: &Layers, items: &[usize]) -> Vec<Unit> {
     units
 }
 
-/// The pairs of which the first is greater than the second; both sorted.
+/// The number of pairs of which the first is greater than the second; both lists are sorted.
 fn inversions(first: &[usize], second: &[usize]) -> u64 {
     let (mut below, mut sum) = (0, 0);
     for &a in first {

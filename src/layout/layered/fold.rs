@@ -1,4 +1,4 @@
-//! Folds crowded layers: where few are known to subscribe, most nodes would stand in one layer and most topics in the
+//! Folds crowded layers: where few subscribers are known, most nodes would stand in one layer and most topics in the
 //! next; sources move to later layers, more of them if that suits the page.
 
 /// Ranks with at least `layers` layers and the sources spread evenly over them; `None` if there is nothing to spread.
@@ -43,9 +43,9 @@ pub(crate) fn fold(
     Some(squeezed(&folded))
 }
 
-/// How many layers suit `n` boxes on a page of this aspect (width by height), with edges from left to right and from
-/// top to bottom. A box with the gap behind it is about five times as long as it is high, and one and a half times as
-/// wide as the distance between layers below each other.
+/// The numbers of layers that suit `n` boxes on a page of this aspect (width by height), with edges from left to right
+/// and from top to bottom. A box with the gap behind it is about five times as long as it is high, and one and a half
+/// times as wide as the distance between layers below each other.
 pub(crate) fn suitable(n: usize, aspect: f64) -> [usize; 2] {
     let n = n as f64;
     let layers = |square: f64| {

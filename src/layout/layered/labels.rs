@@ -1,4 +1,4 @@
-//! Where the label of each edge stands: on the edge or beside it, on no box, no title and no other label.
+//! The place of each edge's label: on the edge or beside it, on no box, no title and no other label.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -6,19 +6,19 @@ use std::collections::BTreeMap;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::{Layout, Plan, Route};
 
-/// Where along an edge a label is tried, best first.
+/// The places at which a label is tried, as parts of the edge's length, best first.
 const STATIONS: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
 /// A straight piece longer than this many cells is looked up in parts: the rectangle around all of it is mostly empty.
 const LONG: f64 = 4.0;
-/// How many rectangles may be looked at over all labels; the labels of the longest edges are then left out. The largest
-/// graph that is laid out in layers needs a tenth of it.
+/// The number of rectangles that may be looked at over all labels; the labels of the longest edges are then left out.
+/// The largest graph that is laid out in layers needs a tenth of it.
 const EFFORT: u64 = 20_000_000;
-/// How many cells edges may be noted in, over all of them; the longest are then not avoided. Long edges of a drawing with
-/// tens of thousands of boxes in a column pass through thousands each.
+/// The number of cells in which edges may be noted, over all edges; the longest are then not avoided. Long edges of a
+/// drawing with tens of thousands of boxes in a column pass through thousands each.
 const CELLS: usize = 2_000_000;
 /// The room between a label and its edge, if it stands beside.
 const ASIDE: f64 = 2.0;
-/// How bad it is to lie on another edge, and to hide most of the own edge.
+/// The cost of a label on another edge, and of one that hides most of its own edge.
 const ON_EDGE: f64 = 2.0;
 const HIDING: f64 = 4.0;
 
@@ -86,7 +86,7 @@ fn between(a: Point, b: Point) -> Rect {
 /// A route as a chain of short straight pieces.
 struct Segments {
     points: Vec<Point>,
-    /// How far along the line each point is.
+    /// The distance of each point from the start, along the line.
     at: Vec<f64>,
 }
 
@@ -156,7 +156,7 @@ impl Segments {
         best.map(|(_, spot)| spot)
     }
 
-    /// The middles on and beside a point of the line, each with how bad it is.
+    /// The middles on and beside a point of the line, each with its cost.
     fn around(&self, point: Point, size: Size, sideways: bool) -> [(f64, Point); 3] {
         let (hidden, away) = if sideways {
             (size.w, Point::new(0.0, size.h / 2.0 + ASIDE))
@@ -198,9 +198,9 @@ struct Obstacles {
     cell: f64,
     cells: BTreeMap<(i64, i64), Vec<usize>>,
     rects: Vec<(Rect, usize)>,
-    /// In how many cells rectangles are noted, one counted again in each.
+    /// The number of notes of rectangles in cells; a rectangle counts once per cell.
     noted: usize,
-    /// How many rectangles were looked at.
+    /// The number of rectangles that were looked at.
     looks: Cell<u64>,
 }
 

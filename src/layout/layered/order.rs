@@ -1,14 +1,14 @@
 //! The order of the items in each layer: barycentre and median sweeps with transposition, fewest crossings kept.
 //!
-//! It knows its sibling that sorts; the two are one step, in two files for their length.
+//! It uses its sibling that sorts; the two are one step, in two files for their length.
 
 use super::crossings::CrossingReducer;
 use crate::layout::{LayerRows, Layers};
 
-/// How often one order is swept at most, and after how many sweeps without gain it is given up.
+/// The largest number of sweeps of one order, and the number of sweeps without gain after which it is given up.
 const SWEEPS: usize = 24;
 const PATIENCE: usize = 6;
-/// How often the best order is shaken at most.
+/// The largest number of times that the best order is shaken.
 const SHAKES: usize = 8;
 
 /// The best order found and its number of crossings, borders of clusters included. `effort` counts edges swept: the
@@ -119,7 +119,7 @@ impl Search<'_> {
     }
 }
 
-/// The same throws on every machine: Knuth's linear congruence.
+/// Pseudo-random numbers, the same on every machine: Knuth's linear congruence.
 struct Dice(u64);
 
 impl Dice {
@@ -133,7 +133,7 @@ impl Dice {
     }
 }
 
-/// When a walk through the graph meets each item; it begins at the sources, or at the sinks.
+/// The turn at which a walk through the graph meets each item; it begins at the sources, or at the sinks.
 fn depth_first(layers: &Layers, sources: bool) -> Vec<f64> {
     let n = layers.rank.len();
     let ends = if sources { &layers.up } else { &layers.down };

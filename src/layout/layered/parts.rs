@@ -1,10 +1,10 @@
-//! Which vertices belong together: those joined by links, and those that share a namespace.
+//! The parts of a plan: vertices joined by links, and those that share a namespace.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::layout::{Component, Plan};
 
-/// The parts of a plan that know nothing of each other, by their first vertices.
+/// The parts of a plan without links between them, in the order of their first vertices.
 pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
     let n = plan.vertices.len();
     let mut groups = DisjointSets::new(n + plan.clusters.len());
@@ -39,7 +39,7 @@ pub(crate) fn parts(plan: &Plan) -> Vec<Component> {
         .collect()
 }
 
-/// The part with its ends, homes and pieces told by places in it.
+/// The part with its ends, homes and pieces given by places in it.
 fn localised(plan: &Plan, mut part: Component) -> Component {
     let at = |v: usize| part.vertices.binary_search(&v).unwrap_or(0);
     part.ends = part

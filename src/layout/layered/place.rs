@@ -1,8 +1,8 @@
-//! Where the items of each layer stand across: as near to their neighbours as order and gaps allow.
+//! The places of the items of each layer across: as near to their neighbours as order and gaps allow.
 
 use crate::layout::{LayerItem, LayerRows, Layers, monotone};
 
-/// How often all layers are placed.
+/// The number of times that all layers are placed.
 const SWEEPS: usize = 40;
 
 /// The middle of each item across. `half` is half the extent of each item, `gaps` the room between neighbours per row.
@@ -41,7 +41,7 @@ fn packed(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
     y
 }
 
-/// Where each item of a row wants to be, and how much.
+/// The goal of each item of a row, and the weight of that goal.
 fn goals(layers: &Layers, row: &[usize], y: &[f64], sweep: usize) -> (Vec<f64>, Vec<f64>) {
     let (mut goal, mut weight) = (Vec::new(), Vec::new());
     for &v in row {
@@ -62,7 +62,7 @@ fn goals(layers: &Layers, row: &[usize], y: &[f64], sweep: usize) -> (Vec<f64>, 
     (goal, weight)
 }
 
-/// How much two linked items want to stand in line: bends most, so that long edges come out straight.
+/// The weight with which two linked items are pulled into line: bends most, so that long edges come out straight.
 fn stiffness(a: LayerItem, b: LayerItem) -> f64 {
     match (a, b) {
         (LayerItem::Vertex, LayerItem::Vertex) => 1.0,

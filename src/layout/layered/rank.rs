@@ -1,9 +1,9 @@
 //! The layer of each vertex: longest paths, then a slide inside the slack towards the side with more edges.
 
-/// How often vertices slide at most.
+/// The largest number of passes in which vertices slide.
 const PASSES: usize = 30;
 
-/// A rank for each of `n` vertices, 0.., growing along every edge. The edges must not form a cycle.
+/// A rank for each of `n` vertices, counted from 0 and growing along every edge. The edges must not form a cycle.
 pub(crate) fn ranks(n: usize, edges: &[(usize, usize)]) -> Vec<usize> {
     let (mut after, mut before) = (vec![Vec::new(); n], vec![Vec::new(); n]);
     for &(from, to) in edges.iter().filter(|(from, to)| from != to) {

@@ -6,15 +6,15 @@ use std::collections::{BTreeMap, BinaryHeap};
 use crate::base::geometry::{Point, Rect, Size};
 use crate::layout::{Outline, Plan, Route};
 
-/// How near to a foreign box an edge may come, and how far from it an edge turns.
+/// The distance that an edge keeps from foreign boxes, and at which it turns around their corners.
 const CLEAR: f64 = 3.0;
 const TURN: f64 = 5.0;
 /// The distance of edges between the same two boxes.
 const PARALLEL: f64 = 6.0;
-/// How many pairs of line and box may be looked at, over all edges; what is left then runs straight.
+/// The number of pairs of line and box that may be looked at, over all edges; the edges left then run straight.
 const EFFORT: usize = 40_000_000;
 
-/// A route per link; also how many of them run through foreign boxes because no way was found.
+/// A route per link, and the number of them that run through foreign boxes because no way was found.
 pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
     let mut map = Map::new(boxes);
     let mut met: BTreeMap<(usize, usize), usize> = BTreeMap::new();
@@ -46,7 +46,7 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
     (routes, straight)
 }
 
-/// A vertex where it stands.
+/// A vertex with its place.
 struct VertexPlace<'a> {
     plan: &'a Plan,
     boxes: &'a [Rect],
@@ -58,7 +58,7 @@ impl VertexPlace<'_> {
         self.boxes[self.v]
     }
 
-    /// Where the line from a point inside to a point outside leaves the outline.
+    /// The point where the line from a point inside to a point outside leaves the outline.
     fn leaves(&self, inside: Point, outside: Point) -> Point {
         let rect = self.rect();
         let (mut low, mut high) = (0.0, 1.0);
@@ -133,7 +133,7 @@ fn shifted((from, to): &(VertexPlace, VertexPlace), count: usize) -> (Point, Poi
     (inside(from.rect()), inside(to.rect()))
 }
 
-/// The way cut at the outlines, as straight pieces.
+/// The route along a way, cut at the outlines, as straight pieces.
 fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
     let last = way.len() - 1;
     let start = a.leaves(way[0], way[1]);
@@ -156,7 +156,7 @@ fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
     }
 }
 
-/// What stands in the way, and where one can turn.
+/// The obstacles in the way of edges, and the points where an edge can turn.
 struct Map {
     obstacles: Vec<Rect>,
     corners: Vec<Point>,

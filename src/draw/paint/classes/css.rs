@@ -1,4 +1,4 @@
-//! The style as rules for classes: what [`crate::draw::picture`] paints, said once per class instead of once per element.
+//! The style as rules for classes: the paint of [`crate::draw::picture`], once per class instead of once per element.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -12,7 +12,7 @@ pub(crate) fn rules(style: &Style, words: &BTreeSet<&str>) -> String {
     base(style) + &states(style, words)
 }
 
-/// How elements look that are active and did not change.
+/// The rules for elements that are active and did not change.
 pub(crate) fn base(style: &Style) -> String {
     let mut out = String::from(
         ":is(.node,.topic,.edge) text{text-anchor:middle;stroke:none}use,.c,.l{visibility:hidden}",
@@ -34,8 +34,8 @@ pub(crate) fn base(style: &Style) -> String {
     out
 }
 
-/// What classes change of that: how fast, how well known, how alive, what changed; a later rule counts more. Only
-/// these class words have rules.
+/// The rules for what classes change of that: rate, degree, state and mark; a later rule counts more. Only these class
+/// words have rules.
 pub(crate) fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     // What is silent has no rate worth a place.
     let mut out = String::from(
@@ -99,7 +99,7 @@ fn body(out: &mut String, what: &str, body: &Body) {
     );
 }
 
-/// The line is the first path of an edge, its head the second.
+/// Writes the rules for edges. The line is the first path of an edge, its head the second.
 fn edges(out: &mut String, style: &Style) {
     let edge = &style.edge;
     let _ = write!(
@@ -153,7 +153,7 @@ fn change(out: &mut String, kind: &str, change: &Change) {
     );
 }
 
-/// The colours of badges; they are hidden until their element has their class.
+/// Writes the colours of badges, which are hidden until their element has their class.
 fn badges(out: &mut String, style: &Style) {
     let _ = write!(
         out,
@@ -197,7 +197,7 @@ fn dashes(dash: &[f64]) -> String {
     all.join(" ")
 }
 
-/// To a hundredth.
+/// A number to a hundredth, as text.
 fn short(value: f64) -> String {
     (libm::round(value * 100.0) / 100.0).to_string()
 }

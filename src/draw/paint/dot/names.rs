@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use crate::base::words::is_invisible;
 use crate::view::{ItemKind, View};
 
-/// A longer id is cut; the label keeps the whole name.
+/// The longest id in characters; a longer one is cut, and the label keeps the whole name.
 const LONGEST_ID: usize = 1000;
 
 /// A name as part of a DOT id, as `PydotFactory.escape_name` makes it: percent-encoded, then `/` as `__`, `%` and

@@ -1,7 +1,7 @@
 //! The profile `rqt`: as `rqt_graph` saves a graph, with every place in the file, so that it loads there.
 //!
 //! Its loader reads points with y up from `pos`, `bb` and `lp`, inches from `width` and `height`, and draws nothing
-//! that has no place. It breaks on edge labels without `lp`, widths that are no whole numbers, edges at both ends,
+//! that has no place. It breaks on edge labels without `lp`, widths that are not whole numbers, edges at both ends,
 //! clusters without a `graph` statement and colours in parts; all edges stand at the top level, or they come twice.
 
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, SeenWindow, Shown};
 
 /// The length of an arrow's head in points, as Graphviz draws it.
 const HEAD: f64 = 10.0;
-/// From a cluster's corner to its title.
+/// The distance from a cluster's corner to its title.
 const MARGIN: f64 = 8.0;
 const POINTS_PER_INCH: f64 = 72.0;
 
@@ -180,7 +180,7 @@ impl RqtWriter<'_> {
         }
     }
 
-    /// In the manner of `rqt_graph`'s own: a line per value. Qt takes it for rich text.
+    /// The tool tip in the manner of `rqt_graph`'s own: a line per value. Qt takes it for rich text.
     fn tooltip(&self, arrow: &Arrow, shown: &Shown) -> String {
         let name = |at: u32| {
             let item = self.drawing.view.items.get(at as usize);
@@ -281,7 +281,7 @@ fn middle(route: &Route) -> Point {
     })
 }
 
-/// At most two decimals; what is no number becomes 0.
+/// The number with at most two decimals; 0 for one that is not finite.
 fn number(value: f64) -> String {
     if !value.is_finite() {
         return "0".to_owned();

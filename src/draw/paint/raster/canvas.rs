@@ -9,7 +9,7 @@ use super::{Painter, PixelSheet, Pixels, RasterGroup, opaque};
 use crate::base::error::Result;
 use crate::draw::scene::{Group, Scene};
 
-/// Above this share of changed tiles, all is drawn anew.
+/// The largest share of changed tiles; above it, all is drawn anew.
 const MOST_SHARE: f64 = 0.7;
 
 /// A page that frames are drawn on in turn; it remembers the last one.
@@ -24,12 +24,12 @@ struct Last {
     drawn: Vec<Arc<RasterGroup>>,
     sheet: PixelSheet,
     scratch: PixelSheet,
-    /// What differs from the scene before; `None` for all of it.
+    /// The tiles that differ from the scene before; `None` for all of them.
     dirty: Option<Tiles>,
 }
 
 impl<'a> Canvas<'a> {
-    /// An empty canvas; what is drawn on it will be `scale` times as large.
+    /// An empty canvas; scenes drawn on it will be `scale` times as large.
     pub fn new(painter: &'a Painter, scale: f64) -> Self {
         Self {
             painter,
@@ -80,7 +80,7 @@ impl Last {
         })
     }
 
-    /// Draws what differs again, or all of it where that is too much.
+    /// Draws again the parts that differ, or all of it where they are too many.
     fn followed_by(mut self, scene: Scene, painter: &Painter) -> Result<Self> {
         if scene.size != self.scene.size || scene.background != self.scene.background {
             return Self::first(scene, painter, self.sheet.scale);
@@ -105,7 +105,7 @@ impl Last {
         })
     }
 
-    /// Draws what meets these tiles, and copies the tiles alone.
+    /// Draws the groups that meet these tiles, and copies these tiles alone.
     fn mend(&mut self, scene: &Scene, drawn: &[Arc<RasterGroup>], dirty: &Tiles) {
         self.scratch.clear(dirty, scene);
         for group in drawn.iter().filter(|d| d.tiles.meets(dirty)) {

@@ -1,4 +1,4 @@
-//! Which parts of the page a group may touch: a bit per square of the page, never one too few.
+//! The parts of the page that a group may touch: a bit per square of the page, never one too few.
 
 use std::ops::Range;
 
@@ -137,7 +137,7 @@ impl Tiles {
         }
     }
 
-    /// A curve lies inside the box of its controls: halved until that is small.
+    /// Adds the tiles of a curve, which lies inside the box of its controls: it is halved until that box is small.
     fn add_curve(&mut self, curve: [Point; 4], reach: f64, depth: u8) {
         let Some(area) = around(curve.iter()) else {
             return;

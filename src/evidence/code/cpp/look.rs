@@ -1,11 +1,11 @@
-//! First pass over a C++ file: its classes, what its types are called, and what its variables stand for.
+//! First pass over a C++ file: its classes, the names of its types, and the values of its variables.
 
 use super::CppReader;
 use super::made::Callee;
 use crate::evidence::syntax::{Node, children, line};
 
 impl<'a> CppReader<'a> {
-    /// First pass: classes, names of types, and what variables stand for.
+    /// First pass: classes, names of types, and values of variables.
     pub(super) fn look(&mut self, node: Node<'a>) {
         match node.kind() {
             "class_specifier" | "struct_specifier"
@@ -70,7 +70,7 @@ impl<'a> CppReader<'a> {
         class.line = line(node);
     }
 
-    /// Takes down that a name is given a value.
+    /// Notes that a name is given a value.
     pub(super) fn set(&mut self, node: Node<'a>, name: &str, value: &str) {
         let sides = [name, value].map(|side| node.child_by_field_name(side));
         if let [Some(name), Some(value)] = sides {

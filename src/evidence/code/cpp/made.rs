@@ -1,17 +1,17 @@
-//! Which functions and classes of the client libraries make publishers and subscribers.
+//! The functions and classes of the client libraries that make publishers and subscribers.
 
 use super::super::declaration::Made;
 use crate::evidence::syntax::{Node, Parsed};
 
-/// What a call calls: `object.name<template>(…)`, `scope::name<template>(…)`.
+/// The parts of a called name: `object.name<template>(…)`, `scope::name<template>(…)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Callee<'a> {
     pub(super) name: &'a str,
-    /// Empty without.
+    /// The object; empty without one.
     pub(super) object: &'a str,
-    /// Empty without.
+    /// The scope; empty without one.
     pub(super) scope: &'a str,
-    /// The first argument of the template; empty without.
+    /// The first argument of the template; empty without one.
     pub(super) template: &'a str,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Callee<'a> {
     }
 }
 
-/// What a function makes.
+/// The thing that a function makes.
 pub(super) fn by_function(callee: &Callee<'_>) -> Option<Made> {
     let has_type = !callee.template.is_empty();
     let is_transport = callee.scope.ends_with("image_transport");
@@ -78,7 +78,8 @@ pub(super) fn by_function(callee: &Callee<'_>) -> Option<Made> {
     })
 }
 
-/// What a variable of this type makes as it is constructed, with the type in its template; pointers to it as well.
+/// The thing that a variable of this type makes as it is constructed, with the type in its template; pointers to it as
+/// well.
 pub(super) fn by_constructor(kind: &str) -> Option<(Made, &str)> {
     let (before, inner) = kind.split_once('<')?;
     let inner = inner.trim().strip_suffix('>')?;
@@ -96,7 +97,7 @@ pub(super) fn by_constructor(kind: &str) -> Option<(Made, &str)> {
     }
 }
 
-/// What a class of transforms makes.
+/// The thing that a class of transforms makes.
 pub(super) fn transform(scope: &str, name: &str) -> Option<Made> {
     Some(match (scope, name) {
         ("tf" | "tf2_ros", "TransformBroadcaster") => Made::Broadcaster,

@@ -5,19 +5,19 @@ use std::collections::BTreeMap;
 use super::super::declaration::type_of;
 use crate::evidence::syntax::{Node, Parsed, children};
 
-/// Names that stand for others in a file.
+/// The alias names in a file.
 #[derive(Debug, Default)]
 pub(super) struct Aliases {
     aliases: BTreeMap<String, String>,
-    /// Namespaces all of whose names are used.
+    /// Namespaces that are opened by `using namespace`.
     open: Vec<String>,
 }
 
-/// Aliases of aliases further than this are not followed.
+/// The most steps from alias to alias that are followed.
 const DEEPEST: usize = 8;
 
 impl Aliases {
-    /// Takes an element in that gives a name to something.
+    /// Adds an element that gives a name to something.
     pub(super) fn look(&mut self, parsed: &Parsed, node: Node<'_>) {
         let text = |node: Node<'_>| parsed.text(node).trim().to_owned();
         let field = |name| node.child_by_field_name(name).map(text);

@@ -7,7 +7,7 @@ use super::made::{self, Callee, by_constructor, by_function, is_recorder};
 use crate::evidence::syntax::{Node, children, line, walk};
 
 impl<'a> CppReader<'a> {
-    /// Second pass: calls and variables that make something.
+    /// Second pass: calls and variables that make publishers, subscribers and nodes.
     pub(super) fn take(&mut self, node: Node<'a>) {
         match node.kind() {
             "call_expression" => self.call(node),
@@ -96,7 +96,7 @@ impl<'a> CppReader<'a> {
         }
     }
 
-    /// A member that is made as the class is: `sub_(nh_, "topic", 1)`, `Node("name")`.
+    /// A member that is made with its class: `sub_(nh_, "topic", 1)`, `Node("name")`.
     pub(super) fn initializer(&mut self, node: Node<'a>) {
         let parts = children(node);
         let [name, given, ..] = parts[..] else {
@@ -120,7 +120,7 @@ impl<'a> CppReader<'a> {
         }
     }
 
-    /// A variable that is made of these arguments.
+    /// A variable that is made from these arguments.
     pub(super) fn constructed(&mut self, node: Node<'a>, kind: Node<'a>, given: Node<'a>) {
         let given = children(given);
         let kind = self.text(kind);
@@ -213,8 +213,8 @@ impl<'a> CppReader<'a> {
     }
 }
 
-/// The namespace that a node handle's name speaks of, where the code that made it is elsewhere: `pnh`, `private_nh_`. The
-/// bag tells whether that was right, for only a topic of exactly this name counts.
+/// The namespace that a node handle's name suggests, where the code that made it is elsewhere: `pnh`, `private_nh_`.
+/// The bag tells whether that was right, for only a topic of exactly this name counts.
 fn spoken(object: &str) -> &'static str {
     let name = object.to_lowercase();
     let is_private = ["pnh", "private", "priv_n", "nhp", "nh_p"]

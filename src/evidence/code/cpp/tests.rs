@@ -1,4 +1,4 @@
-//! What is read from C++, idiom by idiom.
+//! Tests of reading C++, idiom by idiom.
 
 use super::super::declaration::Role;
 use super::read;

@@ -1,4 +1,4 @@
-//! The texts that expressions of C++ stand for: literals, constants, members, defaults of parameters.
+//! The texts of C++ expressions: literals, constants, members, defaults of parameters.
 
 use super::super::texts::{DEEPEST, LONGEST, most_work};
 use super::CppReader;
@@ -17,7 +17,7 @@ impl<'a> CppReader<'a> {
         self.string_at(node, 0).filter(|text| text.len() <= LONGEST)
     }
 
-    /// The text that an expression stands for.
+    /// The text of an expression, as far as it is known.
     pub(super) fn string_at(&self, node: Node<'a>, depth: usize) -> Option<String> {
         self.work.set(self.work.get() + 1);
         if depth > DEEPEST || self.work.get() > most_work(self.parsed.text.len()) {

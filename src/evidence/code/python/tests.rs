@@ -1,4 +1,4 @@
-//! What is read from Python, idiom by idiom.
+//! Tests of reading Python, idiom by idiom.
 
 use super::super::declaration::{FileCode, Role};
 use super::read;

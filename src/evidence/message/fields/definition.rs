@@ -4,22 +4,22 @@
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Field {
     pub(super) name: String,
-    /// Its type without array and bounds, as written: `float64`, `Point`, `geometry_msgs/Point`.
+    /// The type without array and bounds, as written: `float64`, `Point`, `geometry_msgs/Point`.
     pub(super) kind: String,
     pub(super) array: Array,
 }
 
-/// Whether a field is an array.
+/// The kind of array that a field is, if any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Array {
     No,
-    /// Of this length.
+    /// An array of this length.
     Fixed(usize),
-    /// Of the length that the payload says.
+    /// An array whose length is in the payload.
     Told,
 }
 
-/// A message: its package, its own name, its fields.
+/// A message: its package, its name without it, its fields.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct MessageFields {
     package: String,
@@ -27,7 +27,7 @@ pub(super) struct MessageFields {
     pub(super) fields: Vec<Field>,
 }
 
-/// A definition, the outermost message first.
+/// A parsed definition, the outermost message first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Definition {
     pub(super) messages: Vec<MessageFields>,
@@ -35,10 +35,10 @@ pub(super) struct Definition {
 
 impl Definition {
     /// Reads the definition of `type_name`. The definition of a message without fields is empty, so an empty text is
-    /// believed only of types that are known to be so.
+    /// accepted only for types known to be empty.
     ///
     /// # Errors
-    /// What keeps it from being used.
+    /// The reason why it cannot be used.
     pub(super) fn parse(text: &str, type_name: &str) -> Result<Self, String> {
         let is_empty = text.lines().all(|l| without_comment(l).is_empty());
         if is_empty && !type_name.ends_with("/Empty") {
@@ -59,8 +59,8 @@ impl Definition {
         Ok(Self { messages })
     }
 
-    /// The place of the message that `kind` means in the message at place `from`: of that package, of the same
-    /// package, of any.
+    /// The place of the message that `kind` names in the message at place `from`: of the package in the name, of the
+    /// same package, of any.
     ///
     /// # Errors
     /// If the definition does not hold it.
@@ -83,7 +83,7 @@ impl Definition {
 }
 
 impl MessageFields {
-    /// `std_msgs/Header`, `std_msgs/msg/Header` or `Header`, without fields yet.
+    /// A message `std_msgs/Header`, `std_msgs/msg/Header` or `Header`, without fields yet.
     fn new(name: &str) -> Self {
         let mut parts = name.split('/');
         let last = parts.next_back().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Payloads by hand against their columns.
+//! Tests of hand-made payloads against their columns.
 
 use super::*;
 use crate::bag::ConnectionId;

@@ -25,7 +25,7 @@ const OTHER: &[&str] = &[
 ];
 
 impl Evaluator<'_> {
-    /// The action that a call makes; `None` if it makes none.
+    /// The action that a call makes; `None` if it does not make one.
     pub(super) fn action(&mut self, name: &str, arguments: &Arguments) -> Option<PythonValue> {
         let mut tree = match name {
             "LaunchDescription" => {
@@ -55,8 +55,8 @@ impl Evaluator<'_> {
         Some(PythonValue::Action(tree))
     }
 
-    /// A function that the launch system calls: followed like any other of this file; what it asks the running system
-    /// is not known.
+    /// A function that the launch system calls: followed like any other of this file; answers of the running system are
+    /// unknown.
     fn opaque(&mut self, arguments: &Arguments) -> Tree {
         let function = match arguments.get(0, "function") {
             Some(PythonValue::Function(name)) => self.function(name),
@@ -232,7 +232,7 @@ fn element(tag: &str, attributes: &[(&str, Option<String>)]) -> Tree {
     }
 }
 
-/// The actions in a value, lists taken apart; what is not known is left as such.
+/// The actions in a value, with lists flattened; unknown values are kept as unknown.
 pub(super) fn trees(value: &PythonValue) -> Vec<Tree> {
     match value {
         PythonValue::List(list) => list.iter().flat_map(trees).collect(),

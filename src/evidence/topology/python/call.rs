@@ -26,7 +26,7 @@ impl Arguments {
             .map(|(_, value)| value)
     }
 
-    /// The same as a text of launch files.
+    /// An argument as a text of launch files.
     pub(super) fn text(&self, place: usize, name: &str) -> Option<String> {
         self.get(place, name)
             .filter(|v| **v != PythonValue::None)
@@ -106,7 +106,7 @@ impl<'a> Evaluator<'a> {
         arguments
     }
 
-    /// A method of a value that is known: lists grow, texts are formatted.
+    /// A method of a known value: lists grow, texts are formatted.
     fn method(
         &mut self,
         object: Node<'a>,
@@ -174,7 +174,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// Adds to the list that a name stands for.
+    /// Adds to the list in a variable.
     fn grow(&mut self, object: Node<'a>, more: Vec<PythonValue>) -> Option<PythonValue> {
         let more = self.kept(PythonValue::List(more), object);
         if let (PythonValue::List(list), PythonValue::List(more)) = (self.variable(object)?, more) {
@@ -183,7 +183,7 @@ impl<'a> Evaluator<'a> {
         Some(PythonValue::None)
     }
 
-    /// `Path(…).parent` and the like.
+    /// The value of an attribute, such as `Path(…).parent`.
     pub(super) fn attribute(&mut self, node: Node<'a>) -> PythonValue {
         let unknown = PythonValue::Unknown(line(node));
         let Some(object) = node.child_by_field_name("object") else {
@@ -199,7 +199,7 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// What the launch system fills in, in the words of its XML form.
+/// A substitution that the launch system fills in, in the words of its XML form.
 fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
     let text = |place, name| arguments.text(place, name);
     let made = match name {
@@ -246,7 +246,7 @@ fn substitution(name: &str, arguments: &Arguments) -> Option<PythonValue> {
     Some(PythonValue::Text(made))
 }
 
-/// Functions of Python itself.
+/// The result of a function of Python itself.
 fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
     let first = arguments.positional.first();
     let text = || first.map(PythonValue::launch_text);
@@ -289,7 +289,7 @@ fn plain(full: &str, arguments: &Arguments) -> Option<PythonValue> {
     }
 }
 
-/// The parts of a path behind each other; one that begins with a slash stands for itself.
+/// The parts of a path joined; a part that begins with a slash starts anew.
 fn path(parts: &[PythonValue]) -> String {
     let mut joined = String::new();
     for part in parts {

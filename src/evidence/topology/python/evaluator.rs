@@ -8,10 +8,10 @@ use super::value::{DEEPEST, PythonValue};
 use crate::base::budget::LaunchWork;
 use crate::evidence::syntax::{Node, Parsed, children, line};
 
-/// Expressions and calls inside each other deeper than this are not followed.
+/// The deepest nesting of expressions and calls that is followed.
 const NESTED: usize = 120;
 
-/// The work of one step, in the bytes that budgets count.
+/// The cost of one step, in bytes of work.
 const STEP: usize = 16;
 
 pub(super) struct Evaluator<'a> {
@@ -19,21 +19,21 @@ pub(super) struct Evaluator<'a> {
     frames: Vec<Locals>,
     functions: BTreeMap<String, Node<'a>>,
     pub(super) budget: LaunchWork,
-    /// How many conditions that are not known stand around the statement.
+    /// The number of unknown conditions around the statement.
     pub(super) undecided: usize,
     nested: usize,
 }
 
-/// The names of a function that is being followed.
+/// The variables of a function that is being followed.
 #[derive(Default)]
 struct Locals {
     names: BTreeMap<String, PythonValue>,
     returned: Option<PythonValue>,
-    /// `undecided` where the function was called.
+    /// The value of `undecided` where the function was called.
     undecided: usize,
 }
 
-/// What comes after a statement.
+/// The continuation after a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ControlFlow {
     Next,
@@ -56,7 +56,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// What `generate_launch_description` returns; `None` if there is no such function.
+    /// The return value of `generate_launch_description`; `None` if there is no such function.
     pub(super) fn launch_description(&mut self) -> Option<PythonValue> {
         self.run(self.parsed.root());
         let function = *self.functions.get("generate_launch_description")?;
@@ -202,7 +202,7 @@ impl<'a> Evaluator<'a> {
         ControlFlow::Next
     }
 
-    /// What a loop goes over, as far as it is known.
+    /// The items that a loop goes over, as far as they are known.
     pub(super) fn items(&mut self, node: Node<'a>) -> Vec<PythonValue> {
         match self.value(node) {
             PythonValue::List(list) => list,
@@ -279,7 +279,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The variable that a name stands for, to be changed.
+    /// The variable of a name, to be changed.
     pub(super) fn variable(&mut self, node: Node<'a>) -> Option<&mut PythonValue> {
         let name = self.parsed.text(node);
         let frames = self.frames.iter_mut().rev();
@@ -293,7 +293,7 @@ impl<'a> Evaluator<'a> {
         self.lookup(self.text(node), node)
     }
 
-    /// A copy of the value that a name stands for at `node`.
+    /// A copy of the value of a name at `node`.
     pub(super) fn lookup(&mut self, name: &str, node: Node<'a>) -> PythonValue {
         let found = self.frames.iter().rev().find_map(|f| f.names.get(name));
         match found {
@@ -313,7 +313,7 @@ impl<'a> Evaluator<'a> {
         self.functions.get(name).copied()
     }
 
-    /// What a function of this file returns.
+    /// The return value of a function of this file.
     pub(super) fn call(
         &mut self,
         function: Node<'a>,

@@ -272,7 +272,7 @@ impl<'a> Evaluator<'a> {
 }
 
 impl PythonValue {
-    /// Whether it is one of a list or a part of a text; `None` where that is not known.
+    /// Whether it is an item of a list or a part of a text; `None` where that is not known.
     fn is_in(&self, all: &Self) -> Option<bool> {
         match (self, all) {
             (_, Self::List(list)) => {

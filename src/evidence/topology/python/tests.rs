@@ -1,4 +1,4 @@
-//! What is read from launch files in Python, idiom by idiom.
+//! Tests of reading launch files in Python, idiom by idiom.
 
 use std::path::Path;
 

@@ -1,11 +1,11 @@
-//! What an expression of a launch file stands for, as far as that is known without running it.
+//! The value of an expression of a launch file, as far as it is known without running it.
 
 use crate::evidence::topology::tree::Tree;
 
 /// The value of an expression. Texts may hold substitutions `$(…)`, which the launch system would fill in.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum PythonValue {
-    /// Only running the file would tell; with the line.
+    /// A value that only running the file would reveal; with the line.
     Unknown(usize),
     None,
     Bool(bool),
@@ -19,11 +19,11 @@ pub(super) enum PythonValue {
     Function(String),
 }
 
-/// Values inside values deeper than this are not kept.
+/// The deepest nesting of values that is kept.
 pub(super) const DEEPEST: usize = 48;
 
 impl PythonValue {
-    /// As a text of launch files: parts of a list one behind the other, a part that is not known as `$(unknown)`.
+    /// The text in launch files: parts of a list joined, an unknown part as `$(unknown)`.
     pub(super) fn launch_text(&self) -> String {
         match self {
             Self::List(parts) => parts.iter().map(Self::launch_text).collect(),
@@ -32,7 +32,7 @@ impl PythonValue {
         }
     }
 
-    /// As Python's `str` writes it; `None` where that is not known.
+    /// The text as Python's `str` writes it; `None` where that is not known.
     pub(super) fn text(&self) -> Option<String> {
         match self {
             Self::Text(text) => Some(text.clone()),
@@ -44,7 +44,7 @@ impl PythonValue {
         }
     }
 
-    /// Whether Python takes it for true; `None` where that is not known.
+    /// Whether Python treats it as true; `None` where that is not known.
     pub(super) fn truth(&self) -> Option<bool> {
         match self {
             Self::Bool(is_true) => Some(*is_true),
@@ -75,7 +75,7 @@ impl PythonValue {
         }
     }
 
-    /// Whether launch actions are in it.
+    /// Whether it contains launch actions.
     pub(super) fn acts(&self) -> bool {
         match self {
             Self::Action(_) => true,
@@ -84,7 +84,7 @@ impl PythonValue {
         }
     }
 
-    /// How much it holds, in about as many bytes, and how deep it is.
+    /// The size in bytes, approximately, and the depth of nesting.
     pub(super) fn measure(&self) -> (usize, usize) {
         let all = |parts: &mut dyn Iterator<Item = (usize, usize)>| {
             parts.fold((32, 1), |(size, depth), (s, d)| {
@@ -115,7 +115,7 @@ fn of_tree(tree: &Tree) -> (usize, usize) {
         })
 }
 
-/// The value of an argument's text: `true` and `false` are taken as such.
+/// The value of an argument's text: `true` and `false` become truth values.
 pub(super) fn of_text(text: &str) -> PythonValue {
     match text {
         "true" | "True" => PythonValue::Bool(true),
