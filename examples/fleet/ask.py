@@ -35,7 +35,8 @@ def datafusion(folder):
 def spark(folder):
     from pyspark.sql import SparkSession
 
-    session = SparkSession.builder.master("local[2]").config("spark.ui.enabled", "false").getOrCreate()
+    quiet = {"spark.ui.enabled": "false", "spark.ui.showConsoleProgress": "false"}
+    session = SparkSession.builder.master("local[2]").config(map=quiet).getOrCreate()
     session.sparkContext.setLogLevel("ERROR")
     for table in TABLES:
         session.read.parquet(f"{folder}/{table}").cache().createOrReplaceTempView(table)

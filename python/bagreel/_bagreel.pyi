@@ -1,0 +1,57 @@
+"""What is written in Rust."""
+
+from os import PathLike
+from typing import Any, final
+
+class BagreelError(RuntimeError):
+    """A bag could not be read, or a table not be made."""
+
+class StoreError(BagreelError):
+    """A store refused, or could not be reached: trying again may help."""
+
+@final
+class Table:
+    """An Arrow record batch, by the PyCapsule interface."""
+
+    def __new__(cls, batch: Any) -> Table: ...
+    @property
+    def num_rows(self) -> int: ...
+    @property
+    def column_names(self) -> list[str]: ...
+    def __arrow_c_schema__(self) -> Any: ...
+    def __arrow_c_array__(self, requested_schema: Any = None) -> tuple[Any, Any]: ...
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any: ...
+    def __len__(self) -> int: ...
+    def to_pyarrow(self) -> Any:
+        """As `pyarrow.RecordBatch`; no row is copied."""
+    def to_pandas(self) -> Any:
+        """As `pandas.DataFrame`."""
+
+@final
+class Mission:
+    """A mission: its windows, what is in them, what changed."""
+
+    def tables(self) -> dict[str, Table]:
+        """By name: edges, topics, nodes, changes, ledger, phases, bags."""
+    def to_json(self) -> str: ...
+    def __len__(self) -> int:
+        """Windows."""
+
+def plan(
+    sources: list[str], *, period: str = "10s", align: str = "clock", mission: str | None = None
+) -> list[dict[str, Any]]: ...
+def tables(
+    uri: str,
+    *,
+    period: str = "10s",
+    align: str = "clock",
+    mission: str | None = None,
+    origin_ns: int | None = None,
+    tier: str = "auto",
+    start_ns: int | None = None,
+    end_ns: int | None = None,
+) -> dict[str, Table]: ...
+def merge(tables: list[Table]) -> Table: ...
+def finish(tables: list[Table]) -> Mission: ...
+def read(uris: list[str], *, period: str | None = None, align: str = "bag") -> Mission: ...
+def main(args: list[str | PathLike[str]]) -> int: ...

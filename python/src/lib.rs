@@ -1,0 +1,254 @@
+//! The functions that Python sees; all that takes time runs without the interpreter's lock.
+
+mod table;
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+
+use bagreel::fleet::arrow::{bags_batch, counts_batch, counts_of, mission_batches};
+use bagreel::fleet::{self, CountDetail, PlannedBag, Planning, Tally};
+use bagreel::values::{Align, Length, Period, Span, Stamp};
+use bagreel::{Error, Mission as Read, Reading};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use table::Table;
+
+pyo3::create_exception!(
+    _bagreel,
+    BagreelError,
+    PyRuntimeError,
+    "A bag could not be read, or a table not be made."
+);
+pyo3::create_exception!(
+    _bagreel,
+    StoreError,
+    BagreelError,
+    "A store refused, or could not be reached: trying again may help."
+);
+
+/// The error as Python knows it, with the way out behind it.
+fn raised(error: &Error) -> PyErr {
+    let hint = error.hint();
+    let text = match hint.is_empty() {
+        true => error.to_string(),
+        false => format!("{error} ({hint})"),
+    };
+    match error {
+        Error::Remote { .. } => StoreError::new_err(text),
+        error if error.is_usage() => PyValueError::new_err(text),
+        _ => BagreelError::new_err(text),
+    }
+}
+
+fn period(text: &str) -> PyResult<Period> {
+    let bad = || {
+        PyValueError::new_err(format!(
+            "`{text}` is no period: write `60`, `30s`, `1m` or `500ms`"
+        ))
+    };
+    Period::parse(text).ok_or_else(bad)
+}
+
+fn align(text: &str) -> PyResult<Align> {
+    match text {
+        "clock" => Ok(Align::Clock),
+        "bag" => Ok(Align::Bag),
+        _ => Err(PyValueError::new_err(format!(
+            "`{text}` is neither `clock` nor `bag`"
+        ))),
+    }
+}
+
+fn detail(text: &str) -> PyResult<CountDetail> {
+    let found = CountDetail::ALL
+        .into_iter()
+        .find(|detail| detail.word() == text);
+    found.ok_or_else(|| {
+        PyValueError::new_err(format!("`{text}` is none of `auto`, `index`, `chunks`"))
+    })
+}
+
+/// Every bag of some paths, folders, URLs and prefixes, with its mission and where its windows begin.
+#[pyfunction]
+#[pyo3(signature = (sources, *, period="10s", align="clock", mission=None))]
+fn plan<'py>(
+    py: Python<'py>,
+    sources: Vec<String>,
+    period: &str,
+    align: &str,
+    mission: Option<String>,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let planning = Planning {
+        period: self::period(period)?,
+        align: self::align(align)?,
+        mission,
+    };
+    let plan = py.detach(|| fleet::plan(&sources, &planning));
+    let bags = plan.map_err(|e| raised(&e))?.bags;
+    bags.into_iter()
+        .map(|bag| {
+            let row = PyDict::new(py);
+            row.set_item("uri", bag.uri)?;
+            row.set_item("mission", bag.mission)?;
+            row.set_item("origin_ns", bag.origin.0)?;
+            Ok(row)
+        })
+        .collect()
+}
+
+/// What one bag, or a part of its time, says: the tables `counts` and `bags`.
+#[pyfunction]
+#[pyo3(signature = (uri, *, period="10s", align="clock", mission=None, origin_ns=None, tier="auto", start_ns=None, end_ns=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
+fn tables(
+    py: Python<'_>,
+    uri: String,
+    period: &str,
+    align: &str,
+    mission: Option<String>,
+    origin_ns: Option<i64>,
+    tier: &str,
+    start_ns: Option<i64>,
+    end_ns: Option<i64>,
+) -> PyResult<BTreeMap<&'static str, Table>> {
+    let planning = Planning {
+        period: self::period(period)?,
+        align: self::align(align)?,
+        mission: None,
+    };
+    let part = (start_ns.is_some() || end_ns.is_some()).then(|| Span {
+        start: Stamp(start_ns.unwrap_or(i64::MIN)),
+        end: Stamp(end_ns.unwrap_or(i64::MAX)),
+    });
+    let tally = Tally {
+        period: planning.period,
+        detail: detail(tier)?,
+        part,
+    };
+    let counted = py.detach(|| {
+        let planned = match origin_ns {
+            Some(origin) => planned(uri, mission, origin),
+            None => one(uri, mission, &planning)?,
+        };
+        fleet::count(&planned, &tally)
+    });
+    let counted = counted.map_err(|e| raised(&e))?;
+    let counts = counts_batch(&counted.counts).map_err(|e| raised(&e))?;
+    let bags = bags_batch(std::slice::from_ref(&counted.bag)).map_err(|e| raised(&e))?;
+    Ok(BTreeMap::from([
+        ("counts", Table(counts)),
+        ("bags", Table(bags)),
+    ]))
+}
+
+fn planned(uri: String, mission: Option<String>, origin: i64) -> PlannedBag {
+    PlannedBag {
+        mission: mission.unwrap_or_else(|| uri.clone()),
+        uri,
+        origin: Stamp(origin),
+    }
+}
+
+/// The plan of a single bag.
+fn one(uri: String, mission: Option<String>, planning: &Planning) -> Result<PlannedBag, Error> {
+    let plan = fleet::plan(std::slice::from_ref(&uri), planning)?;
+    let mut bags = plan.bags.into_iter();
+    match (bags.next(), bags.next()) {
+        (Some(bag), None) => Ok(PlannedBag {
+            mission: mission.unwrap_or(bag.mission),
+            ..bag
+        }),
+        _ => Err(Error::usage(
+            format!("`{uri}` is not one bag"),
+            "list its bags with `plan`, and give each",
+        )),
+    }
+}
+
+fn counts(tables: Vec<Table>) -> PyResult<Vec<fleet::Count>> {
+    let mut all = Vec::new();
+    for table in &tables {
+        all.extend(counts_of(&table.0).map_err(|e| raised(&e))?);
+    }
+    Ok(all)
+}
+
+/// One table `counts` of those of all parts of one or more bags.
+#[pyfunction]
+fn merge(py: Python<'_>, tables: Vec<Table>) -> PyResult<Table> {
+    let counts = counts(tables)?;
+    let merged = py.detach(|| counts_batch(&fleet::merge(counts)));
+    merged.map(Table).map_err(|e| raised(&e))
+}
+
+/// The mission that the counts of its bags tell of.
+#[pyfunction]
+fn finish(py: Python<'_>, tables: Vec<Table>) -> PyResult<Mission> {
+    let counts = counts(tables)?;
+    let mission = py.detach(|| fleet::finish(counts));
+    mission.map(Mission).map_err(|e| raised(&e))
+}
+
+/// Reads bags, or a mission's own JSON, as one mission.
+#[pyfunction]
+#[pyo3(signature = (uris, *, period=None, align="bag"))]
+fn read(py: Python<'_>, uris: Vec<String>, period: Option<&str>, align: &str) -> PyResult<Mission> {
+    let mut reading = Reading::of(uris);
+    reading.division.length = match period {
+        None => Length::Auto,
+        Some("all") => Length::All,
+        Some(text) => Length::Fixed(self::period(text)?),
+    };
+    reading.division.align = self::align(align)?;
+    let mission = py.detach(|| bagreel::read(&reading));
+    mission.map(Mission).map_err(|e| raised(&e))
+}
+
+/// Runs the command with these arguments, the program's name first; its exit code.
+#[pyfunction]
+fn main(py: Python<'_>, args: Vec<OsString>) -> u8 {
+    py.detach(|| bagreel::run_command(args))
+}
+
+/// A mission: its windows, what is in them, what changed.
+#[pyclass(frozen, module = "bagreel")]
+struct Mission(Read);
+
+#[pymethods]
+impl Mission {
+    /// Its tables by name: `edges`, `topics`, `nodes`, `changes`, `ledger`, `phases`, `bags`.
+    fn tables(&self, py: Python<'_>) -> PyResult<BTreeMap<&'static str, Table>> {
+        let tables = py.detach(|| mission_batches(&self.0));
+        let tables = tables.map_err(|e| raised(&e))?.into_iter();
+        Ok(tables.map(|(word, batch)| (word, Table(batch))).collect())
+    }
+
+    /// The mission as the text that `render -o x.json` writes.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        let mut text = Vec::new();
+        py.detach(|| bagreel::write_json(&self.0, &mut text))
+            .map_err(|e| BagreelError::new_err(e.to_string()))?;
+        String::from_utf8(text).map_err(|e| BagreelError::new_err(e.to_string()))
+    }
+
+    /// Windows.
+    fn __len__(&self) -> usize {
+        self.0.windows.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let (windows, entries) = (self.0.windows.len(), self.0.ledger.entries.len());
+        format!("<bagreel.Mission: {windows} windows, {entries} entries>")
+    }
+}
+
+/// The native part of the package `bagreel`.
+#[pymodule]
+mod _bagreel {
+    #[pymodule_export]
+    use super::{
+        BagreelError, Mission, StoreError, Table, finish, main, merge, plan, read, tables,
+    };
+}

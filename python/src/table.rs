@@ -1,0 +1,128 @@
+//! A table that other libraries take over without copying, by Arrow's PyCapsule interface.
+//!
+//! The interface: <https://arrow.apache.org/docs/format/CDataInterface/PyCapsuleInterface.html>.
+
+use std::ffi::CStr;
+
+use arrow_array::ffi::{FFI_ArrowArray, FFI_ArrowSchema, from_ffi, to_ffi};
+use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+use arrow_array::{Array as _, RecordBatch, RecordBatchIterator, StructArray};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyCapsule, PyTuple};
+
+use super::BagreelError;
+
+const SCHEMA: &CStr = c"arrow_schema";
+const ARRAY: &CStr = c"arrow_array";
+const STREAM: &CStr = c"arrow_array_stream";
+
+/// An Arrow record batch. `pyarrow.record_batch(table)`, `polars.DataFrame(table)` and DuckDB take it as it is.
+#[pyclass(frozen, module = "bagreel", from_py_object)]
+#[derive(Clone)]
+pub(crate) struct Table(pub(crate) RecordBatch);
+
+fn arrow(error: impl std::fmt::Display) -> PyErr {
+    BagreelError::new_err(format!("no Arrow table can be made: {error}"))
+}
+
+#[pymethods]
+impl Table {
+    /// Takes over any object that is an Arrow record batch.
+    #[new]
+    fn new(from: &Bound<'_, PyAny>) -> PyResult<Self> {
+        taken(from)
+    }
+
+    #[getter]
+    fn num_rows(&self) -> usize {
+        self.0.num_rows()
+    }
+
+    #[getter]
+    fn column_names(&self) -> Vec<String> {
+        let schema = self.0.schema();
+        schema
+            .fields()
+            .iter()
+            .map(|field| field.name().clone())
+            .collect()
+    }
+
+    fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        let schema = FFI_ArrowSchema::try_from(self.0.schema().as_ref()).map_err(arrow)?;
+        PyCapsule::new_with_value(py, schema, SCHEMA)
+    }
+
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_array__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        // A consumer casts what it does not like itself.
+        let _ = requested_schema;
+        let data = StructArray::from(self.0.clone()).to_data();
+        let (array, schema) = to_ffi(&data).map_err(arrow)?;
+        let schema = PyCapsule::new_with_value(py, schema, SCHEMA)?;
+        let array = PyCapsule::new_with_value(py, array, ARRAY)?;
+        PyTuple::new(py, [schema, array])
+    }
+
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        let _ = requested_schema;
+        let rows = RecordBatchIterator::new([Ok(self.0.clone())], self.0.schema());
+        let stream = FFI_ArrowArrayStream::new(Box::new(rows));
+        PyCapsule::new_with_value(py, stream, STREAM)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.num_rows()
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<bagreel.Table: {} rows of {}>",
+            self.0.num_rows(),
+            self.column_names().join(", ")
+        )
+    }
+
+    /// As `pyarrow.RecordBatch`; no row is copied.
+    fn to_pyarrow<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let pyarrow = slf.py().import("pyarrow")?;
+        pyarrow.call_method1("record_batch", (slf,))
+    }
+
+    /// As `pandas.DataFrame`.
+    fn to_pandas(slf: Bound<'_, Self>) -> PyResult<Bound<'_, PyAny>> {
+        Self::to_pyarrow(slf)?.call_method0("to_pandas")
+    }
+}
+
+/// A record batch that somebody else made.
+fn taken(from: &Bound<'_, PyAny>) -> PyResult<Table> {
+    if let Ok(table) = from.cast::<Table>() {
+        return Ok(table.get().clone());
+    }
+    let wrong = || PyTypeError::new_err("give a record batch: an object with `__arrow_c_array__`");
+    let pair = from
+        .call_method0("__arrow_c_array__")
+        .map_err(|_| wrong())?;
+    let (schema, array): (Bound<'_, PyCapsule>, Bound<'_, PyCapsule>) = pair.extract()?;
+    let schema = schema
+        .pointer_checked(Some(SCHEMA))?
+        .cast::<FFI_ArrowSchema>();
+    let array = array.pointer_checked(Some(ARRAY))?.cast::<FFI_ArrowArray>();
+    // SAFETY: capsules of these names hold these structures. What is moved out of the array leaves it released, as the
+    // interface asks of a consumer; the schema is only read.
+    let data = unsafe { from_ffi(FFI_ArrowArray::from_raw(array.as_ptr()), schema.as_ref()) };
+    Ok(Table(RecordBatch::from(StructArray::from(
+        data.map_err(arrow)?,
+    ))))
+}
