@@ -181,7 +181,9 @@ impl Style {
             Some(Value::String(base)) => builtin_text(base)
                 .and_then(|text| complete(text, path))
                 .map_err(|e| file.bad(&["base"], e.to_string()))?,
-            Some(_) => return Err(file.bad(&["base"], "`base` is not the name of a style".to_owned())),
+            Some(_) => {
+                return Err(file.bad(&["base"], "`base` is not the name of a style".to_owned()));
+            }
         };
         file.overlay(&mut keys)?;
         Self::from_keys(keys, path)
@@ -297,8 +299,8 @@ impl<'a> StyleFile<'a> {
             let known = known
                 .ok_or_else(|| self.bad(&[section], format!("unknown section `{section}`")))?;
             let table = value.as_table();
-            let table =
-                table.ok_or_else(|| self.bad(&[section], format!("`{section}` is not a section")))?;
+            let table = table
+                .ok_or_else(|| self.bad(&[section], format!("`{section}` is not a section")))?;
             for (key, value) in table {
                 let at = [section.as_str(), key.as_str()];
                 let old = known.get_mut(key);
