@@ -137,10 +137,11 @@ fn serve(stream: TcpStream, state: &Mutex<State>) {
             head.push(line.trim().to_owned());
         }
         let (status, fields, body) = answer(&head, &mut state.lock().unwrap());
-        let fields: String = fields
+        let fields: Vec<String> = fields
             .iter()
             .map(|(k, v)| format!("{k}: {v}\r\n"))
             .collect();
+        let fields = fields.concat();
         let text = format!("HTTP/1.1 {status} X\r\n{fields}\r\n");
         if stream.write_all(text.as_bytes()).is_err() || stream.write_all(&body).is_err() {
             return;
@@ -261,7 +262,9 @@ fn an_object_counts_like_the_file() {
         let near = counted(&path.to_string_lossy(), CountDetail::Index).unwrap();
         let plain = |counted: &CountedBag| {
             let mut counts = counted.counts.clone();
-            counts.iter_mut().for_each(|count| count.bag = "".into());
+            for count in &mut counts {
+                count.bag = "".into();
+            }
             counts
         };
         assert_eq!(plain(&far), plain(&near), "{name}");
