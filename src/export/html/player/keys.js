@@ -53,7 +53,8 @@ document.addEventListener('click', e => {
 $.speed.onchange = () => $.play.focus();
 const resized = () => { wide = stage.clientWidth; high = stage.clientHeight; drawTime(); fit(view); };
 new ResizeObserver(resized).observe(stage);
-onhashchange = load;
+// The address that was asked for, even where ours was written over it since.
+onhashchange = e => load(e.newURL.split('#')[1]);
 if ($.open) $.open.hidden = !folded;
 $.notes.hidden = !$.notes.querySelector('li');
 if (innerWidth < 1200) side(false);
@@ -61,4 +62,4 @@ livesOn(innerWidth > 760 && innerHeight > 600);
 if (innerWidth <= 760) side(true);
 // The board draws its own head.
 if ($.boardhead) onSeek.push(() => { for (const k of ['x', 'width']) $.boardhead.setAttribute(k, $.boardhead.dataset[k].split(' ')[now]); });
-load();
+load(location.hash.slice(1));

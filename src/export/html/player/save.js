@@ -10,8 +10,8 @@ function save() {
 	later = setTimeout(() => { if (!timer) try { history.replaceState(0, '', link()); } catch {} }, 50);
 }
 // A window by its time; an element by its kind and name, or by a name alone: a node before a topic.
-function load() {
-	const to = new URLSearchParams(location.hash.slice(1)), time = parseFloat(to.get('t')), against = parseFloat(to.get('b'));
+function load(hash = '') {
+	const to = new URLSearchParams(hash), time = parseFloat(to.get('t')), against = parseFloat(to.get('b'));
 	$.q.value = to.get('q') ?? '';
 	base = against >= 0 ? windowAt(against) : -1;
 	now = time >= 0 ? windowAt(time) : data.still;
