@@ -34,11 +34,14 @@ pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTre
     tracks.iter().map(of).collect()
 }
 
-/// How many parts of namespaces tell groups apart, from all of them down to the first one.
+/// The most parts of namespaces that tell groups apart: each is a layout to try, and names come from the bag.
+const MOST_PARTS: usize = 8;
+
+/// The numbers of parts of namespaces that may tell groups apart, from all of them down to the first one.
 pub(crate) fn depths(tracks: &[Track]) -> impl Iterator<Item = usize> + use<> {
     let parts = |t: &Track| namespace(&t.name).matches('/').count();
     let deepest = tracks.iter().map(parts).max().unwrap_or(1).max(1);
-    (1..=deepest).rev()
+    (1..=deepest.min(MOST_PARTS)).rev()
 }
 
 /// The first `depth` parts of a namespace.
