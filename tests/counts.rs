@@ -92,6 +92,7 @@ fn every_frame_counts_what_the_data_says() {
             let svg = text(&format!("x{index:0digits$}.svg"));
             let at = format!("{bag} by {period} s, window {index}");
             frame(&svg, told, &at);
+            alive(&svg, &mission["windows"][index], &at);
             let is_back = svg.contains(" is back after ") || svg.contains(" are back");
             assert_eq!(is_back, over.contains(&index), "who is back in {at}");
             chart(&text(&format!("x{index:0digits$}.mmd")), told, &at);
@@ -124,6 +125,27 @@ fn frame(svg: &str, told: &BTreeSet<u64>, at: &str) {
         svg.contains("no reconfiguration"),
         "caption of {at}"
     );
+}
+
+/// A node that is drawn as active is one of the window's nodes in the data: of an anonymous one, a run of it.
+fn alive(svg: &str, window: &Value, at: &str) {
+    let nodes = window["nodes"].as_array().unwrap();
+    let names: Vec<&str> = nodes.iter().map(|n| n["name"].as_str().unwrap()).collect();
+    let is_run = |name: &str, role: &str| {
+        let rest = name.strip_prefix(role);
+        rest.is_some_and(|rest| rest.chars().all(|c| c == '_' || c.is_ascii_digit()))
+    };
+    let tags = svg.split("<g class=\"node ").skip(1);
+    for tag in tags.map(|rest| &rest[..rest.find('>').unwrap()]) {
+        let (classes, rest) = tag.split_once("\" data-name=\"").unwrap();
+        let name = &rest[..rest.find('"').unwrap()];
+        let classes: Vec<&str> = classes.split(' ').collect();
+        // An unknown publisher is a box, and no node.
+        let is_drawn = classes.contains(&"active") && !classes.contains(&"removed");
+        if is_drawn && !name.contains(" ?") {
+            assert!(names.iter().any(|n| is_run(n, name)), "{name} of {at}");
+        }
+    }
 }
 
 /// The timeline's marks: a window without a headline has none.

@@ -73,9 +73,11 @@ impl<'a> ItemTurns<'a> {
         };
         let entries = &mission.ledger.entries;
         for entry in entries {
-            // A part is told with its whole, so that it comes and goes with it. What restarts keeps its parts.
+            // A part is told with its whole, so that it comes and goes with it. What restarts keeps its parts; of a role
+            // one run ends there and the next one begins, without which each of them would live all the time.
             let whole = entry.part_of.and_then(|id| entries.get(id as usize));
-            if whole.is_some_and(|whole| whole.kind == Kind::Restarted) {
+            let is_kept = whole.is_some_and(|whole| whole.kind == Kind::Restarted);
+            if is_kept && !matches!(entry.what, Element::Node(_)) {
                 continue;
             }
             let begins = match entry.kind {
