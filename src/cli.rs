@@ -442,6 +442,13 @@ fn log(args: &EventsArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, 
     Ok(code(&mission))
 }
 
+#[cfg_attr(
+    not(feature = "parquet"),
+    expect(
+        clippy::match_wildcard_for_single_variants,
+        reason = "with Parquet there are two tables"
+    )
+)]
 fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, Error> {
     let time = TimeArgs {
         period: Some(Length::Parts(PARTS)),

@@ -53,7 +53,8 @@ impl Terminal {
         }
     }
 
-    /// Prints one of several errors that did not end the run.
+    /// Prints one of several errors that did not end the run, as only tables have them.
+    #[cfg(feature = "parquet")]
     pub(crate) fn failed(&mut self, why: &str) {
         self.end_stage();
         self.line("31", "error", why);
