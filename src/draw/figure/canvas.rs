@@ -5,6 +5,9 @@ use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
 
+/// No line of a page has room for a text of more characters than this; what is behind them is not measured.
+const LONGEST: usize = 1000;
+
 /// Pixels per millimetre of a page on paper, 96 to the inch.
 pub(crate) const PX_PER_MM: f64 = 96.0 / 25.4;
 /// Millimetres per point.
@@ -125,8 +128,9 @@ impl<'a> PaperCanvas<'a> {
 
     /// `text` cut at its end with … until it is at most `most` wide.
     pub(crate) fn cut(&self, text: &str, of: Type, most: f64) -> String {
-        let shown = self.fonts.shown(text);
-        if self.width(&shown, of) <= most {
+        let end = text.char_indices().nth(LONGEST).map(|(end, _)| end);
+        let shown = self.fonts.shown(&text[..end.unwrap_or(text.len())]);
+        if end.is_none() && self.width(&shown, of) <= most {
             return shown.into_owned();
         }
         let mut kept: Vec<char> = shown.chars().collect();
@@ -270,5 +274,22 @@ impl<'a> PaperCanvas<'a> {
             title,
             groups: self.into_groups(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_cut_fits_however_long_it_was() {
+        let fonts = Fonts::bundled();
+        let canvas = PaperCanvas::new(&fonts, Sizes::of_names(7.0), PX_PER_MM);
+        // Held against every prefix, this would take hours.
+        let names = "/robot1/planner, ".repeat(50_000);
+        let cut = canvas.cut(&names, Type::Small, 30.0);
+        assert!(cut.ends_with('\u{2026}') && canvas.width(&cut, Type::Small) <= 30.0);
+        assert!(cut.starts_with("/robot1/planner, "));
+        assert_eq!(canvas.cut("/robot1", Type::Small, 30.0), "/robot1");
     }
 }
