@@ -292,6 +292,15 @@ impl Route {
         }
     }
 
+    /// About its length: that of the straight lines between the points that its pieces join.
+    fn length(&self) -> f64 {
+        let ends = self.curves.iter().map(|curve| curve[2]);
+        let far = |(length, from): (f64, Point), to: Point| {
+            (length + libm::hypot(to.x - from.x, to.y - from.y), to)
+        };
+        ends.fold((0.0, self.start), far).0
+    }
+
     /// This route from its end to its start.
     fn backwards(&self) -> Self {
         let points: Vec<Point> = self.points().rev().collect();

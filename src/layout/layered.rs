@@ -5,11 +5,14 @@
 pub(crate) mod acyclic;
 pub(crate) mod crossings;
 pub(crate) mod fold;
+pub(crate) mod inside;
 pub(crate) mod labels;
 pub(crate) mod order;
 pub(crate) mod parts;
 pub(crate) mod place;
 pub(crate) mod rank;
+pub(crate) mod subplan;
+pub(crate) mod wrap;
 
 use std::collections::BTreeSet;
 
@@ -43,30 +46,19 @@ impl Engine for Layered {
 
 /// The layered layout of a sane plan.
 pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
-    let parts = parts::parts(plan);
-    let aspect = options.page.w / options.page.h.max(1.0);
-    let orderings: Vec<Vec<Ordering>> = parts
-        .iter()
-        .map(|part| orderings(plan, part, aspect))
-        .collect();
-    if orderings.iter().any(Vec::is_empty) {
+    let Some(draft) = Draft::new(plan, options) else {
         let mut layout = grid::lay_out(plan, options);
         labels::place(plan, &mut layout);
         return layout;
-    }
+    };
     let both = [Orientation::LeftRight, Orientation::TopBottom];
     let wished = both
         .into_iter()
         .filter(|o| options.orientation.is_none_or(|options| options == *o));
-    let tries = wished.map(|orientation| {
-        let blocks: Vec<PlacedPart> = parts
-            .iter()
-            .zip(&orderings)
-            .map(|(part, orderings)| best_block(plan, options, part, orderings, orientation))
-            .collect();
-        assembled(plan, options, &parts, blocks, orientation)
-    });
-    let labelled = tries.map(|(quality, mut layout)| {
+    let tries = wished.map(|orientation| draft.assembled(plan, options, orientation));
+    let labelled = tries.map(|(crossings, mut layout)| {
+        let length = layout.routes.iter().map(Route::length).sum();
+        let quality = quality(layout.size, (crossings, length), plan.links.len(), options);
         labels::place(plan, &mut layout);
         (quality * (0.6 + 0.4 * labelled(plan, &layout)), layout)
     });
@@ -90,6 +82,38 @@ fn labelled(plan: &Plan, layout: &Layout) -> f64 {
         1.0
     } else {
         placed as f64 / wanted as f64
+    }
+}
+
+/// The parts of a plan, each with the ways of ordering it.
+struct Draft {
+    parts: Vec<Component>,
+    orderings: Vec<Vec<Ordering>>,
+}
+
+impl Draft {
+    /// The draft of a sane plan; `None` if a part is too large for layers.
+    fn new(plan: &Plan, options: &LayoutOptions) -> Option<Self> {
+        let parts = parts::parts(plan);
+        let aspect = options.page.w / options.page.h.max(1.0);
+        let ways = parts.iter().map(|part| orderings(plan, part, aspect));
+        let orderings: Vec<Vec<Ordering>> = ways.collect();
+        let is_whole = !orderings.iter().any(Vec::is_empty);
+        is_whole.then_some(Self { parts, orderings })
+    }
+
+    /// Every part in its best way, packed on the page; and the number of crossings.
+    fn assembled(
+        &self,
+        plan: &Plan,
+        options: &LayoutOptions,
+        orientation: Orientation,
+    ) -> (u64, Layout) {
+        let parts = self.parts.iter().zip(&self.orderings);
+        let blocks = parts
+            .map(|(part, orderings)| best_block(plan, options, part, orderings, orientation))
+            .collect();
+        assembled(plan, options, &self.parts, blocks, orientation)
     }
 }
 
@@ -160,14 +184,26 @@ pub(crate) struct PlacedPart {
     pub(crate) clusters: Vec<Rect>,
 }
 
+/// The weight of the length of edges in the quality of a drawing: one whose edges are half as long again is a tenth
+/// worse, as much as one that is a tenth smaller.
+const LENGTH: f64 = 0.25;
+
 /// The quality of a drawing, larger for a better one: from the scale at which it fills the page above all, from its
-/// smallness, and from the number of its crossings.
-fn quality(size: Size, crossings: u64, links: usize, options: &LayoutOptions) -> f64 {
+/// smallness, and from the number of crossings and the length of its edges.
+fn quality(
+    size: Size,
+    (crossings, length): (u64, f64),
+    links: usize,
+    options: &LayoutOptions,
+) -> f64 {
+    let links = links.max(1) as f64;
     let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
     let readable = libm::pow(pack::fit(size, options.page), 0.8) * libm::pow(small, 0.2);
-    readable / (1.0 + 0.5 * crossings as f64 / links.max(1) as f64)
+    let shortness = libm::pow((length / links).max(1.0), -LENGTH);
+    readable * shortness / (1.0 + 0.5 * crossings as f64 / links)
 }
 
+/// The best of all ways to place a part.
 fn best_block(
     plan: &Plan,
     options: &LayoutOptions,
@@ -175,17 +211,30 @@ fn best_block(
     orderings: &[Ordering],
     orientation: Orientation,
 ) -> PlacedPart {
-    let blocks = orderings
+    let links = part.links.len();
+    let judged = |block: PlacedPart| {
+        let length = block.routes.iter().map(Route::length).sum();
+        let quality = quality(block.size, (block.crossings, length), links, options);
+        (quality, block)
+    };
+    let better = |best: (f64, PlacedPart), next: (f64, PlacedPart)| {
+        if next.0 > best.0 { next } else { best }
+    };
+    let plain = orderings
         .iter()
-        .map(|ordering| block(plan, part, ordering, orientation));
-    let judged = blocks.map(|block| {
-        (
-            quality(block.size, block.crossings, part.links.len(), options),
-            block,
-        )
-    });
-    let best = judged.reduce(|best, next| if next.0 > best.0 { next } else { best });
-    best.map_or_else(PlacedPart::empty, |best| best.1)
+        .map(|ordering| judged(block(plan, part, ordering, orientation)));
+    let Some(best) = plain.reduce(better) else {
+        return PlacedPart::empty();
+    };
+    let is_long = wrap::is_long(best.1.size, options, orientation);
+    if links > MANY {
+        return best.1;
+    }
+    let inside = inside::inside(plan, options, part, is_long, orientation);
+    let ways = orderings.iter().filter(|_| is_long);
+    let wraps = ways.flat_map(|way| wrap::wraps(plan, options, part, &way.layers, orientation));
+    let others = inside.into_iter().chain(wraps).map(judged);
+    others.fold(best, better).1
 }
 
 fn block(
@@ -273,14 +322,14 @@ impl PlacedPart {
     }
 }
 
-/// All blocks packed, with the quality of the whole.
+/// All blocks packed, and the number of their crossings.
 pub(crate) fn assembled(
     plan: &Plan,
     options: &LayoutOptions,
     parts: &[Component],
     blocks: Vec<PlacedPart>,
     orientation: Orientation,
-) -> (f64, Layout) {
+) -> (u64, Layout) {
     let sizes: Vec<Size> = blocks.iter().map(|block| block.size).collect();
     let (corners, size) = pack::pack(&sizes, options.page, PART_GAP);
     let crossings = blocks.iter().map(|block| block.crossings).sum();
@@ -304,5 +353,5 @@ pub(crate) fn assembled(
             layout.routes[i] = route.mapped(|p| Point::new(p.x + corner.x, p.y + corner.y));
         }
     }
-    (quality(size, crossings, plan.links.len(), options), layout)
+    (crossings, layout)
 }

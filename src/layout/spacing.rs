@@ -9,7 +9,7 @@ use crate::layout::{Component, LayerItem, LayerRows, Layers, Orientation, Plan};
 const BOX_GAP: f64 = 12.0;
 const EDGE_GAP: f64 = 7.0;
 /// The room between a cluster's border and what is inside, and outside.
-const PADDING: f64 = 7.0;
+pub(crate) const PADDING: f64 = 7.0;
 const MARGIN: f64 = 4.0;
 /// The room before and after a label between two layers.
 const LABEL_GAP: f64 = 12.0;

@@ -27,7 +27,15 @@ use bagreel::internals::layout::{self, Layout, Orientation};
 
 use graph::Graph;
 
-const GRAPHS: [&str; 6] = ["medium", "cyclic", "disconnected", "large", "churn", "huge"];
+const GRAPHS: [&str; 7] = [
+    "example",
+    "medium",
+    "cyclic",
+    "disconnected",
+    "large",
+    "churn",
+    "huge",
+];
 const PAGE: Size = Size::new(1280.0, 560.0);
 
 fn main() {
@@ -50,12 +58,14 @@ fn main() {
     };
     let folder = value("--svg").map(Path::new);
     println!(
-        "| graph | engine | | size | fit | Mpx | crossings | bends | overlaps | through | foreign | labels | label overlaps | ms |"
+        "| graph | engine | | size | fit | Mpx | length | crossings | bends | overlaps | through | foreign | labels | label overlaps | ms |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for name in GRAPHS.iter().filter(chosen) {
-        let mut graph =
-            graph::read(&Path::new("../shared/data/graphs").join(format!("{name}.json")));
+        let mut graph = match *name {
+            "example" => graph::of_bag("examples/warehouse.bag"),
+            name => graph::read(&Path::new("../shared/data/graphs").join(format!("{name}.json"))),
+        };
         if args.iter().any(|a| a == "--flat") {
             graph.plan.clusters.clear();
             graph
@@ -115,10 +125,11 @@ fn report(name: &str, engine: &str, graph: &Graph, layout: &Layout, took: Durati
     let found = measure::measure(&graph.plan, layout);
     let Size { w, h } = layout.size;
     println!(
-        "| {name} | {engine} | {} | {w:.0} × {h:.0} | {:.3} | {:.2} | {} | {} | {} | {} | {} | {} | {} | {:.1} |",
+        "| {name} | {engine} | {} | {w:.0} × {h:.0} | {:.3} | {:.2} | {:.0} | {} | {} | {} | {} | {} | {} | {} | {:.1} |",
         layout.orientation.word(),
         (PAGE.w / w).min(PAGE.h / h),
         w * h / 1e6,
+        found.length,
         found.crossings,
         found.bends,
         found.overlaps,

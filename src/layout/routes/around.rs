@@ -46,6 +46,65 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
     (routes, straight)
 }
 
+/// The radius at which an edge with given points turns.
+const BEND: f64 = 9.0;
+
+/// A route from one box to another through these points, around whatever stands between; `None` if a way is blocked.
+pub(crate) fn via(
+    boxes: &[Rect],
+    ends: (usize, usize),
+    outlines: [Outline; 2],
+    points: &[Point],
+) -> Option<Route> {
+    let mut map = Map::new(boxes);
+    let (first, last) = (points.first()?, points.last()?);
+    let (start, end) = (boxes[ends.0].centre(), boxes[ends.1].centre());
+    let mut way = map.way(start, *first, (ends.0, ends.0))?;
+    way.extend(&points[1..]);
+    let rest = map.way(*last, end, (ends.1, ends.1))?;
+    way.extend(&rest[1..]);
+    let many = way.len();
+    way[0] = leaves(&boxes[ends.0], outlines[0], way[0], way[1]);
+    way[many - 1] = leaves(&boxes[ends.1], outlines[1], way[many - 1], way[many - 2]);
+    Some(rounded(&way))
+}
+
+/// A route along these points with round corners.
+fn rounded(way: &[Point]) -> Route {
+    let mut route = Route {
+        start: way[0],
+        ..Route::default()
+    };
+    let mut at = way[0];
+    for three in way.windows(3) {
+        let (corner, next) = (three[1], three[2]);
+        let (before, after) = (towards(corner, at), towards(corner, next));
+        route.curves.push(straight(at, before));
+        route.curves.push([
+            mixed(before, corner, 2.0 / 3.0),
+            mixed(after, corner, 2.0 / 3.0),
+            after,
+        ]);
+        at = after;
+    }
+    route.curves.push(straight(at, way[way.len() - 1]));
+    route
+}
+
+/// The point at which the turn around a corner begins on the way to another point: half the way at most.
+fn towards(corner: Point, other: Point) -> Point {
+    let length = libm::hypot(other.x - corner.x, other.y - corner.y).max(1e-9);
+    mixed(corner, other, (BEND / length).min(0.5))
+}
+
+fn mixed(p: Point, q: Point, t: f64) -> Point {
+    Point::new(p.x + (q.x - p.x) * t, p.y + (q.y - p.y) * t)
+}
+
+fn straight(p: Point, q: Point) -> [Point; 3] {
+    [mixed(p, q, 1.0 / 3.0), mixed(p, q, 2.0 / 3.0), q]
+}
+
 /// A vertex with its place.
 struct VertexPlace<'a> {
     plan: &'a Plan,
@@ -58,25 +117,9 @@ impl VertexPlace<'_> {
         self.boxes[self.v]
     }
 
-    /// The point where the line from a point inside to a point outside leaves the outline.
     fn leaves(&self, inside: Point, outside: Point) -> Point {
-        let rect = self.rect();
-        let (mut low, mut high) = (0.0, 1.0);
-        let at = |t: f64| {
-            Point::new(
-                inside.x + (outside.x - inside.x) * t,
-                inside.y + (outside.y - inside.y) * t,
-            )
-        };
-        for _ in 0..40 {
-            let middle = f64::midpoint(low, high);
-            if contains(&rect, self.plan.vertices[self.v].outline, at(middle)) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        at(high)
+        let outline = self.plan.vertices[self.v].outline;
+        leaves(&self.rect(), outline, inside, outside)
     }
 
     /// A small arc on top, the later ones around the earlier.
@@ -93,6 +136,20 @@ impl VertexPlace<'_> {
             label: None,
         }
     }
+}
+
+/// The point where the line from a point inside to a point outside leaves an outline.
+fn leaves(rect: &Rect, outline: Outline, inside: Point, outside: Point) -> Point {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..40 {
+        let middle = f64::midpoint(low, high);
+        if contains(rect, outline, mixed(inside, outside, middle)) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    mixed(inside, outside, high)
 }
 
 fn contains(rect: &Rect, outline: Outline, p: Point) -> bool {
@@ -140,15 +197,7 @@ fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
     let mut points = vec![start];
     points.extend(&way[1..last]);
     points.push(b.leaves(way[last], way[last - 1]));
-    let third =
-        |p: Point, q: Point, t: f64| Point::new(p.x + (q.x - p.x) * t, p.y + (q.y - p.y) * t);
-    let piece = |pair: &[Point]| {
-        [
-            third(pair[0], pair[1], 1.0 / 3.0),
-            third(pair[0], pair[1], 2.0 / 3.0),
-            pair[1],
-        ]
-    };
+    let piece = |pair: &[Point]| straight(pair[0], pair[1]);
     Route {
         start,
         curves: points.windows(2).map(piece).collect(),

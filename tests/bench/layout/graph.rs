@@ -19,14 +19,26 @@ pub(crate) struct Graph {
 /// The union of all windows of an evolution.
 pub(crate) fn read(path: &Path) -> Graph {
     let text = std::fs::read_to_string(path).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    union(&serde_json::from_str(&text).unwrap())
+}
+
+/// The union of all windows of a bag.
+#[allow(dead_code, reason = "the properties look at drawn graphs only")]
+pub(crate) fn of_bag(path: &str) -> Graph {
+    let mission = bagreel::read(&bagreel::Reading::of([path])).unwrap();
+    let mut json = Vec::new();
+    bagreel::write_json(&mission, &mut json).unwrap();
+    union(&serde_json::from_slice(&json).unwrap())
+}
+
+fn union(json: &serde_json::Value) -> Graph {
     let (mut nodes, mut topics) = (BTreeSet::new(), BTreeSet::new());
     let (mut publishes, mut subscribes) = (BTreeMap::new(), BTreeSet::new());
     let word =
         |value: &serde_json::Value, key: &str| value[key].as_str().unwrap_or_default().to_owned();
     let list =
         |value: &serde_json::Value, key: &str| value[key].as_array().cloned().unwrap_or_default();
-    for window in list(&json, "windows") {
+    for window in list(json, "windows") {
         nodes.extend(list(&window, "nodes").iter().map(|x| word(x, "name")));
         topics.extend(list(&window, "topics").iter().map(|x| word(x, "name")));
         for x in list(&window, "publishes") {

@@ -25,6 +25,8 @@ pub(crate) struct Measures {
     pub(crate) foreign: usize,
     /// How many pieces of routes are not straight and level.
     pub(crate) bends: usize,
+    /// The length of all edges, in pixels.
+    pub(crate) length: f64,
 }
 
 /// Measures a layout.
@@ -57,7 +59,12 @@ pub(crate) fn measure(plan: &Plan, layout: &Layout) -> Measures {
         label_overlaps: pairs(&labels) + on_boxes,
         foreign: foreign(plan, layout),
         bends: layout.routes.iter().map(bends).sum(),
+        length: lines.iter().flat_map(|line| line.windows(2)).map(far).sum(),
     }
+}
+
+fn far(pair: &[Point]) -> f64 {
+    (pair[0].x - pair[1].x).hypot(pair[0].y - pair[1].y)
 }
 
 /// A route as points.

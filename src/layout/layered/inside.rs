@@ -1,0 +1,48 @@
+//! A part that lies in one namespace: its inside is laid out like a page of its own, and framed.
+
+use super::subplan::Subplan;
+use super::{Draft, PlacedPart, parts};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::layout::spacing::PADDING;
+use crate::layout::{Component, LayoutOptions, Orientation, Plan};
+
+/// The part with its pieces packed inside the frames of the namespaces around all of it; `None` if there is no such
+/// namespace, or nothing to gain: a single piece that is not `long`.
+pub(crate) fn inside(
+    plan: &Plan,
+    options: &LayoutOptions,
+    part: &Component,
+    is_long: bool,
+    orientation: Orientation,
+) -> Option<PlacedPart> {
+    let root = part.root();
+    if root == 0 {
+        return None;
+    }
+    let inner = Subplan::new(plan, part, root, |_| true);
+    if !is_long && parts::parts(&inner.plan).len() < 2 {
+        return None;
+    }
+    let draft = Draft::new(&inner.plan, options)?;
+    let (crossings, layout) = draft.assembled(&inner.plan, options, orientation);
+    let mut placed = PlacedPart::unplaced(part);
+    inner.put(&layout, Point::default(), &mut placed);
+    let mut frame = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
+    for cluster in part.around(root) {
+        frame = framed(frame, plan.clusters[part.clusters[cluster - 1]].title);
+        placed.clusters[cluster - 1] = frame;
+    }
+    placed.crossings = crossings;
+    Some(placed.on_page(Orientation::LeftRight))
+}
+
+/// The frame of a namespace around its inside: the title stands at the top left.
+fn framed(inside: Rect, title: Size) -> Rect {
+    let around = inside.grown(PADDING);
+    Rect::new(
+        around.x,
+        around.y - title.h,
+        around.w.max(title.w + 2.0 * PADDING),
+        around.h + title.h,
+    )
+}

@@ -1,0 +1,265 @@
+//! Long parts in rows one below the other, like the lines of a text: chains of a hundred layers fit a page that way.
+//!
+//! Each row is a layout of its own; the edges between rows run through the channels between them.
+
+use super::subplan::Subplan;
+use super::{Draft, PlacedPart};
+use crate::base::geometry::{Point, Rect, Size};
+use crate::layout::routes::around;
+use crate::layout::spacing::turned;
+use crate::layout::{Component, Layers, Layout, LayoutOptions, Orientation, Plan, Route, pack};
+
+/// The aspect, along by across, beyond which a part that does not fit the page is long.
+const LONG: f64 = 2.5;
+/// The most rows.
+const MOST_ROWS: usize = 12;
+/// The most edges from a row to the next: with more of them the rows are no longer read one by one.
+const MOST_CUT: usize = 8;
+/// The room beside an edge in a channel, and between a channel and the boxes.
+const LANE: f64 = 8.0;
+const BESIDE: f64 = 12.0;
+
+/// Whether a placed part is so long that it does not fit the page.
+pub(crate) fn is_long(size: Size, options: &LayoutOptions, orientation: Orientation) -> bool {
+    let turned = turned(size, orientation);
+    turned.w > LONG * turned.h && pack::fit(size, options.page) < 1.0
+}
+
+/// The part in rows, cut at these layers in every number of rows that makes it fit the page better than the one before;
+/// none if it cannot be cut between its namespaces, or lies in one: then its inside can.
+pub(crate) fn wraps(
+    plan: &Plan,
+    options: &LayoutOptions,
+    part: &Component,
+    layers: &Layers,
+    orientation: Orientation,
+) -> Vec<PlacedPart> {
+    let mut found: Vec<PlacedPart> = Vec::new();
+    if part.root() != 0 {
+        return found;
+    }
+    let fit = |block: &PlacedPart| pack::fit(block.size, options.page);
+    for many in 2..=MOST_ROWS {
+        let rows = cuts(part, layers, many)
+            .and_then(|cuts| Rows::new(plan, options, part, layers, &cuts, orientation));
+        let Some(block) = rows.and_then(|rows| rows.placed(plan, part)) else {
+            continue;
+        };
+        let block = block.on_page(orientation);
+        // More rows make it narrower and higher: past the best there is nothing to find.
+        if found.last().is_some_and(|last| fit(last) >= fit(&block)) {
+            break;
+        }
+        found.push(block);
+    }
+    found
+}
+
+/// The first layer of each row but the first: where few edges pass, as evenly as that allows, and where no namespace is
+/// cut in two.
+fn cuts(part: &Component, layers: &Layers, many: usize) -> Option<Vec<usize>> {
+    let mut passing = vec![0_usize; layers.ranks];
+    for &(from, to) in &part.ends {
+        let (a, b) = (layers.rank[from], layers.rank[to]);
+        for rank in a.min(b) + 1..=a.max(b) {
+            passing[rank] += 1;
+        }
+    }
+    let is_whole = |rank: usize| {
+        let spans = layers.span.iter().skip(1);
+        spans
+            .into_iter()
+            .all(|&(low, high)| rank <= low || rank > high)
+    };
+    let length = layers.ranks / many;
+    let cut = |k: usize| {
+        let ideal = k * layers.ranks / many;
+        let near = ideal.saturating_sub(length / 3)..=ideal + length / 3;
+        let free = near.filter(|&rank| (1..layers.ranks).contains(&rank) && is_whole(rank));
+        free.min_by_key(|&rank| (passing[rank], rank.abs_diff(ideal), rank))
+            .filter(|&rank| passing[rank] <= MOST_CUT)
+    };
+    let cuts: Option<Vec<usize>> = (1..many).map(cut).collect();
+    cuts.filter(|cuts| cuts.windows(2).all(|pair| pair[0] < pair[1]))
+}
+
+/// The rows of a part, each laid out, x along the edges and y across.
+struct Rows {
+    rows: Vec<(Subplan, Layout)>,
+    /// The row of each vertex.
+    row: Vec<usize>,
+    crossings: u64,
+}
+
+impl Rows {
+    fn new(
+        plan: &Plan,
+        options: &LayoutOptions,
+        part: &Component,
+        layers: &Layers,
+        cuts: &[usize],
+        orientation: Orientation,
+    ) -> Option<Self> {
+        let row_of = |v: usize| cuts.partition_point(|&cut| cut <= layers.rank[v]);
+        let row: Vec<usize> = (0..part.vertices.len()).map(row_of).collect();
+        // A row may be as long as it likes: it is a row already.
+        let endless = LayoutOptions {
+            page: Size::new(1e5, 1e5),
+            ..*options
+        };
+        let mut rows = Vec::new();
+        let mut crossings = 0;
+        for at in 0..=cuts.len() {
+            let sub = Subplan::new(plan, part, 0, |v| row[v] == at);
+            let draft = Draft::new(&sub.plan, &endless)?;
+            let (crossed, layout) = draft.assembled(&sub.plan, &endless, orientation);
+            crossings += crossed;
+            rows.push((sub, lying(layout, orientation)));
+        }
+        Some(Self {
+            rows,
+            row,
+            crossings,
+        })
+    }
+
+    /// The rows below each other, with the edges from row to row in the channels between; `None` if a way is blocked.
+    fn placed(&self, plan: &Plan, part: &Component) -> Option<PlacedPart> {
+        let mut placed = PlacedPart::unplaced(part);
+        let cut: Vec<usize> = (0..part.ends.len())
+            .filter(|&link| self.row[part.ends[link].0] != self.row[part.ends[link].1])
+            .collect();
+        let many = cut.len();
+        let mut channels = vec![Channel::default(); self.rows.len()];
+        for &link in &cut {
+            for channel in self.channels(part.ends[link]) {
+                channels[channel].lanes += 1;
+            }
+        }
+        let mut y = 0.0;
+        for (at, (sub, layout)) in self.rows.iter().enumerate() {
+            sub.put(layout, Point::new(0.0, y), &mut placed);
+            y += layout.size.h + BESIDE;
+            channels[at].y = y;
+            y += BESIDE + LANE * channels[at].lanes as f64;
+        }
+        let boxes = placed.boxes.clone();
+        let mut margin = 0.0;
+        for link in cut {
+            let (from, to) = part.ends[link];
+            let ways = self.channels((from, to));
+            let lanes: Vec<f64> = ways.iter().map(|&c| channels[c].next()).collect();
+            if lanes.len() > 1 {
+                margin -= LANE;
+            }
+            let via = via((&boxes[from], &boxes[to]), &lanes, margin - BESIDE);
+            let outlines = [from, to].map(|v| plan.vertices[part.vertices[v]].outline);
+            placed.routes[link] = around::via(&boxes, (from, to), outlines, &via)?;
+        }
+        // An edge that is followed through a channel costs a reader as much as a crossing does.
+        placed.crossings = self.crossings + many as u64;
+        Some(placed)
+    }
+
+    /// The channels that an edge runs through: the one beyond its first row, and the one before its last if that is
+    /// another.
+    fn channels(&self, (from, to): (usize, usize)) -> Vec<usize> {
+        let (a, b) = (self.row[from], self.row[to]);
+        let mut ways = if a < b {
+            vec![a, b - 1]
+        } else {
+            vec![a - 1, b]
+        };
+        ways.dedup();
+        ways
+    }
+}
+
+/// The room between a row and the next.
+#[derive(Clone, Default)]
+struct Channel {
+    /// Where its first lane runs.
+    y: f64,
+    lanes: usize,
+}
+
+impl Channel {
+    /// The next free lane.
+    fn next(&mut self) -> f64 {
+        let y = self.y;
+        self.y += LANE;
+        y
+    }
+}
+
+/// The points that an edge passes between its ends: along the lanes, and down the margin between two of them.
+fn via((from, to): (&Rect, &Rect), lanes: &[f64], margin: f64) -> Vec<Point> {
+    let (out, back) = (from.centre().x, to.centre().x);
+    match *lanes {
+        [lane] => vec![Point::new(out, lane), Point::new(back, lane)],
+        [first, last] => vec![
+            Point::new(out, first),
+            Point::new(margin, first),
+            Point::new(margin, last),
+            Point::new(back, last),
+        ],
+        _ => Vec::new(),
+    }
+}
+
+/// A layout with x along the edges and y across.
+fn lying(layout: Layout, orientation: Orientation) -> Layout {
+    if orientation == Orientation::LeftRight {
+        return layout;
+    }
+    let rect = |r: &Rect| Rect::new(r.y, r.x, r.h, r.w);
+    Layout {
+        size: turned(layout.size, orientation),
+        boxes: layout.boxes.iter().map(rect).collect(),
+        clusters: layout.clusters.iter().map(rect).collect(),
+        routes: layout.routes.iter().map(flipped).collect(),
+        ..layout
+    }
+}
+
+fn flipped(route: &Route) -> Route {
+    route.mapped(|p| Point::new(p.y, p.x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::layered::lay_out;
+    use crate::layout::tests::{cluster, link, vertex};
+
+    /// A ring of `n` boxes, in a namespace or not.
+    fn ring(n: usize, home: Option<usize>) -> Layout {
+        let plan = Plan {
+            vertices: vec![vertex(home); n],
+            links: (0..n).map(|v| link(v, (v + 1) % n)).collect(),
+            clusters: vec![cluster(None)],
+        };
+        let options = LayoutOptions {
+            page: Size::new(1280.0, 560.0),
+            orientation: None,
+        };
+        lay_out(&plan, &options)
+    }
+
+    #[test]
+    fn a_long_ring_is_wrapped() {
+        for home in [None, Some(0)] {
+            let layout = ring(60, home);
+            let aspect = layout.size.w / layout.size.h;
+            assert!((1.0..4.0).contains(&aspect), "{home:?}: {:?}", layout.size);
+            let routes = layout.routes.iter().flat_map(Route::points);
+            assert!(routes.into_iter().all(|p| p.x >= 0.0 && p.y >= 0.0));
+        }
+    }
+
+    #[test]
+    fn a_short_chain_stays_a_line() {
+        let size = ring(5, None).size;
+        assert!(size.w > 3.0 * size.h || size.h > 3.0 * size.w, "{size:?}");
+    }
+}
