@@ -34,6 +34,7 @@ use crate::graph::{Element, State};
 use crate::mission::Mission;
 use crate::mission::ledger::{EntryId, Kind};
 
+pub(crate) use collapse::Collapsible;
 pub(crate) use filter::NameFilter;
 pub(crate) use filtered::filtered;
 pub(crate) use nothing::nothing;

@@ -13,7 +13,7 @@ use crate::draw::text::Fonts;
 use crate::layout::{Engine, Layout, RING, engine, extend, lay_out};
 use crate::mission::phases::knows_publishers;
 use crate::mission::{Mission, Place, Places};
-use crate::view::{Mode, View, ViewOptions, outline, view};
+use crate::view::{Collapsible, Mode, View, ViewOptions, outline, view};
 
 /// The kind of picture of a mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -126,7 +126,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     watch.stage(Stage::Layout);
     let mut page = drawing.page.clone();
     let mut options = drawing.view.clone();
-    let asked = options.collapse.len();
+    let (asked, expanded) = (options.collapse.len(), options.expand.len());
     let mut best = Attempt::new(mission, drawing, &options, &page);
     if let Some(purpose) = drawing.purpose {
         for size in purpose.sizes().into_iter().skip(1) {
@@ -154,6 +154,7 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
         } else {
             bundle(mission, drawing, &page, &mut options, &mut best);
         }
+        tighten(mission, drawing, &mut page, &options, &mut best);
     }
     if best.layout.is_none() {
         best = Attempt::drawn(mission, drawing, &options, &page);
@@ -167,7 +168,8 @@ pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watc
     let layout = layout.unwrap_or_else(Layout::empty);
     if drawing.is_fitted || drawing.purpose.is_some() {
         let collapsed = &options.collapse[asked..];
-        notices.extend(told(drawing, collapsed, &page, text).iter());
+        let parts = parts(collapsed, &options.expand[expanded..]);
+        notices.extend(told(drawing, &parts, &page, text).iter());
         if options.mode != drawing.view.mode {
             let text = format!(
                 "one arrow for all topics between two boxes{}; `--mode {}` draws each",
@@ -299,7 +301,10 @@ fn is_crowded(boxes: usize, drawing: &Drawing, page: &PageOptions) -> bool {
     boxes as f64 > page.size.w * page.size.h / (LEAST_BOX * text * text)
 }
 
-/// Collapses namespaces until the text can be read.
+/// The least number of boxes that must vanish in a collapsed namespace from which those that change are left out.
+const FEWEST_STEADY: usize = 3;
+
+/// Collapses namespaces until the text can be read: first what does not change in them, then the whole of them.
 fn collapse(
     mission: &Mission,
     drawing: &Drawing,
@@ -307,25 +312,50 @@ fn collapse(
     options: &mut ViewOptions,
     best: &mut Attempt,
 ) {
-    while !best.is_readable(drawing) {
-        let candidates = best.view.collapsible(mission, options);
-        let fresh = candidates
-            .into_iter()
-            .map(|c| c.name)
-            .filter(|name| !options.collapse.contains(name));
-        let fresh: Vec<Arc<str>> = fresh.collect();
-        if fresh.is_empty() {
-            return;
-        }
-        // Far too small a text is not worth a layout for every namespace on the way.
-        let many = if best.text < drawing.readable() / 2.0 {
-            fresh.len().div_ceil(4)
-        } else {
-            1
+    let mut left: Vec<(Arc<str>, Vec<Arc<str>>)> = Vec::new();
+    loop {
+        let is_new = |name: &Arc<str>| {
+            !options.collapse.contains(name) && !left.iter().any(|(other, _)| other == name)
         };
-        options.collapse.extend(fresh.into_iter().take(many));
+        let candidates = best.view.collapsible(mission, options).into_iter();
+        let fresh: Vec<Collapsible> = candidates.filter(|c| is_new(&c.name)).collect();
+        if best.is_readable(drawing) || fresh.is_empty() {
+            break;
+        }
+        for candidate in at_once(fresh, best, drawing) {
+            let mut changing = best.view.changing(mission, &candidate.name);
+            changing.retain(|name| !options.expand.contains(name));
+            if changing.is_empty() || candidate.items >= changing.len() + FEWEST_STEADY {
+                options.collapse.push(Arc::clone(&candidate.name));
+                options.expand.extend(changing.iter().cloned());
+            }
+            if !changing.is_empty() {
+                left.push((candidate.name, changing));
+            }
+        }
         *best = Attempt::new(mission, drawing, options, page);
     }
+    while !best.is_readable(drawing) && !left.is_empty() {
+        for (name, changing) in at_once(left.clone(), best, drawing) {
+            options.expand.retain(|kept| !changing.contains(kept));
+            if !options.collapse.contains(&name) {
+                options.collapse.push(Arc::clone(&name));
+            }
+            left.retain(|(other, _)| *other != name);
+        }
+        *best = Attempt::new(mission, drawing, options, page);
+    }
+}
+
+/// The first of these, or a quarter of them where the text is far too small: that is not worth a layout for every
+/// namespace on the way.
+fn at_once<T>(all: Vec<T>, best: &Attempt, drawing: &Drawing) -> Vec<T> {
+    let many = if best.text < drawing.readable() / 2.0 {
+        all.len().div_ceil(4)
+    } else {
+        1
+    };
+    all.into_iter().take(many).collect()
 }
 
 /// The last resort: outermost namespaces as one box each, and one arrow for all topics between two boxes; if that can
@@ -371,6 +401,29 @@ fn outermost(name: &str) -> Option<&str> {
     name.get(..end)
 }
 
+/// Takes the lowest page of a purpose on which what is left can be read.
+fn tighten(
+    mission: &Mission,
+    drawing: &Drawing,
+    page: &mut PageOptions,
+    options: &ViewOptions,
+    best: &mut Attempt,
+) {
+    let sizes = drawing.purpose.map(Purpose::sizes).unwrap_or_default();
+    let lower = sizes.into_iter().take_while(|size| size.h < page.size.h);
+    for size in lower.collect::<Vec<_>>() {
+        let lower = PageOptions {
+            size,
+            ..page.clone()
+        };
+        let attempt = Attempt::new(mission, drawing, options, &lower);
+        if attempt.is_readable(drawing) {
+            (*page, *best) = (lower, attempt);
+            return;
+        }
+    }
+}
+
 /// The largest number of collapsed namespaces that are tried to be opened again.
 const MOST_REOPENED: usize = 24;
 
@@ -397,8 +450,29 @@ fn open_again(
     }
 }
 
+/// The collapsed namespaces in words, with the number of those in it that were kept open because they change.
+fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
+    let told = |name: &Arc<str>| {
+        let inside = |other: &&Arc<str>| {
+            let rest = other.strip_prefix(&**name);
+            rest.is_some_and(|rest| rest.starts_with('/'))
+        };
+        let words = match kept.iter().filter(inside).count() {
+            0 => name.to_string(),
+            many => format!("{name} but for {} in it", words::count(many, "change")),
+        };
+        (Arc::clone(name), words)
+    };
+    collapsed.iter().map(told).collect()
+}
+
 /// The notices about what `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
-fn told(drawing: &Drawing, collapsed: &[Arc<str>], got: &PageOptions, text: f64) -> Notices {
+fn told(
+    drawing: &Drawing,
+    collapsed: &[(Arc<str>, String)],
+    got: &PageOptions,
+    text: f64,
+) -> Notices {
     let mut notices = Notices::new();
     let is_readable = text >= drawing.readable();
     if drawing.page.size != got.size && drawing.purpose.is_none() {
@@ -410,11 +484,12 @@ fn told(drawing: &Drawing, collapsed: &[Arc<str>], got: &PageOptions, text: f64)
         );
         notices.add(Notice::new(NoticeKind::Chosen, text));
     }
-    if let Some(first) = collapsed.first() {
+    if let Some((first, _)) = collapsed.first() {
+        let collapsed: Vec<&String> = collapsed.iter().map(|(_, words)| words).collect();
         let text = format!(
             "drawn as one box each{}: {}; `--expand {first}` opens one, `--fit none` all",
             so_that(is_readable),
-            words::some_of(collapsed, 3)
+            words::some_of(&collapsed, 3)
         );
         notices.add(Notice::new(NoticeKind::Hidden, text));
     }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{Item, Namespace};
+use super::{Item, ItemKind, Namespace};
 
 /// The largest depth of nested boxes; a name of nothing but slashes must not make thousands of boxes in each other.
 const DEEPEST: usize = 16;
@@ -15,7 +15,7 @@ const DEEPEST: usize = 16;
 /// namespace around a single thing is left out.
 pub(crate) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespace> {
     let levels = depth.unwrap_or(DEEPEST).min(DEEPEST);
-    let homes: Vec<String> = items.iter().map(|item| home(&item.name, levels)).collect();
+    let homes: Vec<String> = homes(items, levels);
     let mut spaces: BTreeSet<&str> = BTreeSet::new();
     for mut space in homes.iter().map(String::as_str) {
         while !space.is_empty() && spaces.insert(space) {
@@ -43,6 +43,21 @@ pub(crate) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespac
             replicas: Vec::new(),
         })
         .collect()
+}
+
+/// The namespace of each item; that of a collapsed one beside members that were kept open is itself.
+fn homes(items: &[Item], levels: usize) -> Vec<String> {
+    let outer: Vec<String> = items.iter().map(|item| home(&item.name, levels)).collect();
+    let around: BTreeSet<&str> = outer.iter().map(String::as_str).collect();
+    let own = |(item, outer): (&Item, &String)| {
+        let is_around = item.kind == ItemKind::Namespace && around.contains(&*item.name);
+        if is_around {
+            item.name.to_string()
+        } else {
+            outer.clone()
+        }
+    };
+    items.iter().zip(&outer).map(own).collect()
 }
 
 /// The first parts of a name, at most `levels`, without its last; empty at the root.
@@ -86,7 +101,6 @@ fn fold(spaces: &mut BTreeSet<&str>, homes: &[String]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::ItemKind;
 
     /// The boxes around these names: each item with the path of its innermost one, and each box with its parent.
     fn boxes(names: &[&str], depth: Option<usize>) -> Vec<String> {

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{ItemKind, View, ViewOptions};
+use super::{Item, ItemKind, View, ViewOptions};
 use crate::base::name::namespace;
-use crate::graph::Element;
+use crate::graph::{Edge, Element};
 use crate::mission::Mission;
 
 /// The namespaces to collapse and those to keep open.
@@ -41,6 +41,11 @@ impl<'a> Collapse<'a> {
     pub(crate) fn is_empty(&self) -> bool {
         self.collapse.is_empty()
     }
+
+    /// Whether this very element is kept open, not only a namespace around it.
+    pub(crate) fn keeps(&self, name: &str) -> bool {
+        self.expand.contains(name)
+    }
 }
 
 /// The collapsed namespace that swallows a topic (or group): the one of all its `publishers` and `subscribers`, if it
@@ -71,22 +76,26 @@ pub struct Collapsible {
     pub headlines: usize,
 }
 
+/// The node or topic that each headline is about: an edge's topic.
+fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_ {
+    let elements = &mission.elements;
+    let topic = |edge: Option<&Edge>| edge.map(|edge| Element::Topic(edge.topic));
+    let entries = mission.ledger.entries.iter().filter(|e| e.is_headline());
+    entries.filter_map(move |entry| match entry.what {
+        Element::Publish(id) => topic(elements.publishes.get(id as usize)),
+        Element::Subscribe(id) => topic(elements.subscribes.get(id as usize)),
+        other => Some(other),
+    })
+}
+
 /// The number of headlines about each name: of a node, of a topic, of an edge by its topic.
 pub(crate) fn news(mission: &Mission) -> BTreeMap<&str, usize> {
     let (elements, mut news) = (&mission.elements, BTreeMap::new());
-    let topic = |id: u32| elements.topics.get(id as usize).map(|t| t.name.as_str());
-    for entry in mission.ledger.entries.iter().filter(|e| e.is_headline()) {
-        let name = match entry.what {
+    for what in headlines(mission) {
+        let name = match what {
             Element::Node(id) => elements.nodes.get(id as usize).map(|n| n.name.as_str()),
-            Element::Topic(id) => topic(id),
-            Element::Publish(id) => elements
-                .publishes
-                .get(id as usize)
-                .and_then(|e| topic(e.topic)),
-            Element::Subscribe(id) => elements
-                .subscribes
-                .get(id as usize)
-                .and_then(|e| topic(e.topic)),
+            Element::Topic(id) => elements.topics.get(id as usize).map(|t| t.name.as_str()),
+            Element::Publish(_) | Element::Subscribe(_) => None,
         };
         *news.entry(name.unwrap_or_default()).or_default() += 1;
     }
@@ -94,6 +103,21 @@ pub(crate) fn news(mission: &Mission) -> BTreeMap<&str, usize> {
 }
 
 impl View {
+    /// The boxes inside a namespace that a headline is about.
+    pub(crate) fn changing(&self, mission: &Mission, space: &str) -> Vec<Arc<str>> {
+        let told: BTreeSet<Element> = headlines(mission).collect();
+        let is_inside = |name: &str| {
+            let rest = name.strip_prefix(space);
+            rest.is_some_and(|rest| rest.starts_with('/'))
+        };
+        let inside = self.items.iter().filter(|item| is_inside(&item.name));
+        let changes = |item: &&Item| item.members.iter().any(|member| told.contains(member));
+        let open = inside.filter(|item| item.kind != ItemKind::Namespace);
+        open.filter(changes)
+            .map(|item| Arc::clone(&item.name))
+            .collect()
+    }
+
     /// The namespaces that could be collapsed, the one to collapse first at the front: those in which least changes for
     /// each box that they hold, then innermost ones before those around them, the largest first, then by name. Those
     /// that hold fewer than two boxes, or that `options` keeps open, are left out.
@@ -192,6 +216,21 @@ mod tests {
             ["/a/c 3", "/a/b 2", "/e 2", "/a 6"]
         );
         assert_eq!(candidates(&options(&["/a/c"], &["/e"])), ["/a/b 2", "/a 4"]);
+    }
+
+    #[test]
+    fn what_changes_can_stay_open_beside_the_rest() {
+        let mission = mission(&["/a/x>/a/t /a/y>/a/u /a/z>/a/u", "/a/x>/a/t /a/z>/a/u"]);
+        let whole = outline(&mission, &options(&[], &[]));
+        let open = whole.changing(&mission, "/a");
+        assert_eq!(open, ["/a/y".into()]);
+        let view = outline(&mission, &options(&["/a"], &["/a/y"]));
+        let boxes: Vec<(&str, usize)> = (view.items.iter())
+            .map(|item| (&*item.name, item.members.len()))
+            .collect();
+        assert_eq!(boxes, [("/a/y", 1), ("/a/u", 1), ("/a", 3)]);
+        let homes: BTreeSet<Option<usize>> = view.items.iter().map(|item| item.cluster).collect();
+        assert_eq!(homes, [Some(0)].into());
     }
 
     #[test]

@@ -422,7 +422,7 @@ fn swallow(
         .into_iter()
         .filter_map(|(key, (p, s))| {
             let space = swallows(collapse.of(&key.1), &p, &s)?;
-            Some((key, space.into()))
+            (!collapse.keeps(&key.1)).then(|| (key, space.into()))
         })
         .collect();
     for topic in topics.iter_mut().flatten() {

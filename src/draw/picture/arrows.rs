@@ -30,14 +30,46 @@ pub(crate) struct ArrowPath {
     pub(crate) ends: [String; 2],
     start: Point,
     curves: Vec<[Point; 3]>,
-    /// The middle of its label.
-    label: Option<Point>,
+    /// The place of its label.
+    label: Option<LabelPlace>,
     /// The middle of its badge.
     pub(crate) badge: Point,
     /// The places where its badge does not cover its label; the first is the best.
     pub(super) spots: Vec<Point>,
     /// Its length in pixels, about.
     pub(crate) length: f64,
+}
+
+/// The room of an arrow's label, and the side of it at which the arrow runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LabelPlace {
+    area: Rect,
+    side: Anchor,
+}
+
+impl LabelPlace {
+    /// The place of a label in this room beside an arrow through these points.
+    fn new(area: Rect, points: &[Point]) -> Self {
+        let centre = area.centre();
+        let far = |p: &&Point| distance(**p, centre);
+        let nearest = points.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
+        let side = match nearest {
+            Some(p) if p.x <= area.x => Anchor::Start,
+            Some(p) if p.x >= area.right() => Anchor::End,
+            _ => Anchor::Middle,
+        };
+        Self { area, side }
+    }
+
+    /// The middle of words of this width, which stand next to the arrow however wide the room is.
+    fn middle(&self, width: f64) -> Point {
+        let (centre, slack) = (self.area.centre(), (self.area.w - width).max(0.0) / 2.0);
+        match self.side {
+            Anchor::Start => Point::new(centre.x - slack, centre.y),
+            Anchor::Middle => centre,
+            Anchor::End => Point::new(centre.x + slack, centre.y),
+        }
+    }
 }
 
 impl ArrowPath {
@@ -57,10 +89,11 @@ impl ArrowPath {
         let start = fit.point(route.start);
         let points = polyline(start, &curves, PIECES);
         let length = points.windows(2).map(|w| distance(w[0], w[1])).sum();
-        let label = room.and(route.label.map(|p| fit.point(p)));
-        let area = label.zip(room).map(|(label, room)| {
-            Rect::around(label, Size::new(room.w * fit.scale, room.h * fit.scale))
+        let area = route.label.zip(room).map(|(label, room)| {
+            let room = Size::new(room.w * fit.scale, room.h * fit.scale);
+            Rect::around(fit.point(label), room)
         });
+        let label = area.map(|area| LabelPlace::new(area, &points));
         let badge = Size::new(12.0, 12.0);
         let covers = |p: &Point| area.is_some_and(|area| area.overlaps(&Rect::around(*p, badge)));
         let mut spots = [0.5, 0.4, 0.6, 0.3, 0.7, 0.22, 0.78]
@@ -185,18 +218,21 @@ impl Arrows<'_> {
         shown: &Shown,
         look: &ArrowLook,
     ) {
-        let Some(centre) = track.label else { return };
+        let Some(place) = track.label else { return };
         let text = self.fonts.shown(text);
         let style = &self.style.edge;
         let size = style.size * self.fit.scale;
         if is_pill {
             let paint = (look.stroke.color, self.style.badge.sign);
+            let width = badge::pill_width(self.fonts, &text, size);
+            let centre = place.middle(width);
             badge::pill(group, self.fonts, paint, &text, centre, size);
             return;
         }
+        let edge = place.middle(style.halo_width * self.fit.scale);
         group.text(Text {
-            at: Point::new(centre.x, centre.y + size * 0.36),
-            anchor: Anchor::Middle,
+            at: Point::new(edge.x, edge.y + size * 0.36),
+            anchor: place.side,
             size,
             weight: if shown.mark.is_some() {
                 Weight::SemiBold

@@ -104,6 +104,11 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
     }
 }
 
+/// The width of a pill with this text.
+pub(crate) fn pill_width(fonts: &Fonts, text: &str, size: f64) -> f64 {
+    fonts.width(text, size, Weight::SemiBold) + size * PILL_PAD
+}
+
 /// A pill around `text` with its middle at `centre`; `size` is its font size.
 pub(crate) fn pill(
     group: &mut Group,
@@ -113,9 +118,9 @@ pub(crate) fn pill(
     centre: Point,
     size: f64,
 ) {
-    let width = fonts.width(text, size, Weight::SemiBold) + size * PILL_PAD;
     let height = size * PILL_HEIGHT;
-    let form = Form::Rect(Rect::around(centre, Size::new(width, height)), height / 2.0);
+    let area = Rect::around(centre, Size::new(pill_width(fonts, text, size), height));
+    let form = Form::Rect(area, height / 2.0);
     group.shape(Shape::filled(form, paint.0));
     group.text(Text {
         at: Point::new(centre.x, centre.y + size * 0.36),

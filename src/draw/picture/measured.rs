@@ -142,6 +142,9 @@ impl MeasuredGraph {
     }
 }
 
+/// The words on the box of a namespace inside its own frame, beside the members that were kept open.
+const REST: &str = "all others";
+
 struct Measurer<'a> {
     view: &'a View,
     style: &'a Style,
@@ -171,7 +174,12 @@ impl Measurer<'_> {
         let unshown = (name != whole).then(|| words::visible(whole).into_owned());
         let mut fixed = String::new();
         if item.kind == ItemKind::Namespace {
-            name.push_str("/…");
+            let is_rest = &*item.name == inside;
+            name = if is_rest {
+                REST.to_owned()
+            } else {
+                name + "/…"
+            };
             fixed = members(item);
         }
         Label {

@@ -10,14 +10,21 @@ use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{Frame, View};
 
+/// The room in a chip beside its words, and between two chips.
+const CHIP_PAD: f64 = 20.0;
+const CHIP_GAP: f64 = 8.0;
+
+/// The usual width of a character, as a share of the size of the text.
+const USUAL_WIDTH: f64 = 0.5;
+
 /// The bar's fixed places, decided once for all frames.
 pub(crate) struct Title<'a> {
     style: &'a Style,
     fonts: &'a Fonts,
     page: PageFrame,
     name: String,
-    /// The left edges and widths of the chips for what came, went and changed.
-    chips: [(f64, f64); 3],
+    /// The x at which the last chip ends.
+    right: f64,
     /// The x at which the words on the left must end.
     end: f64,
     /// The width of the widest phase.
@@ -42,29 +49,22 @@ impl<'a> Title<'a> {
             Weight::Regular,
         );
         let clock = clock.max(date);
-        let mut right = page.size.w - (style.page.margin + 14.0) * unit - clock;
-        let mut chips = [(0.0, 0.0); 3];
-        for kind in [2, 1, 0] {
-            let widths = view.frames.iter().map(|frame| {
-                let text = &chips::chips(&frame.counts)[kind].0;
-                if text.is_empty() {
-                    0.0
-                } else {
-                    fonts.width(text, style.chip.size * unit, Weight::SemiBold) + 22.0 * unit
-                }
-            });
-            let widest = widths.fold(0.0, f64::max);
-            right -= widest;
-            chips[kind] = (right, widest);
-            right -= if widest > 0.0 { 8.0 * unit } else { 0.0 };
-        }
+        let right = page.size.w - (style.page.margin + 14.0) * unit - clock;
         let none = if view.compares {
             "no difference"
         } else {
             "no reconfiguration"
         };
-        let wide = fonts.width(none, style.chip.size * unit, Weight::SemiBold) + 22.0 * unit;
-        let end = right.min(chips[2].0 + chips[2].1 - wide) - 10.0 * unit;
+        let wide = |text: &str| {
+            fonts.width(text, style.chip.size * unit, Weight::SemiBold)
+                + (CHIP_PAD + CHIP_GAP) * unit
+        };
+        let widths = view.frames.iter().map(|frame| {
+            let chips = chips::chips(&frame.counts);
+            let told = chips.iter().filter(|(text, _)| !text.is_empty());
+            told.map(|(text, _)| wide(text)).sum::<f64>()
+        });
+        let end = right - widths.fold(wide(none), f64::max) - 10.0 * unit;
         let widest = options
             .phases
             .iter()
@@ -75,7 +75,7 @@ impl<'a> Title<'a> {
             fonts,
             page: page.clone(),
             name: fonts.shown(options.title()).into_owned(),
-            chips,
+            right,
             end,
             phase,
             none,
@@ -219,28 +219,24 @@ impl<'a> Title<'a> {
             (chip.removed, chip.removed_text),
             (chip.changed, chip.changed_text),
         ];
-        for (((text, _), (x, width)), paint) in texts.iter().zip(self.chips).zip(paint) {
+        let mut right = self.right;
+        for ((text, _), paint) in texts.iter().zip(paint).rev() {
             if !text.is_empty() {
-                self.chip(&mut group, text, x + width, paint);
+                right -= self.chip(&mut group, text, right, paint) + self.page.unit * CHIP_GAP;
             }
         }
         if frame.counts.total() == 0 {
-            let (x, width) = self.chips[2];
-            self.chip(
-                &mut group,
-                self.none,
-                x + width,
-                (chip.none, chip.none_text),
-            );
+            let paint = (chip.none, chip.none_text);
+            self.chip(&mut group, self.none, self.right, paint);
         }
         group
     }
 
-    /// Draws a chip that ends at `right`.
-    fn chip(&self, group: &mut Group, text: &str, right: f64, paint: (Color, Color)) {
+    /// Draws a chip that ends at `right`, and returns its width.
+    fn chip(&self, group: &mut Group, text: &str, right: f64, paint: (Color, Color)) -> f64 {
         let unit = self.page.unit;
         let size = self.style.chip.size * unit;
-        let width = self.fonts.width(text, size, Weight::SemiBold) + 20.0 * unit;
+        let width = self.fonts.width(text, size, Weight::SemiBold) + CHIP_PAD * unit;
         let bar = self.page.title;
         let place = Rect::new(
             right - width,
@@ -270,6 +266,7 @@ impl<'a> Title<'a> {
             halo: None,
             text: text.to_owned(),
         });
+        width
     }
 
     /// The line below the bar: the mission's phase, and the changes in words.
@@ -317,8 +314,12 @@ impl<'a> Title<'a> {
         let texts = (1..=all)
             .rev()
             .map(|keep| self.fonts.shown(&frame.words(keep)).into_owned());
-        let mut fitting =
-            texts.filter(|text| self.fonts.width(text, size, Weight::Regular) <= most);
+        // Where an SVG is shown in another font, its words may be wider.
+        let wide = |text: &str| {
+            let elsewhere = text.chars().count() as f64 * size * USUAL_WIDTH;
+            self.fonts.width(text, size, Weight::Regular).max(elsewhere)
+        };
+        let mut fitting = texts.filter(|text| wide(text) <= most);
         fitting.next().unwrap_or_else(|| {
             let first = self.fonts.shown(&frame.words(1.min(all))).into_owned();
             self.fonts

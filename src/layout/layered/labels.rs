@@ -145,6 +145,10 @@ impl Segments {
                     .hits(&Rect::around(spot, size))
                     .filter(|&edge| edge != own)
                     .collect();
+                // Beside its own edge and on another, it would be read as the other's.
+                if spot != point && !met.is_empty() {
+                    continue;
+                }
                 met.sort_unstable();
                 met.dedup();
                 let cost = cost + ON_EDGE * met.len() as f64;
