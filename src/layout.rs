@@ -95,6 +95,8 @@ pub struct LayoutOptions {
     pub page: Size,
     /// The orientation; `None` takes the better one.
     pub orientation: Option<Orientation>,
+    /// Whether a drawing that fills the page is better than one of short edges without crossings.
+    pub is_tight: bool,
 }
 
 /// The way of one edge: a start point, then cubic pieces `(control, control, end)`; straight pieces have their

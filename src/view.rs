@@ -9,6 +9,7 @@ mod filtered;
 mod frames;
 mod group;
 mod hidden;
+mod hubs;
 mod items;
 mod lives;
 mod marks;
@@ -124,6 +125,8 @@ pub struct Item {
     pub is_replica: bool,
     /// The innermost namespace whose box it stands in: a place in [`View::namespaces`].
     pub cluster: Option<usize>,
+    /// For a hub, which has a box in each namespace that uses it, the first of its boxes: a place in [`View::items`].
+    pub hub: Option<u32>,
 }
 
 /// A namespace drawn as a box around its members.

@@ -11,6 +11,7 @@ fn options(orientation: Option<Orientation>) -> layout::LayoutOptions {
     layout::LayoutOptions {
         page: Size::new(1280.0, 560.0),
         orientation,
+        is_tight: false,
     }
 }
 
@@ -253,6 +254,7 @@ fn a_broken_plan_is_laid_out_all_the_same() {
         let page = layout::LayoutOptions {
             page: odd,
             orientation: None,
+            is_tight: false,
         };
         let layout = layout::lay_out(&plan, &page, layout::engine(word).unwrap());
         let finite = |r: &Rect| [r.x, r.y, r.w, r.h].iter().all(|x| x.is_finite());

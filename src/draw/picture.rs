@@ -130,6 +130,7 @@ impl<'a> Measured<'a> {
         layout::LayoutOptions {
             page: Size::new(self.page.graph.w, self.page.graph.h),
             orientation: self.options.orientation,
+            is_tight: false,
         }
     }
 

@@ -195,7 +195,11 @@ impl<'a> StripSource<'a> {
             layouts.extend(SHAPES.map(|high| {
                 let page = Size::new(1000.0, 1000.0 * high);
                 let orientation = None;
-                let options = layout::LayoutOptions { page, orientation };
+                let options = layout::LayoutOptions {
+                    page,
+                    orientation,
+                    is_tight: false,
+                };
                 layout::lay_out(measured.plan(), &options, self.engine)
             }));
         }
@@ -414,6 +418,7 @@ mod tests {
             members: vec![Element::Node(id)],
             is_replica: false,
             cluster: None,
+            hub: None,
         };
         let shown = |id, mark| Shown {
             mark,

@@ -89,6 +89,7 @@ mod tests {
             &LayoutOptions {
                 page,
                 orientation: None,
+                is_tight: false,
             },
         );
         let inside = |v: usize, c: usize| layout.boxes[v].overlaps(&layout.clusters[c]);

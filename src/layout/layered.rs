@@ -95,8 +95,7 @@ impl Draft {
     /// The draft of a sane plan; `None` if a part is too large for layers.
     fn new(plan: &Plan, options: &LayoutOptions) -> Option<Self> {
         let parts = parts::parts(plan);
-        let aspect = options.page.w / options.page.h.max(1.0);
-        let ways = parts.iter().map(|part| orderings(plan, part, aspect));
+        let ways = parts.iter().map(|part| orderings(plan, part, options));
         let orderings: Vec<Vec<Ordering>> = ways.collect();
         let is_whole = !orderings.iter().any(Vec::is_empty);
         is_whole.then_some(Self { parts, orderings })
@@ -125,14 +124,15 @@ struct Ordering {
 }
 
 /// The drafts of a part, none if it is too large: every way of ranking, with long edges led outside and inside of clusters.
-fn orderings(plan: &Plan, part: &Component, aspect: f64) -> Vec<Ordering> {
-    let mut ways = rankings(part, aspect);
+fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Ordering> {
+    let mut ways = rankings(part, options);
     ways.retain(|rank| items(part, rank) <= MOST);
     let mut lanes = vec![Lane::Inside];
     if part.ends.len() <= MANY && !part.clusters.is_empty() {
         lanes.push(Lane::Outside);
     }
-    let share = EFFORT * part.vertices.len() / plan.vertices.len().max(1);
+    let effort = if options.is_tight { 3 * EFFORT } else { EFFORT };
+    let share = effort * part.vertices.len() / plan.vertices.len().max(1);
     let effort = share / ways.len().max(1) / lanes.len();
     let pairs = ways
         .iter()
@@ -150,7 +150,8 @@ fn orderings(plan: &Plan, part: &Component, aspect: f64) -> Vec<Ordering> {
 }
 
 /// Ranks for a part: cycles broken in different ways, shallow graphs folded.
-fn rankings(part: &Component, aspect: f64) -> Vec<Vec<usize>> {
+fn rankings(part: &Component, options: &LayoutOptions) -> Vec<Vec<usize>> {
+    let aspect = options.page.w / options.page.h.max(1.0);
     let n = part.vertices.len();
     let ranked = |reversed: &[bool]| {
         let edges = rank::turned(&part.ends, reversed);
@@ -165,8 +166,13 @@ fn rankings(part: &Component, aspect: f64) -> Vec<Vec<usize>> {
     let mut rankings = Vec::new();
     for reversed in ways {
         let (rank, edges) = ranked(&reversed);
-        let folded =
-            fold::suitable(n, aspect).map(|many| fold::fold(&rank, &edges, &part.home, many));
+        let near = if options.is_tight { 2 } else { 0 };
+        let counts = fold::suitable(n, aspect)
+            .into_iter()
+            .flat_map(|many| many.saturating_sub(near)..=many + near);
+        let folded: Vec<_> = counts
+            .map(|many| fold::fold(&rank, &edges, &part.home, many))
+            .collect();
         rankings.push(rank);
         rankings.extend(folded.into_iter().flatten());
     }
@@ -184,9 +190,14 @@ pub(crate) struct PlacedPart {
     pub(crate) clusters: Vec<Rect>,
 }
 
-/// The weight of the length of edges in the quality of a drawing: one whose edges are half as long again is a tenth
-/// worse, as much as one that is a tenth smaller.
-const LENGTH: f64 = 0.25;
+/// The weight of the length of edges in the quality of a drawing: one whose edges are half as long again is a twentieth
+/// worse, as much as one that is a twentieth smaller.
+const LENGTH: f64 = 0.12;
+
+/// The weight of the crossings: a drawing in which every edge crosses another is a third worse, or a tenth if it shall
+/// above all fill the page.
+const CROSSING: f64 = 0.5;
+const TIGHT_CROSSING: f64 = 0.1;
 
 /// The quality of a drawing, larger for a better one: from the scale at which it fills the page above all, from its
 /// smallness, and from the number of crossings and the length of its edges.
@@ -198,9 +209,13 @@ fn quality(
 ) -> f64 {
     let links = links.max(1) as f64;
     let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
-    let readable = libm::pow(pack::fit(size, options.page), 0.8) * libm::pow(small, 0.2);
+    let fit = pack::fit(size, options.page);
+    let readable = libm::pow(fit, 0.8) * libm::pow(small, 0.2);
+    if options.is_tight {
+        return fit / (1.0 + TIGHT_CROSSING * crossings as f64 / links);
+    }
     let shortness = libm::pow((length / links).max(1.0), -LENGTH);
-    readable * shortness / (1.0 + 0.5 * crossings as f64 / links)
+    readable * shortness / (1.0 + CROSSING * crossings as f64 / links)
 }
 
 /// The best of all ways to place a part.

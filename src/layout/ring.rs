@@ -247,6 +247,7 @@ mod tests {
         LayoutOptions {
             page: Size::new(1280.0, 560.0),
             orientation: None,
+            is_tight: false,
         }
     }
 

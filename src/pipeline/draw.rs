@@ -10,7 +10,7 @@ use crate::base::words;
 use crate::draw::picture::{self, Measured, PageOptions};
 use crate::draw::style::Style;
 use crate::draw::text::Fonts;
-use crate::layout::{Engine, Layout, RING, engine, extend, lay_out};
+use crate::layout::{Engine, Layout, LayoutOptions, RING, engine, extend, lay_out};
 use crate::mission::phases::knows_publishers;
 use crate::mission::{Mission, Place, Places};
 use crate::view::{Collapsible, Mode, View, ViewOptions, outline, view};
@@ -58,6 +58,8 @@ pub struct Drawing {
     pub(crate) purpose: Option<Purpose>,
     /// Whether to grow the page and collapse namespaces until the text can be read.
     pub is_fitted: bool,
+    /// Whether hubs, topics that half the system is connected to, have a box in each namespace that uses them.
+    pub(crate) splits_hubs: bool,
     /// The layout engine.
     pub engine: &'static (dyn Engine + Sync),
     /// Places of an earlier drawing, which are kept; new elements are placed beside them.
@@ -79,6 +81,7 @@ impl Drawing {
             is_sized: false,
             purpose: None,
             is_fitted: true,
+            splits_hubs: true,
             engine: crate::layout::ENGINES[0].1,
             kept: None,
         })
@@ -257,13 +260,31 @@ impl Attempt {
     ) -> Self {
         // The widest labels depend on rates, so that the windows are needed too.
         let (view, notices) = view(mission, options);
+        let view = if drawing.splits_hubs {
+            view.with_hubs_split()
+        } else {
+            view
+        };
         let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
         let (plan, page) = (measured.plan(), measured.layout_options());
-        let layout = match &drawing.kept {
-            None => lay_out(plan, &page, drawing.engine),
-            Some(kept) => extend(plan, &page, drawing.engine, &known(&view, kept)),
+        let placed = |page: &LayoutOptions| {
+            let layout = match &drawing.kept {
+                None => lay_out(plan, page, drawing.engine),
+                Some(kept) => extend(plan, page, drawing.engine, &known(&view, kept)),
+            };
+            (measured.text_px(&layout), layout)
         };
-        let text = measured.text_px(&layout);
+        let (mut text, mut layout) = placed(&page);
+        let readable = drawing.readable();
+        if drawing.is_fitted && (ALMOST * readable..readable).contains(&text) {
+            let tight = placed(&LayoutOptions {
+                is_tight: true,
+                ..page
+            });
+            if tight.0 >= readable {
+                (text, layout) = tight;
+            }
+        }
         Self {
             view,
             notices,
@@ -290,6 +311,9 @@ impl Attempt {
         self.text >= drawing.readable()
     }
 }
+
+/// The share of the smallest text that can be read from which a drawing that fills the page better is tried.
+const ALMOST: f64 = 0.7;
 
 /// The least area of a box in squares of its text's height: no box is lower than its text, nor narrower than four
 /// times that.

@@ -22,7 +22,7 @@ use crate::export::sequence::{Drawings, Sequence, Unfolded};
 use crate::export::{self, OneDrawing, Output, Written};
 use crate::graph::window::default_period;
 use crate::mission::Mission;
-use crate::view::{View, ViewOptions, filtered, nothing};
+use crate::view::{View, ViewOptions, filtered, nothing, outline};
 
 /// The whole job of `bagreel render`.
 #[derive(Clone)]
@@ -116,7 +116,51 @@ fn check_figure(job: &Render) -> Result<()> {
 /// # Errors
 /// As [`render`].
 pub(crate) fn show(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
+    let is_figure = job.sequence.figure.is_some();
+    let is_whole: Vec<bool> = job.outputs.iter().map(has_whole_hubs).collect();
+    let is_mixed = is_whole.contains(&true)
+        && job
+            .outputs
+            .iter()
+            .any(|o| o.format.is_drawn && !has_whole_hubs(o));
+    if is_figure || !is_mixed || !outline(&mission, &job.drawing.view).has_hubs() {
+        return show_alike(job, mission, watch);
+    }
+    // Two drawings of one mission: the same picture as if either kind of output had been asked for alone.
+    let some = |is: bool| {
+        let outputs = job.outputs.iter().filter(|o| has_whole_hubs(o) == is);
+        Render {
+            outputs: outputs.cloned().collect(),
+            ..job.clone()
+        }
+    };
+    let mut pictures = show_alike(&some(false), mission, watch)?;
+    let graphs = show_alike(&some(true), pictures.mission, watch)?;
+    let told: Vec<Notice> = pictures.notices.iter().collect();
+    let more = graphs.notices.iter().filter(|n| !told.contains(n));
+    pictures.notices.extend(more);
+    let (mut drawn, mut written) = (pictures.written.into_iter(), graphs.written.into_iter());
+    let in_order = is_whole
+        .into_iter()
+        .filter_map(|is| if is { written.next() } else { drawn.next() });
+    Ok(Rendered {
+        mission: graphs.mission,
+        notices: pictures.notices,
+        written: in_order.collect(),
+    })
+}
+
+/// Whether an output has each topic once: a page that opens boxes, and a graph that is written down. Pictures may show
+/// a hub in each namespace that uses it.
+fn has_whole_hubs(output: &Output) -> bool {
+    let format = output.format;
+    format.is_unfolded || format.is_viewed && !format.is_drawn
+}
+
+/// Draws and writes a mission where all outputs show the same drawing.
+fn show_alike(job: &Render, mission: Mission, watch: &mut dyn Watch) -> Result<Rendered> {
     let mut drawing = job.drawing.clone();
+    drawing.splits_hubs &= !job.outputs.iter().any(has_whole_hubs);
     drawing.page.title.get_or_insert_with(|| mission.title());
     if matches!(job.reading.phases, Phases::Captions(_)) {
         drawing.page.phases = captions(&mission);

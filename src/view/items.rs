@@ -167,6 +167,7 @@ impl Viewed {
                 members,
                 is_replica: *kind != ItemKind::Namespace && self.fleets.of(name).is_some(),
                 cluster: None,
+                hub: None,
             })
             .collect();
         if !options.exact_names {

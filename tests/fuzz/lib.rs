@@ -63,10 +63,7 @@ pub fn read_bag(path: &Path, verify: bool) {
 
 /// Reads whatever lies there into graphs.
 pub fn read_graphs(path: &Path) {
-    let reading = Reading {
-        inputs: vec![Input::Path(path.to_owned())],
-        ..Reading::default()
-    };
+    let reading = Reading::of([path]);
     if let Ok(mission) = read(&reading, &mut Unwatched) {
         assert!(!mission.windows.is_empty());
     }

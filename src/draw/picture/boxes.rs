@@ -369,5 +369,6 @@ fn title(item: &Item, shown: &Shown) -> String {
         ItemKind::Group => "topics",
         ItemKind::Namespace => "namespace",
     };
-    format!("{}\n{what}: {}", item.name, chips::facts(shown))
+    let name = item.hub.map_or(&item.name, |_| &item.label);
+    format!("{name}\n{what}: {}", chips::facts(shown))
 }

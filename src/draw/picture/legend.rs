@@ -20,6 +20,7 @@ pub(crate) enum LegendSign {
     Topic,
     Group,
     Namespace,
+    Hub,
     Change(Mark),
     Box(State),
     Line(Degree),
@@ -45,6 +46,11 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
             kind(ItemKind::Namespace),
             LegendSign::Namespace,
             "namespace",
+        ),
+        (
+            view.items.iter().any(|i| i.hub.is_some()),
+            LegendSign::Hub,
+            "goes on elsewhere",
         ),
         (
             mark(&[Mark::Added]),
@@ -229,6 +235,12 @@ fn draw(group: &mut Group, sign: &LegendSign, style: &Style, place: Rect, unit: 
                     stroke: stroke.clone(),
                 });
             }
+        }
+        LegendSign::Hub => {
+            card(group, style, place, false, State::Active, unit);
+            let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, None);
+            let inside = place.grown(-4.0 * unit);
+            arrow(group, inside, stroke, style.edge.arrow * unit);
         }
         LegendSign::Change(mark) => {
             let stroke = arrow_of(ArrowKind::Publish, Degree::Measured, Some(*mark));

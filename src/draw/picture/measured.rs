@@ -170,6 +170,7 @@ impl Measurer<'_> {
     fn label(&self, item: &Item, inside: &str, second: bool) -> Label {
         let body = self.body(item);
         let whole = short_name(&item.label, inside);
+        let ways = item.hub.map(|_| self.ways(item)).unwrap_or_default();
         let mut name = self.fonts.shown(whole).into_owned();
         let unshown = (name != whole).then(|| words::visible(whole).into_owned());
         let mut fixed = String::new();
@@ -182,15 +183,26 @@ impl Measurer<'_> {
             };
             fixed = members(item);
         }
+        let name = self.fonts.fit(&name, body.size, body.weight(), WIDEST);
         Label {
-            name: self
-                .fonts
-                .fit(&name, body.size, body.weight(), WIDEST)
-                .into_owned(),
+            name: format!("{}{name}{}", ways[0], ways[1]),
             second: second || !fixed.is_empty(),
             fixed,
             unshown,
         }
+    }
+
+    /// The signs before and behind the name of a hub's box: that messages leave from here, and that they come here, by
+    /// its other boxes.
+    fn ways(&self, item: &Item) -> [&'static str; 2] {
+        let is = |at: u32| {
+            let other = self.view.items.get(at as usize);
+            other.is_some_and(|other| other.name == item.name && other.kind == item.kind)
+        };
+        let mut arrows = self.view.arrows.iter();
+        let sent = arrows.clone().any(|arrow| is(arrow.to));
+        let heard = arrows.any(|arrow| is(arrow.from));
+        [if sent { "→ " } else { "" }, if heard { " →" } else { "" }]
     }
 
     /// The size of a box with this label, whose changing smaller lines are at most `second` wide.
@@ -294,8 +306,14 @@ pub(crate) enum Tells {
 pub(crate) fn tells(view: &View) -> Vec<Tells> {
     let mut senders = vec![0_usize; view.items.len()];
     for arrow in view.arrows.iter().filter(|a| a.kind == ArrowKind::Publish) {
-        if let Some(senders) = senders.get_mut(arrow.to as usize) {
+        let hub = view.items.get(arrow.to as usize).and_then(|item| item.hub);
+        if let Some(senders) = senders.get_mut(hub.unwrap_or(arrow.to) as usize) {
             *senders += 1;
+        }
+    }
+    for (at, item) in view.items.iter().enumerate() {
+        if let Some(whole) = item.hub.and_then(|hub| senders.get(hub as usize)) {
+            senders[at] = *whole;
         }
     }
     let tells = |(item, senders): (&Item, usize)| match item.kind {

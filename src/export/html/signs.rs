@@ -61,6 +61,7 @@ fn picture(sign: &LegendSign) -> String {
     match sign {
         LegendSign::Node => group("node", "<ellipse cx=\"18\" cy=\"10\" rx=\"15\" ry=\"7\"/>"),
         LegendSign::Topic => group("topic", BOX),
+        LegendSign::Hub => group("topic", &format!("{BOX}{LINE}")),
         LegendSign::Group => group("topic", &format!("{BOX}{front}")),
         LegendSign::Namespace => group("node", &format!("{BOX}{front}")),
         LegendSign::Change(mark) => {

@@ -67,7 +67,8 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
         let Some(size) = plan.links[i].label else {
             continue;
         };
-        layout.routes[i].label = lines[i].spot(size, i, &taken, &edges);
+        let room = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
+        layout.routes[i].label = lines[i].spot(size, i, &room, (&taken, &edges));
         if let Some(spot) = layout.routes[i].label {
             taken.insert(Rect::around(spot, size).grown(0.5), 0);
         }
@@ -127,8 +128,20 @@ impl Segments {
         Some((point, (b.x - a.x).abs() > (b.y - a.y).abs()))
     }
 
-    /// The best middle for a label of this size, if any is free.
-    fn spot(&self, size: Size, own: usize, taken: &Obstacles, edges: &Obstacles) -> Option<Point> {
+    /// The best middle for a label of this size inside `room`, if any is free.
+    fn spot(
+        &self,
+        size: Size,
+        own: usize,
+        room: &Rect,
+        (taken, edges): (&Obstacles, &Obstacles),
+    ) -> Option<Point> {
+        let is_inside = |at: &Rect| {
+            at.x >= room.x
+                && at.y >= room.y
+                && at.right() <= room.right()
+                && at.bottom() <= room.bottom()
+        };
         let mut best: Option<(f64, Point)> = None;
         for (turn, &part) in STATIONS.iter().enumerate() {
             let Some((point, sideways)) = self.station(part) else {
@@ -137,6 +150,7 @@ impl Segments {
             for (penalty, spot) in self.around(point, size, sideways) {
                 let cost = penalty + 0.1 * turn as f64;
                 if best.is_some_and(|(least, _)| least <= cost)
+                    || !is_inside(&Rect::around(spot, size))
                     || taken.hits(&Rect::around(spot, size)).any(|_| true)
                 {
                     continue;

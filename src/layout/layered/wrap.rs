@@ -242,6 +242,7 @@ mod tests {
         let options = LayoutOptions {
             page: Size::new(1280.0, 560.0),
             orientation: None,
+            is_tight: false,
         };
         lay_out(&plan, &options)
     }
