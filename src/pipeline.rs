@@ -5,6 +5,7 @@ mod draw;
 mod export;
 mod extract;
 mod figure;
+mod fit;
 pub mod fleet;
 #[cfg(feature = "cli")]
 pub(crate) mod gate;

@@ -44,7 +44,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "showing"],
-        &["settle"],
+        &["hubs", "settle"],
         &["union"],
         &["options"],
         &["group", "select"],
@@ -72,7 +72,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
     ]),
     ("pipeline", &[
         &["collect", "draw", "phases", "purpose"],
-        &["figure", "unfolded", "verify"],
+        &["figure", "fit", "unfolded", "verify"],
         &["read"],
         &["export", "extract", "survey"],
         &["fleet", "gate"],

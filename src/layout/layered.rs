@@ -63,7 +63,9 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
         (quality * (0.6 + 0.4 * labelled(plan, &layout)), layout)
     });
     let best = labelled.reduce(|best, next| if next.0 > best.0 { next } else { best });
-    best.map_or_else(Layout::empty, |best| best.1)
+    let mut best = best.map_or_else(Layout::empty, |best| best.1);
+    labels::make_room(plan, &mut best);
+    best
 }
 
 /// The share of the labels that found room, from 0 to 1.
@@ -235,10 +237,10 @@ fn best_block(
     let better = |best: (f64, PlacedPart), next: (f64, PlacedPart)| {
         if next.0 > best.0 { next } else { best }
     };
-    let plain = orderings
+    let usual = orderings
         .iter()
         .map(|ordering| judged(block(plan, part, ordering, orientation)));
-    let Some(best) = plain.reduce(better) else {
+    let Some(best) = usual.reduce(better) else {
         return PlacedPart::empty();
     };
     let is_long = wrap::is_long(best.1.size, options, orientation);

@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::draw::{Body, Composed, compose, places, unplaced, unseen};
+use super::draw::{Body, Composed, places, unplaced, unseen};
+use super::fit::compose;
 use super::{Drawing, Phases, Reading, Stage, Watch, read, unfolded};
 use crate::bag::Input;
 use crate::base::error::{Error, Result};

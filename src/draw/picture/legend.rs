@@ -30,6 +30,7 @@ pub(crate) enum LegendSign {
 /// The signs that occur in the view, with their words.
 pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> {
     let kind = |kind| view.items.iter().any(|i| i.kind == kind);
+    let is_hub = view.items.iter().any(|i| i.hub.is_some());
     let any = |is: &dyn Fn(&Shown) -> bool| view.looks().any(is);
     let mark = |marks: &[Mark]| any(&|s| s.mark.is_some_and(|m| marks.contains(&m)));
     let state = |state| any(&|s| s.state == state && s.mark.is_none());
@@ -47,11 +48,7 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
             LegendSign::Namespace,
             "namespace",
         ),
-        (
-            view.items.iter().any(|i| i.hub.is_some()),
-            LegendSign::Hub,
-            "goes on elsewhere",
-        ),
+        (is_hub, LegendSign::Hub, "goes on elsewhere"),
         (
             mark(&[Mark::Added]),
             LegendSign::Change(Mark::Added),

@@ -67,11 +67,26 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
         let Some(size) = plan.links[i].label else {
             continue;
         };
-        let room = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
-        layout.routes[i].label = lines[i].spot(size, i, &room, (&taken, &edges));
+        layout.routes[i].label = lines[i].spot(size, i, &taken, &edges);
         if let Some(spot) = layout.routes[i].label {
             taken.insert(Rect::around(spot, size).grown(0.5), 0);
         }
+    }
+}
+
+/// Moves and grows the whole where a label stands outside of it.
+pub(crate) fn make_room(plan: &Plan, layout: &mut Layout) {
+    let labels = layout.routes.iter().zip(&plan.links);
+    let labels = labels.filter_map(|(r, l)| Some(Rect::around(r.label?, l.label?)));
+    let before = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
+    let whole = labels.fold(before, |all, label| all.union(&label));
+    layout.size = Size::new(whole.w, whole.h);
+    if whole.x < 0.0 || whole.y < 0.0 {
+        for rect in layout.boxes.iter_mut().chain(&mut layout.clusters) {
+            *rect = Rect::new(rect.x - whole.x, rect.y - whole.y, rect.w, rect.h);
+        }
+        let moved = |p: Point| Point::new(p.x - whole.x, p.y - whole.y);
+        layout.routes = layout.routes.iter().map(|r| r.mapped(moved)).collect();
     }
 }
 
@@ -128,20 +143,8 @@ impl Segments {
         Some((point, (b.x - a.x).abs() > (b.y - a.y).abs()))
     }
 
-    /// The best middle for a label of this size inside `room`, if any is free.
-    fn spot(
-        &self,
-        size: Size,
-        own: usize,
-        room: &Rect,
-        (taken, edges): (&Obstacles, &Obstacles),
-    ) -> Option<Point> {
-        let is_inside = |at: &Rect| {
-            at.x >= room.x
-                && at.y >= room.y
-                && at.right() <= room.right()
-                && at.bottom() <= room.bottom()
-        };
+    /// The best middle for a label of this size, if any is free.
+    fn spot(&self, size: Size, own: usize, taken: &Obstacles, edges: &Obstacles) -> Option<Point> {
         let mut best: Option<(f64, Point)> = None;
         for (turn, &part) in STATIONS.iter().enumerate() {
             let Some((point, sideways)) = self.station(part) else {
@@ -150,7 +153,6 @@ impl Segments {
             for (penalty, spot) in self.around(point, size, sideways) {
                 let cost = penalty + 0.1 * turn as f64;
                 if best.is_some_and(|(least, _)| least <= cost)
-                    || !is_inside(&Rect::around(spot, size))
                     || taken.hits(&Rect::around(spot, size)).any(|_| true)
                 {
                     continue;

@@ -41,7 +41,7 @@ pub(crate) fn wraps(
     let fit = |block: &PlacedPart| pack::fit(block.size, options.page);
     for many in 2..=MOST_ROWS {
         let rows = cuts(part, layers, many)
-            .and_then(|cuts| Rows::new(plan, options, part, layers, &cuts, orientation));
+            .and_then(|cuts| Wrapped::new(plan, options, part, layers, &cuts, orientation));
         let Some(block) = rows.and_then(|rows| rows.placed(plan, part)) else {
             continue;
         };
@@ -61,8 +61,8 @@ fn cuts(part: &Component, layers: &Layers, many: usize) -> Option<Vec<usize>> {
     let mut passing = vec![0_usize; layers.ranks];
     for &(from, to) in &part.ends {
         let (a, b) = (layers.rank[from], layers.rank[to]);
-        for rank in a.min(b) + 1..=a.max(b) {
-            passing[rank] += 1;
+        for passed in &mut passing[a.min(b) + 1..=a.max(b)] {
+            *passed += 1;
         }
     }
     let is_whole = |rank: usize| {
@@ -84,14 +84,14 @@ fn cuts(part: &Component, layers: &Layers, many: usize) -> Option<Vec<usize>> {
 }
 
 /// The rows of a part, each laid out, x along the edges and y across.
-struct Rows {
+struct Wrapped {
     rows: Vec<(Subplan, Layout)>,
     /// The row of each vertex.
     row: Vec<usize>,
     crossings: u64,
 }
 
-impl Rows {
+impl Wrapped {
     fn new(
         plan: &Plan,
         options: &LayoutOptions,

@@ -1,0 +1,426 @@
+//! Makes a drawing readable: the page grows, what does not change is folded, then what changes, then topics are bundled.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::draw::{Composed, Drawing, known};
+use super::{Purpose, Stage, Watch};
+use crate::base::geometry::Size;
+use crate::base::notice::{Notice, NoticeKind, Notices};
+use crate::base::words;
+use crate::draw::picture::{self, Measured, PageOptions};
+use crate::layout::{Layout, LayoutOptions, RING, engine, extend, lay_out};
+use crate::mission::Mission;
+use crate::view::{Collapsible, Mode, View, ViewOptions, outline, view};
+
+/// The largest page that `--fit auto` grows to.
+const LARGEST: Size = Size::new(1920.0, 1080.0);
+/// The least number of boxes that must vanish in a collapsed namespace from which those that change are left out.
+const FEWEST_STEADY: usize = 3;
+/// The share of the smallest text that can be read below which what changes in a namespace is not left out.
+const HOPELESS: f64 = 0.3;
+/// The largest number of collapsed namespaces that are tried to be opened again.
+const MOST_REOPENED: usize = 24;
+
+/// The best drawing so far, with the page and the options that it was made with.
+struct Fitting<'a> {
+    mission: &'a Mission,
+    drawing: &'a Drawing,
+    page: PageOptions,
+    options: ViewOptions,
+    best: Attempt,
+}
+
+/// Chooses what is shown and lays it out on a page. With `--fit auto` the page grows, then those namespaces are collapsed in which least
+/// changes, until the smallest text can be read or nothing is left to collapse; then topics are bundled, if need be, and
+/// namespaces that turn out to fit are opened again.
+pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
+    watch.stage(Stage::Layout);
+    let (page, options) = (drawing.page.clone(), drawing.view.clone());
+    let best = Attempt::new(mission, drawing, &options, &page);
+    let mut fitting = Fitting {
+        mission,
+        drawing,
+        page,
+        options,
+        best,
+    };
+    fitting.take_higher_page();
+    if drawing.is_fitted && !fitting.is_readable() {
+        fitting.make_readable();
+    }
+    let mut composed = fitting.composed();
+    let notices = &mut composed.notices;
+    notices.extend(picture::unshown(&composed.view, &drawing.fonts));
+    let remarks = composed.layout.remarks.iter();
+    notices.extend(remarks.map(|text| Notice::new(NoticeKind::Note, text.as_str())));
+    composed
+}
+
+impl Fitting<'_> {
+    fn is_readable(&self) -> bool {
+        self.best.is_readable(self.drawing)
+    }
+
+    fn attempt(&self, options: &ViewOptions, page: &PageOptions) -> Attempt {
+        Attempt::new(self.mission, self.drawing, options, page)
+    }
+
+    fn again(&mut self) {
+        self.best = self.attempt(&self.options, &self.page);
+    }
+
+    fn make_readable(&mut self) {
+        if !self.drawing.is_sized && self.page.width_mm.is_none() {
+            self.page.size = LARGEST;
+            if self.best.layout.is_some()
+                || !is_crowded(self.best.view.items.len(), self.drawing, &self.page)
+            {
+                self.again();
+            }
+        }
+        let changing = self.collapse_the_steady();
+        self.collapse_the_rest(changing);
+        if self.is_readable() {
+            self.open_again();
+        } else {
+            self.bundle();
+        }
+        self.take_lower_page();
+    }
+
+    /// Takes the lowest page of a purpose on which everything can be read, else the one with the largest text.
+    fn take_higher_page(&mut self) {
+        let sizes = self.drawing.purpose.map(Purpose::sizes).unwrap_or_default();
+        for size in sizes.into_iter().skip(1) {
+            if self.is_readable() {
+                return;
+            }
+            let page = self.page_of(size);
+            let attempt = self.attempt(&self.options, &page);
+            if attempt.text > self.best.text || attempt.layout.is_none() {
+                (self.page, self.best) = (page, attempt);
+            }
+        }
+    }
+
+    /// Takes the lowest page of a purpose on which what is left can be read.
+    fn take_lower_page(&mut self) {
+        let sizes = self.drawing.purpose.map(Purpose::sizes).unwrap_or_default();
+        for size in sizes
+            .into_iter()
+            .take_while(|size| size.h < self.page.size.h)
+        {
+            let page = self.page_of(size);
+            let attempt = self.attempt(&self.options, &page);
+            if attempt.is_readable(self.drawing) {
+                (self.page, self.best) = (page, attempt);
+                return;
+            }
+        }
+    }
+
+    fn page_of(&self, size: Size) -> PageOptions {
+        PageOptions {
+            size,
+            ..self.page.clone()
+        }
+    }
+
+    /// Collapses what does not change in namespaces until the text can be read. Returns the namespaces with the boxes
+    /// in them that were left out.
+    fn collapse_the_steady(&mut self) -> Vec<(Arc<str>, Vec<Arc<str>>)> {
+        let mut left: Vec<(Arc<str>, Vec<Arc<str>>)> = Vec::new();
+        loop {
+            let is_new = |name: &Arc<str>| {
+                !self.options.collapse.contains(name)
+                    && !left.iter().any(|(other, _)| other == name)
+            };
+            let candidates = self.best.view.collapsible(self.mission, &self.options);
+            let fresh = candidates.into_iter().filter(|c| is_new(&c.name));
+            let fresh: Vec<Collapsible> = fresh.collect();
+            if self.is_readable() || fresh.is_empty() {
+                return left;
+            }
+            let is_hopeless = self.best.text < self.drawing.readable() * HOPELESS;
+            for candidate in self.at_once(fresh) {
+                let mut changing = self.best.view.changing(self.mission, &candidate.name);
+                changing.retain(|name| !is_hopeless && !self.options.expand.contains(name));
+                if changing.is_empty() || candidate.items >= changing.len() + FEWEST_STEADY {
+                    self.options.collapse.push(Arc::clone(&candidate.name));
+                    self.options.expand.extend(changing.iter().cloned());
+                }
+                if !changing.is_empty() {
+                    left.push((candidate.name, changing));
+                }
+            }
+            self.again();
+        }
+    }
+
+    /// Collapses these namespaces with the boxes in them that were left out, until the text can be read.
+    fn collapse_the_rest(&mut self, mut left: Vec<(Arc<str>, Vec<Arc<str>>)>) {
+        while !self.is_readable() && !left.is_empty() {
+            let now = self.at_once(left.clone());
+            left.drain(..now.len());
+            for (name, changing) in now {
+                self.options.expand.retain(|kept| !changing.contains(kept));
+                if !self.options.collapse.contains(&name) {
+                    self.options.collapse.push(name);
+                }
+            }
+            self.again();
+        }
+    }
+
+    /// The first of these, or a quarter of them where the text is far too small: that is not worth a layout for every
+    /// namespace on the way.
+    fn at_once<T>(&self, mut all: Vec<T>) -> Vec<T> {
+        let is_far = self.best.text < self.drawing.readable() / 2.0;
+        all.truncate(if is_far { all.len().div_ceil(4) } else { 1 });
+        all
+    }
+
+    /// The last resort: outermost namespaces as one box each, and one arrow for all topics between two boxes; if that
+    /// can be read better.
+    fn bundle(&mut self) {
+        if self.options.mode.is_direct() {
+            return;
+        }
+        let mut bundled = ViewOptions {
+            mode: Mode::Bundles,
+            ..self.drawing.view.clone()
+        };
+        let nodes = self.mission.elements.nodes.iter();
+        let outermost: BTreeSet<&str> = nodes.filter_map(|n| outermost(n.name.as_str())).collect();
+        let outermost = outermost.into_iter().map(Arc::from);
+        bundled.collapse.extend(outermost);
+        let boxes = outline(self.mission, &bundled);
+        // Few boxes with many arrows among them stand best around the page.
+        let mut drawing = self.drawing.clone();
+        if boxes.items.len() <= RING && boxes.namespaces.is_empty() {
+            drawing.engine = engine("ring").unwrap_or(drawing.engine);
+        }
+        let attempt = Attempt::new(self.mission, &drawing, &bundled, &self.page);
+        if boxes.items.len() > 1 && attempt.text > self.best.text {
+            (self.options, self.best) = (bundled, attempt);
+        }
+    }
+
+    /// Opens namespaces that were collapsed on the way and need not have been, the outermost first.
+    fn open_again(&mut self) {
+        let asked = self.drawing.view.collapse.len();
+        let collapsed = self.options.collapse[asked..].to_vec();
+        for name in collapsed.iter().rev().take(MOST_REOPENED) {
+            let mut opened = self.options.clone();
+            opened.collapse.retain(|n| n != name);
+            let attempt = self.attempt(&opened, &self.page);
+            if attempt.is_readable(self.drawing) {
+                (self.options, self.best) = (opened, attempt);
+            }
+        }
+    }
+
+    /// The drawing with the notices about what was done to make it readable, and whether that was enough.
+    fn composed(mut self) -> Composed {
+        if self.best.layout.is_none() {
+            self.best = Attempt::drawn(self.mission, self.drawing, &self.options, &self.page);
+        }
+        let (drawing, text) = (self.drawing, self.best.text);
+        let mut notices = self.best.notices;
+        if drawing.is_fitted || drawing.purpose.is_some() {
+            let collapsed = &self.options.collapse[drawing.view.collapse.len()..];
+            let kept = &self.options.expand[drawing.view.expand.len()..];
+            notices.extend(told(drawing, &parts(collapsed, kept), &self.page, text).iter());
+            if self.options.mode != drawing.view.mode {
+                let text = format!(
+                    "one arrow for all topics between two boxes{}; `--mode {}` draws each",
+                    so_that(text >= drawing.readable()),
+                    drawing.view.mode.word()
+                );
+                notices.add(Notice::new(NoticeKind::Hidden, text));
+            }
+        }
+        Composed {
+            view: self.best.view,
+            options: self.options,
+            page: self.page,
+            layout: self.best.layout.unwrap_or_else(Layout::empty),
+            notices,
+        }
+    }
+}
+
+/// The first part of a name that has more than one: `/robot1` of `/robot1/nav/planner`.
+fn outermost(name: &str) -> Option<&str> {
+    let end = name.get(1..)?.find('/')? + 1;
+    name.get(..end)
+}
+
+/// A layout of the view that some options give.
+struct Attempt {
+    /// The view; without its windows where there is no layout.
+    view: View,
+    notices: Notices,
+    /// The layout; `None` where there are too many boxes to be read in any layout.
+    layout: Option<Layout>,
+    /// The size of its smallest text in pixels.
+    text: f64,
+}
+
+impl Attempt {
+    /// An attempt with a layout if it may be readable or `--fit none` was given, else without.
+    fn new(
+        mission: &Mission,
+        drawing: &Drawing,
+        options: &ViewOptions,
+        page: &PageOptions,
+    ) -> Self {
+        let elements = &mission.elements;
+        let boxes = elements.nodes.len() + elements.topics.len();
+        if drawing.is_fitted && is_crowded(boxes, drawing, page) {
+            let view = outline(mission, options);
+            if is_crowded(view.items.len(), drawing, page) {
+                return Self {
+                    view,
+                    notices: Notices::new(),
+                    layout: None,
+                    text: 0.0,
+                };
+            }
+        }
+        Self::drawn(mission, drawing, options, page)
+    }
+
+    /// An attempt with a layout in any case.
+    fn drawn(
+        mission: &Mission,
+        drawing: &Drawing,
+        options: &ViewOptions,
+        page: &PageOptions,
+    ) -> Self {
+        // The widest labels depend on rates, so that the windows are needed too.
+        let (view, notices) = view(mission, options);
+        let view = if drawing.splits_hubs {
+            view.with_hubs_split()
+        } else {
+            view
+        };
+        let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
+        let (plan, page) = (measured.plan(), measured.layout_options());
+        let placed = |page: &LayoutOptions| {
+            let layout = match &drawing.kept {
+                None => lay_out(plan, page, drawing.engine),
+                Some(kept) => extend(plan, page, drawing.engine, &known(&view, kept)),
+            };
+            (measured.text_px(&layout), layout)
+        };
+        let (mut text, mut layout) = placed(&page);
+        let readable = drawing.readable();
+        if drawing.is_fitted && (ALMOST * readable..readable).contains(&text) {
+            let tight = placed(&LayoutOptions {
+                is_tight: true,
+                ..page
+            });
+            if tight.0 >= readable {
+                (text, layout) = tight;
+            }
+        }
+        Self {
+            view,
+            notices,
+            layout: Some(layout),
+            text,
+        }
+    }
+
+    fn is_readable(&self, drawing: &Drawing) -> bool {
+        self.text >= drawing.readable()
+    }
+}
+
+/// The share of the smallest text that can be read from which a drawing that fills the page better is tried.
+const ALMOST: f64 = 0.7;
+
+/// The least area of a box in squares of its text's height: no box is lower than its text, nor narrower than four
+/// times that.
+const LEAST_BOX: f64 = 4.0;
+
+/// Whether these are more boxes than a page holds with text that can be read.
+fn is_crowded(boxes: usize, drawing: &Drawing, page: &PageOptions) -> bool {
+    let text = drawing.readable();
+    boxes as f64 > page.size.w * page.size.h / (LEAST_BOX * text * text)
+}
+
+/// The collapsed namespaces in words, with the number of those in it that were kept open because they change.
+fn parts(collapsed: &[Arc<str>], kept: &[Arc<str>]) -> Vec<(Arc<str>, String)> {
+    let told = |name: &Arc<str>| {
+        let inside = |other: &&Arc<str>| {
+            let rest = other.strip_prefix(&**name);
+            rest.is_some_and(|rest| rest.starts_with('/'))
+        };
+        let words = match kept.iter().filter(inside).count() {
+            0 => name.to_string(),
+            many => format!("{name} but for {} in it", words::count(many, "change")),
+        };
+        (Arc::clone(name), words)
+    };
+    collapsed.iter().map(told).collect()
+}
+
+/// The notices about what `--fit auto` did, and whether it was enough: the smallest text is `text` pixels high.
+fn told(
+    drawing: &Drawing,
+    collapsed: &[(Arc<str>, String)],
+    got: &PageOptions,
+    text: f64,
+) -> Notices {
+    let mut notices = Notices::new();
+    let is_readable = text >= drawing.readable();
+    if drawing.page.size != got.size && drawing.purpose.is_none() {
+        let text = format!(
+            "the page is {}x{}{}; `--size` takes another",
+            got.size.w,
+            got.size.h,
+            so_that(is_readable)
+        );
+        notices.add(Notice::new(NoticeKind::Chosen, text));
+    }
+    if let Some((first, _)) = collapsed.first() {
+        let collapsed: Vec<&String> = collapsed.iter().map(|(_, words)| words).collect();
+        let text = format!(
+            "drawn as one box each{}: {}; `--expand {first}` opens one, `--fit none` all",
+            so_that(is_readable),
+            words::some_of(&collapsed, 3)
+        );
+        notices.add(Notice::new(NoticeKind::Hidden, text));
+    }
+    if let Some(purpose) = drawing.purpose.filter(|_| !is_readable) {
+        let size = match got.width_mm {
+            Some(mm) => {
+                let pt = text * mm / got.size.w * 72.0 / 25.4;
+                format!("{} pt", words::number(words::significant(pt, 2)))
+            }
+            None => format!("{} pixels", words::number(words::significant(text, 2))),
+        };
+        let advice = purpose.advice();
+        let text =
+            format!("the smallest text is {size} where it is seen, too small to be read; {advice}");
+        notices.add(Notice::new(NoticeKind::Note, text));
+    } else if !is_readable {
+        let text = format!(
+            "the smallest text is {} pixels high, too small to be read; `--ns-filter`, `--hide dead,leaf`, `--mode nodes` or a larger `--size` help",
+            words::number(text)
+        );
+        notices.add(Notice::new(NoticeKind::Note, text));
+    }
+    notices
+}
+
+fn so_that(is_readable: bool) -> &'static str {
+    if is_readable {
+        " so that the text can be read"
+    } else {
+        ""
+    }
+}
