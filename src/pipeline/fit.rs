@@ -193,6 +193,8 @@ impl Fitting<'_> {
         };
         let nodes = self.mission.elements.nodes.iter();
         let outermost: BTreeSet<&str> = nodes.filter_map(|n| outermost(n.name.as_str())).collect();
+        let is_open = |space: &&str| bundled.expand.iter().any(|open| &**open == *space);
+        let outermost: Vec<&str> = outermost.into_iter().filter(|s| !is_open(s)).collect();
         let outermost = outermost.into_iter().map(Arc::from);
         bundled.collapse.extend(outermost);
         let boxes = outline(self.mission, &bundled);

@@ -58,9 +58,9 @@ fn main() {
     };
     let folder = value("--svg").map(Path::new);
     println!(
-        "| graph | engine | | size | fit | Mpx | length | crossings | bends | overlaps | through | foreign | labels | label overlaps | ms |"
+        "| graph | engine | | size | fit | Mpx | length | crossings | bends | overlaps | through | foreign | labels | label overlaps | strayed | ms |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for name in GRAPHS.iter().filter(chosen) {
         let mut graph = match *name {
             "example" => graph::of_bag("examples/warehouse.bag"),
@@ -126,7 +126,7 @@ fn report(name: &str, engine: &str, graph: &Graph, layout: &Layout, took: Durati
     let found = measure::measure(&graph.plan, layout);
     let Size { w, h } = layout.size;
     println!(
-        "| {name} | {engine} | {} | {w:.0} × {h:.0} | {:.3} | {:.2} | {:.0} | {} | {} | {} | {} | {} | {} | {} | {:.1} |",
+        "| {name} | {engine} | {} | {w:.0} × {h:.0} | {:.3} | {:.2} | {:.0} | {} | {} | {} | {} | {} | {} | {} | {} | {:.1} |",
         layout.orientation.word(),
         (PAGE.w / w).min(PAGE.h / h),
         w * h / 1e6,
@@ -142,6 +142,7 @@ fn report(name: &str, engine: &str, graph: &Graph, layout: &Layout, took: Durati
         },
         found.labels,
         found.label_overlaps,
+        found.strayed,
         took.as_secs_f64() * 1e3,
     );
     for remark in &layout.remarks {

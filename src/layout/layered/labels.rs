@@ -341,4 +341,53 @@ mod tests {
                 .all(|b| !b.overlaps(&rect(0)) && !b.overlaps(&rect(1)))
         );
     }
+
+    #[test]
+    fn a_label_beside_its_edge_is_on_no_other() {
+        let labelled = Link {
+            label: Some(Size::new(40.0, 13.0)),
+            ..link(0, 1)
+        };
+        let plan = Plan {
+            vertices: vec![vertex(None); 2],
+            links: vec![labelled, link(0, 1), link(0, 1)],
+            clusters: vec![],
+        };
+        let upright = |x: f64| Route {
+            start: Point::new(x, 30.0),
+            curves: vec![[
+                Point::new(x, 60.0),
+                Point::new(x, 130.0),
+                Point::new(x, 160.0),
+            ]],
+            label: None,
+        };
+        let mut layout = Layout {
+            orientation: Orientation::TopBottom,
+            size: Size::new(80.0, 190.0),
+            boxes: vec![
+                Rect::new(0.0, 0.0, 80.0, 30.0),
+                Rect::new(0.0, 160.0, 80.0, 30.0),
+            ],
+            routes: [40.0, 30.0, 50.0].map(upright).to_vec(),
+            clusters: vec![],
+            remarks: vec![],
+        };
+        place(&plan, &mut layout);
+        assert_eq!(layout.routes[0].label.map(|at| at.x), Some(40.0));
+        // Without its neighbours it stands beside the line, and the whole grows where that needs room.
+        let plan = Plan {
+            links: vec![Link {
+                label: Some(Size::new(70.0, 50.0)),
+                ..link(0, 1)
+            }],
+            ..plan
+        };
+        layout.routes.truncate(1);
+        place(&plan, &mut layout);
+        make_room(&plan, &mut layout);
+        let label = Rect::around(layout.routes[0].label.unwrap(), Size::new(70.0, 50.0));
+        assert!(label.x >= 0.0 && label.right() <= layout.size.w);
+        assert!(layout.boxes.iter().all(|b| !b.overlaps(&label)));
+    }
 }

@@ -6,7 +6,7 @@
     reason = "formulas of analytic geometry"
 )]
 
-use bagreel::internals::base::geometry::{Point, Rect};
+use bagreel::internals::base::geometry::{Point, Rect, Size};
 use bagreel::internals::layout::{Layout, Outline, Plan, Route};
 
 /// The numbers of one layout.
@@ -21,6 +21,8 @@ pub(crate) struct Measures {
     /// Edge labels placed, and pairs of labels, or label and box, that overlap.
     pub(crate) labels: usize,
     pub(crate) label_overlaps: usize,
+    /// Labels on another edge that are not on their own.
+    pub(crate) strayed: usize,
     /// Vertices inside a cluster that is not theirs.
     pub(crate) foreign: usize,
     /// How many pieces of routes are not straight and level.
@@ -57,10 +59,31 @@ pub(crate) fn measure(plan: &Plan, layout: &Layout) -> Measures {
         crossings: crossings(plan, layout, &lines),
         labels: labels.len(),
         label_overlaps: pairs(&labels) + on_boxes,
+        strayed: strayed(plan, layout, &lines),
         foreign: foreign(plan, layout),
         bends: layout.routes.iter().map(bends).sum(),
         length: lines.iter().flat_map(|line| line.windows(2)).map(far).sum(),
     }
+}
+
+fn strayed(plan: &Plan, layout: &Layout, lines: &[Vec<Point>]) -> usize {
+    let mut count = 0;
+    for (i, (route, link)) in layout.routes.iter().zip(&plan.links).enumerate() {
+        let (Some(middle), Some(size)) = (route.label, link.label) else {
+            continue;
+        };
+        // Lines are measured in more pieces here than there.
+        let (core, whole) = (Size::new(3.0, 3.0), Size::new(size.w - 3.0, size.h - 3.0));
+        let on = |line: &Vec<Point>, size: Size| {
+            let area = Rect::around(middle, size);
+            line.windows(2)
+                .any(|pair| enters(pair, &area.grown(2.0), Outline::Box))
+        };
+        let others = lines.iter().enumerate().filter(|(k, _)| *k != i);
+        let is_on_another = others.into_iter().any(|(_, line)| on(line, whole));
+        count += usize::from(is_on_another && !on(&lines[i], core));
+    }
+    count
 }
 
 fn far(pair: &[Point]) -> f64 {
