@@ -484,6 +484,38 @@ fn what_speaks_against_a_place_is_told() {
 }
 
 #[test]
+fn a_simulation_is_not_what_ran_where_another_launch_file_starts_the_same_nodes() {
+    let launch = |nodes: &[&str]| {
+        let node = |n: &&str| format!("Node(package='p', executable='{n}', name='{n}')");
+        let nodes: Vec<String> = nodes.iter().map(node).collect();
+        let nodes = nodes.join(", ");
+        format!("def generate_launch_description():\n    return LaunchDescription([{nodes}])\n")
+    };
+    let setup =
+        "setup(entry_points={'console_scripts': ['steer = p.steer:main', 'sim = p.sim:main']})\n";
+    let robot = launch(&["steer"]);
+    let simulation = launch(&["steer", "sim"]);
+    let (steer, sim) = (node("steer", "in", "out"), node("sim", "out", "in"));
+    let files = [
+        PACKAGE,
+        ("p/setup.py", setup),
+        ("p/p/steer.py", &steer),
+        ("p/p/sim.py", &sim),
+        ("p/launch/simulation.launch.py", &simulation),
+        ("p/launch/robot.launch.py", &robot),
+    ];
+    let recorded = [("/out", STRING), ("/in", STRING)];
+    let named = ["/steer -> /in", "/out -> /steer"];
+    let both = folder(&recorded, &["/steer"], &files);
+    assert_eq!(edges(both.path(), &["--infer", "source"]), set(&named));
+    let text = said(both.path(), &["--infer", "source"]);
+    assert!(text.contains("another launch file fits better"), "{text}");
+    let alone = folder(&recorded, &["/steer"], &files[..5]);
+    let found = edges(alone.path(), &["--infer", "source"]);
+    assert!(found.contains("/sim ? -> /out"), "{found:?}");
+}
+
+#[test]
 fn what_else_the_code_tells_is_listed() {
     let more = "\n        self.create_publisher(String, 'lost', 1)\n\ndef";
     let code = node("talker", "out", "in").replace("\n\ndef", more);

@@ -6,14 +6,25 @@ use std::path::Path;
 
 use super::error::{Error, Result};
 
+/// The number of bytes by which a file is told to be no text, before the rest is read.
+const HEAD: u64 = 4096;
+
 /// The bytes of a file of at most `limit` bytes.
 ///
 /// # Errors
 /// [`Error::Io`] where it cannot be read, [`Error::BadFile`] where it is longer.
 pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    read_if(path, limit, |_| Ok(()))
+}
+
+/// As [`read`], if `fits` accepts the first bytes.
+fn read_if(path: &Path, limit: u64, fits: impl Fn(&[u8]) -> io::Result<()>) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(Error::io("read", path))?;
-    let read = file.take(limit.saturating_add(1)).read_to_end(&mut bytes);
+    let mut file = file.take(limit.saturating_add(1));
+    let head = file.by_ref().take(HEAD).read_to_end(&mut bytes);
+    let read = head.and_then(|_| fits(&bytes));
+    let read = read.and_then(|()| file.read_to_end(&mut bytes));
     read.map_err(Error::io("read", path))?;
     if bytes.len() as u64 > limit {
         return Err(Error::BadFile {
@@ -31,9 +42,13 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
 /// # Errors
 /// As [`read`], and [`Error::Io`] where it is not UTF-8.
 pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String> {
-    let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text");
-    String::from_utf8(read(path, limit)?)
-        .map_err(no_text)
+    let no_text = || io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text");
+    let is_text = |head: &[u8]| {
+        let binary = head.contains(&0);
+        if binary { Err(no_text()) } else { Ok(()) }
+    };
+    String::from_utf8(read_if(path, limit, is_text)?)
+        .map_err(|_| no_text())
         .map_err(Error::io("read", path))
 }
 
@@ -62,5 +77,8 @@ mod tests {
             error.contains("latin1.toml") && error.contains("UTF-8"),
             "{error}"
         );
+        // Gigabytes are allowed for a mission, and not read for what is none.
+        #[cfg(unix)]
+        assert!(read_text(Path::new("/dev/zero"), u64::MAX).is_err());
     }
 }

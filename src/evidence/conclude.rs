@@ -104,6 +104,7 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
     } else {
         BTreeMap::new()
     };
+    proofs.shrink_to_fit();
     let new = facts.renumber();
     let to = |name: Name| new.get(name.0 as usize).copied().unwrap_or(name);
     for proof in &mut proofs {

@@ -39,6 +39,11 @@ impl Graphs {
         self.spans.is_empty()
     }
 
+    /// The times of the windows, in order.
+    pub(crate) fn spans(&self) -> &[Span] {
+        &self.spans
+    }
+
     /// The graphs in order, each built when it is needed.
     pub fn iter(&self) -> Iter<'_> {
         fn cursors(columns: &[Column]) -> Vec<ColumnCursor<'_>> {
@@ -84,6 +89,23 @@ impl Graphs {
     pub(crate) fn lifecycle_word(&self, row: &Row) -> Option<Arc<str>> {
         let place = (row.lifecycle as usize).checked_sub(1)?;
         self.lifecycles.get(place).map(Arc::clone)
+    }
+
+    /// The same graphs without sizes, the spacing of messages and the states of lifecycles.
+    pub(crate) fn plain(mut self) -> Self {
+        let windows = self.spans.len();
+        for topic in &mut self.topics {
+            *topic = topic.map(windows, Row::without_spacing);
+        }
+        for node in self
+            .nodes
+            .iter_mut()
+            .filter(|_| !self.lifecycles.is_empty())
+        {
+            *node = node.map(windows, Row::without_lifecycle);
+        }
+        self.lifecycles = Vec::new();
+        self
     }
 
     /// A walk through all windows that yields only differences from the window before.
@@ -167,9 +189,11 @@ impl<'a> IntoIterator for &'a Graphs {
 
 /// The states of the elements in the next window, by id.
 fn states<T>(cursors: &mut [ColumnCursor<'_>], state: impl Fn(u32, &Row) -> T) -> Vec<T> {
+    // Room for all at once: growing would take half as much again.
+    let mut states = Vec::with_capacity(cursors.len());
     let rows = (0..).zip(cursors);
-    rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?)))
-        .collect()
+    states.extend(rows.filter_map(|(id, cursor)| Some(state(id, &cursor.next()?))));
+    states
 }
 
 /// A writer of the graphs of windows, state by state: each element's in order of the windows, elements in any order.
@@ -254,9 +278,11 @@ impl GraphsWriter {
 
     /// Ends the writing.
     pub(crate) fn finish(self) -> Graphs {
+        // Not collected from the iterator, which would keep the room of the writers.
         let columns = |writers: Vec<ColumnWriter>| {
-            let columns = writers.into_iter().map(ColumnWriter::finish);
-            columns.collect()
+            let mut columns = Vec::with_capacity(writers.len());
+            columns.extend(writers.into_iter().map(ColumnWriter::finish));
+            columns
         };
         Graphs {
             spans: self.spans,

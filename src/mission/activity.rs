@@ -7,7 +7,7 @@ use crate::base::name::{is_player, is_quiet, is_recorder};
 use crate::base::time::{Span, Stamp};
 use crate::graph::sending::Sending;
 use crate::graph::window::every;
-use crate::graph::{Graph, Node};
+use crate::graph::{Element, Graphs, Node, Row};
 use crate::mission::Mission;
 
 /// The most cells of the grid: more would be finer than print, and the cost of phases grows with the square.
@@ -34,38 +34,11 @@ const STEPS: [i64; 16] = [
     86_400 * SECOND,
 ];
 
-/// The graph of a short stretch of time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Cell {
-    /// The time; cells follow one another without gaps.
-    pub span: Span,
-    /// The graph of the elements alive in it.
-    pub graph: Graph,
-}
-
-impl Cell {
-    /// A cell without the values that only windows have: sizes, the spacing of messages, the states of lifecycles.
-    pub(crate) fn new(span: Span, mut graph: Graph) -> Self {
-        for topic in &mut graph.topics {
-            (topic.bytes, topic.median_period_s, topic.max_gap_s) = (None, None, None);
-        }
-        for node in &mut graph.nodes {
-            node.lifecycle = None;
-        }
-        // All cells stay, and were gathered without knowing how many states there would be.
-        graph.nodes.shrink_to_fit();
-        graph.topics.shrink_to_fit();
-        graph.publishes.shrink_to_fit();
-        graph.subscribes.shrink_to_fit();
-        Self { span, graph }
-    }
-}
-
 /// The mission as a sequence of short cells; ids are those of the mission's elements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Activity {
-    /// The cells in order, 1 to `MOST_CELLS`; empty where nothing was read.
-    pub cells: Vec<Cell>,
+    /// The graph of each cell, in order, 1 to `MOST_CELLS` without gaps; empty where nothing was read.
+    pub graphs: Graphs,
     /// The times of messages, to the nanosecond; empty lists where only windows are known.
     pub sending: Sending,
 }
@@ -81,6 +54,15 @@ pub(crate) fn grid(span: Span) -> Vec<Span> {
 }
 
 impl Activity {
+    /// The activity in these cells, without the values that only windows have: sizes, the spacing of messages, the
+    /// states of lifecycles.
+    pub(crate) fn new(graphs: Graphs, sending: Sending) -> Self {
+        Self {
+            graphs: graphs.plain(),
+            sending,
+        }
+    }
+
     /// The activity of a mission of which only the windows are known: neighbours are joined until few enough are left,
     /// each with the graph of the window with most messages. Cells of windows that overlap end where the next begins.
     pub fn of_windows(mission: &Mission) -> Self {
@@ -97,24 +79,36 @@ impl Activity {
                 start: start(k)?,
                 end: start(k + 1).unwrap_or(last),
             };
-            Some(Cell::new(span, graph))
+            Some((span, graph))
         };
-        Self {
-            cells: chunks.iter().enumerate().filter_map(cell).collect(),
-            sending: Sending::default(),
-        }
+        let cells = chunks.iter().enumerate().filter_map(cell);
+        Self::new(cells.collect(), Sending::default())
+    }
+
+    /// The cells, which follow one another without gaps.
+    pub fn cells(&self) -> &[Span] {
+        self.graphs.spans()
     }
 
     /// The time from the first cell's start to the last one's end.
     pub fn span(&self) -> Span {
-        let start = self.cells.first().map_or(Stamp(0), |c| c.span.start);
-        let end = self.cells.last().map_or(start, |c| c.span.end);
+        let start = self.cells().first().map_or(Stamp(0), |cell| cell.start);
+        let end = self.cells().last().map_or(start, |cell| cell.end);
         Span { start, end }
     }
 
     /// The length of the longest cell in nanoseconds, 0 without cells.
     pub fn step(&self) -> i64 {
-        self.cells.iter().map(|c| c.span.nanos()).max().unwrap_or(0)
+        self.cells().iter().map(Span::nanos).max().unwrap_or(0)
+    }
+
+    /// Per cell, whether an element exists in it in a state for which `is` holds.
+    pub(crate) fn presence(&self, what: Element, is: impl Fn(&Row) -> bool) -> Vec<bool> {
+        let mut cells = vec![false; self.cells().len()];
+        for (at, _) in self.graphs.rows(what).filter(|(_, row)| is(row)) {
+            cells[at] = true;
+        }
+        cells
     }
 }
 

@@ -10,14 +10,15 @@ mod presence;
 mod ramp;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 use self::partition::partition;
 pub(crate) use self::presence::knows_publishers;
 use self::presence::{Presence, is_topics, presences};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Elements, TopicId};
-use crate::mission::activity::{Activity, Cell};
+use crate::graph::{Element, Elements, TopicId};
+use crate::mission::activity::Activity;
 use crate::mission::ledger::Phase;
 
 /// The distance from a boundary's cell within which its exact time is searched, in nanoseconds and as a part of the
@@ -37,7 +38,7 @@ pub(crate) struct Configuration {
 /// activity.
 pub fn phases(elements: &Elements, activity: &Activity) -> Vec<Phase> {
     let present = presences(elements, activity);
-    let cells: Vec<i64> = activity.cells.iter().map(|c| c.span.nanos()).collect();
+    let cells: Vec<i64> = activity.cells().iter().map(Span::nanos).collect();
     let cuts = partition(&cells, &present);
     let starts: Vec<usize> = std::iter::once(0).chain(cuts).collect();
     let ends = starts[1..].iter().copied().chain([cells.len()]);
@@ -87,11 +88,12 @@ pub(crate) fn configuration_of(
 
 /// The cells whose middle lies in `span`, as a range; at least one if there is any.
 pub(crate) fn cells_of(activity: &Activity, span: Span) -> (usize, usize) {
-    let middle = |c: &Cell| c.span.start.plus(c.span.nanos() / 2);
-    let from = activity.cells.partition_point(|c| middle(c) < span.start);
-    let to = activity.cells.partition_point(|c| middle(c) < span.end);
-    let from = from.min(activity.cells.len().saturating_sub(1));
-    (from, to.max(from + 1).min(activity.cells.len()))
+    let cells = activity.cells();
+    let middle = |cell: &Span| cell.start.plus(cell.nanos() / 2);
+    let from = cells.partition_point(|cell| middle(cell) < span.start);
+    let to = cells.partition_point(|cell| middle(cell) < span.end);
+    let from = from.min(cells.len().saturating_sub(1));
+    (from, to.max(from + 1).min(cells.len()))
 }
 
 fn configuration(
@@ -103,7 +105,7 @@ fn configuration(
 ) -> Configuration {
     Configuration {
         names: majority(activity, present, (from, to)),
-        senders: senders(elements, &activity.cells[from..to]),
+        senders: senders(elements, activity, from..to),
     }
 }
 
@@ -114,11 +116,11 @@ fn majority(
     (from, to): (usize, usize),
 ) -> BTreeSet<Arc<str>> {
     let topics = is_topics(present);
-    let cells = &activity.cells[from..to];
-    let whole: i64 = cells.iter().map(|c| c.span.nanos()).sum();
+    let cells = &activity.cells()[from..to];
+    let whole: i64 = cells.iter().map(Span::nanos).sum();
     let is_there = |p: &&Presence| {
         let there = cells.iter().zip(&p.cells[from..to]).filter(|(_, is)| **is);
-        let nanos: i64 = there.map(|(c, _)| c.span.nanos()).sum();
+        let nanos: i64 = there.map(|(cell, _)| cell.nanos()).sum();
         nanos * 2 >= whole
     };
     let counted = |p: &&Presence| p.counts(topics);
@@ -127,30 +129,28 @@ fn majority(
 }
 
 /// The senders of more than half of a topic's messages in these cells.
-fn senders(elements: &Elements, cells: &[Cell]) -> BTreeMap<TopicId, Arc<str>> {
-    let mut all = vec![0_u64; elements.topics.len()];
-    let mut counts = vec![0_u64; elements.publishes.len()];
-    for cell in cells {
-        for topic in &cell.graph.topics {
-            if let Some(sum) = all.get_mut(topic.id as usize) {
-                *sum = sum.saturating_add(topic.count);
-            }
-        }
-        for edge in &cell.graph.publishes {
-            if let Some(sum) = counts.get_mut(edge.id as usize) {
-                *sum = sum.saturating_add(edge.count.unwrap_or(0));
-            }
-        }
-    }
+fn senders(
+    elements: &Elements,
+    activity: &Activity,
+    cells: Range<usize>,
+) -> BTreeMap<TopicId, Arc<str>> {
+    let count = |what: Element| {
+        let rows = activity.graphs.rows(what);
+        let inside = rows.filter(|(at, _)| cells.contains(at));
+        let counts = inside.map(|(_, row)| row.count.unwrap_or(0));
+        counts.fold(0, u64::saturating_add)
+    };
     let mut sent: BTreeMap<TopicId, BTreeMap<Arc<str>, u64>> = BTreeMap::new();
-    for (edge, count) in elements.publishes.iter().zip(counts).filter(|s| s.1 > 0) {
-        if let Some(node) = elements.nodes.get(edge.node as usize) {
+    for (id, edge) in (0..).zip(&elements.publishes) {
+        let count = count(Element::Publish(id));
+        let node = elements.nodes.get(edge.node as usize);
+        if let Some(node) = node.filter(|_| count > 0) {
             let of = sent.entry(edge.topic).or_default();
             *of.entry(Arc::clone(&node.role)).or_default() += count;
         }
     }
     let main = |(topic, of): (TopicId, BTreeMap<Arc<str>, u64>)| {
-        let whole = all.get(topic as usize).copied().unwrap_or(0);
+        let whole = count(Element::Topic(topic));
         let found = of.into_iter().find(|(_, n)| n * 2 > whole);
         found.map(|(role, _)| (topic, role))
     };
@@ -169,7 +169,7 @@ fn boundaries(
     let mut bounds = vec![whole.start];
     for pair in ranges.windows(2) {
         let (before, after) = (pair[0], pair[1]);
-        let cell = activity.cells[after.0].span.start;
+        let cell = activity.cells()[after.0].start;
         let exact = differing(elements, activity, present, (before, after), cell);
         let last = bounds.last().copied().unwrap_or(whole.start);
         bounds.push(exact.filter(|at| *at > last).unwrap_or(cell));

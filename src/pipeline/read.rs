@@ -20,7 +20,7 @@ use crate::evidence::conclude::{self, Findings, conclude};
 use crate::graph::diff::RATE_CHANGE;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
 use crate::graph::{History, Windowed, graphs, history};
-use crate::mission::activity::{self, Activity, Cell};
+use crate::mission::activity::{self, Activity};
 use crate::mission::ledger::{self, Ledger};
 use crate::mission::{Mission, Window, read_json};
 
@@ -176,7 +176,7 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         );
         return Err(Error::usage(what, "give the bag itself"));
     }
-    if mission.activity.cells.is_empty() {
+    if mission.activity.graphs.is_empty() {
         mission.activity = Activity::of_windows(&mission);
     }
     let basis = Basis {
@@ -274,13 +274,8 @@ fn activity(
     span: Span,
     graphs: impl Fn(&[Span]) -> Result<Windowed>,
 ) -> Result<Activity> {
-    let spans = activity::grid(span);
-    let graphs = graphs(&spans)?.graphs;
-    let cells = spans.into_iter().zip(&graphs);
-    Ok(Activity {
-        cells: cells.map(|(span, graph)| Cell::new(span, graph)).collect(),
-        sending: history.sending.clone(),
-    })
+    let graphs = graphs(&activity::grid(span))?.graphs;
+    Ok(Activity::new(graphs, history.sending.clone()))
 }
 
 /// The ledger: the events of the mission, and its phases.

@@ -6,7 +6,6 @@ use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
 use crate::graph::sending::Sending;
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph, NodeId};
-use crate::mission::activity::Cell;
 use crate::mission::ledger::{Detail, Entry};
 use crate::mission::{Activity, EntryId, Ledger, Mission, Window};
 
@@ -169,12 +168,10 @@ impl Keep {
     }
 
     fn activity(&self, all: &Activity, options: &ViewOptions, viewed: &Viewed) -> Activity {
-        let cells = all.cells.iter().map(|cell| Cell {
-            span: cell.span,
-            graph: self.graph(&cell.graph, options, viewed),
-        });
+        let cells = all.cells().iter().zip(&all.graphs);
+        let cells = cells.map(|(span, graph)| (*span, self.graph(&graph, options, viewed)));
         Activity {
-            cells: cells.collect(),
+            graphs: cells.collect(),
             sending: Sending {
                 publishes: kept(&all.sending.publishes, &self.publishes),
                 topics: kept(&all.sending.topics, &self.topics),

@@ -59,8 +59,13 @@ impl Showing {
 #[derive(Debug, Default)]
 pub(super) struct ShowingWriter {
     showing: Showing,
+    /// The places of looks without a mark, once there are more than [`FEW`] looks.
     places: BTreeMap<LookKey, u32>,
 }
+
+/// The number of looks that are searched one by one: most items have no more, and a map of each would take more room
+/// than all else.
+const FEW: usize = 4;
 
 /// The properties that tell one look without a mark from another.
 type LookKey = (
@@ -79,16 +84,36 @@ impl ShowingWriter {
 
     /// The place of a look. A look with a mark gets a place of its own each time.
     pub(super) fn look(&mut self, shown: Shown) -> u32 {
+        let is_plain = shown.mark.is_none();
+        if is_plain && let Some(place) = self.place(&shown) {
+            return place;
+        }
         let all = &mut self.showing.looks;
         let next = u32::try_from(all.len()).unwrap_or(AWAY - 1);
-        if shown.mark.is_some() {
-            all.push(shown);
-            return next;
+        if all.is_empty() {
+            all.reserve_exact(1);
         }
-        *self.places.entry(key(&shown)).or_insert_with(|| {
-            all.push(shown);
-            next
-        })
+        if is_plain && all.len() > FEW {
+            self.places.insert(key(&shown), next);
+        }
+        all.push(shown);
+        next
+    }
+
+    /// The place of a look without a mark, if it was there before.
+    fn place(&mut self, shown: &Shown) -> Option<u32> {
+        let wanted = key(shown);
+        let looks = (0..).zip(&self.showing.looks);
+        let mut plain = looks.filter(|(_, look)| look.mark.is_none());
+        if self.showing.looks.len() <= FEW {
+            let found = plain.find(|(_, look)| key(look) == wanted);
+            return found.map(|(place, _)| place);
+        }
+        if self.places.is_empty() {
+            let places = plain.map(|(place, look)| (key(look), place));
+            self.places = places.collect();
+        }
+        self.places.get(&wanted).copied()
     }
 
     /// Notes the place of the look from this window on.
@@ -166,6 +191,14 @@ mod tests {
         }
         assert_eq!(showing.at(99), None);
         assert_eq!(showing.looks().len(), 3);
+    }
+
+    #[test]
+    fn of_many_looks_each_is_kept_once() {
+        let all: Vec<_> = (0..100).map(|n| shown(f64::from(n % 20), None)).collect();
+        let showing = Showing::of(all.iter().map(Option::as_ref));
+        assert_eq!(showing.looks().len(), 20);
+        assert_eq!(showing.at(57), all[57].as_ref());
     }
 
     #[test]

@@ -213,3 +213,22 @@ fn a_chattering_ffmpeg_is_heard_out() {
         errors(&output)
     );
 }
+
+/// A minute of mission is drawn from cells of a second each: what lives through all of them must not take room in each.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_hundred_thousand_nodes_fit_into_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let node = |k: usize| format!("<node pkg=\"p\" type=\"t\" name=\"n{k:05}\"/>\n");
+    let nodes: String = (0..90_000).map(node).collect();
+    let launch = format!("<launch>\n{nodes}</launch>\n");
+    fs::write(dir.path().join("many.launch"), launch).unwrap();
+    let bagreel = env!("CARGO_BIN_EXE_bagreel");
+    let limited = format!("ulimit -v 450000; exec {bagreel} info {COURIER} --topology many.launch");
+    let run = Command::new("sh")
+        .args(["-c", &limited])
+        .current_dir(dir.path())
+        .output()
+        .unwrap();
+    assert_eq!(run.status.code(), Some(0), "{}", errors(&run));
+}

@@ -208,7 +208,7 @@ fn of_pills(
     let source = sheet.source;
     let talks = Talks::new(source, tracks);
     let own: Vec<Option<usize>> = (0..tracks.len()).map(Some).collect();
-    let whole = (0, source.mission.activity.cells.len());
+    let whole = (0, source.mission.activity.cells().len());
     let all = talks.between(&own, whole, false);
     let linked: BTreeSet<usize> = all.iter().flat_map(|t| [t.from, t.to]).collect();
     let phases: Vec<String> = phases_of(source, tracks)
@@ -294,7 +294,7 @@ fn of_groups(
         looks.push(look);
     }
     let talks = Talks::new(source, tracks);
-    let whole = (0, source.mission.activity.cells.len());
+    let whole = (0, source.mission.activity.cells().len());
     let talks = talks.between(&vertex, whole, false);
     finished(sheet, canvas, (looks, vertices, Vec::new(), talks), 2)
 }

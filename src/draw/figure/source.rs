@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::base::name::{is_quiet, last_part};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{EdgeId, NodeId, State, TopicId};
+use crate::graph::{EdgeId, Element, NodeId, State, TopicId};
 use crate::mission::Mission;
 use crate::mission::activity::is_hidden_node;
 use crate::mission::ledger::Phase;
@@ -55,20 +55,17 @@ impl<'a> FigureSource<'a> {
                 published[edge.node as usize].push(id);
             }
         }
-        let mut latched = vec![false; mission.elements.publishes.len()];
-        let cells = mission.activity.cells.iter();
-        for edge in cells.flat_map(|cell| &cell.graph.publishes) {
-            if let Some(latched) = latched.get_mut(edge.id as usize) {
-                *latched |= edge.state == State::Latched;
-            }
-        }
+        let latched = (0..).zip(&mission.elements.publishes).map(|(id, _)| {
+            let mut rows = mission.activity.graphs.rows(Element::Publish(id));
+            rows.any(|(_, row)| row.state == State::Latched)
+        });
         let phases = &mission.ledger.phases[..];
         Self {
             mission,
             roles,
             topics,
             published,
-            latched,
+            latched: latched.collect(),
             phases: if phases.len() > 1 { phases } else { &[] },
             is_named,
         }
@@ -136,10 +133,7 @@ impl<'a> FigureSource<'a> {
         if let Some(exact) = activity.sending.publishes.get(edge as usize) {
             return exact.clone();
         }
-        let is_active = activity.cells.iter().map(|cell| {
-            let found = cell.graph.publishes.binary_search_by_key(&edge, |e| e.id);
-            found.is_ok_and(|at| cell.graph.publishes[at].state == State::Active)
-        });
+        let is_active = activity.presence(Element::Publish(edge), |e| e.state == State::Active);
         self.runs(is_active)
     }
 
@@ -149,57 +143,51 @@ impl<'a> FigureSource<'a> {
         if let Some(exact) = activity.sending.topics.get(topic as usize) {
             return exact.clone();
         }
-        let counts = activity.cells.iter().map(|cell| {
-            let found = cell.graph.topics.binary_search_by_key(&topic, |t| t.id);
-            found.is_ok_and(|at| cell.graph.topics[at].count > 0)
-        });
-        self.runs(counts)
+        self.runs(activity.presence(Element::Topic(topic), |t| t.count > Some(0)))
     }
 
     /// The time until which a topic's last message is kept for late subscribers; `None` if it is not.
     pub(crate) fn topic_kept(&self, topic: TopicId) -> Option<Stamp> {
-        let cells = self.mission.activity.cells.iter();
-        let mut kept = cells.filter(|cell| {
-            let found = cell.graph.topics.binary_search_by_key(&topic, |t| t.id);
-            found.is_ok_and(|at| cell.graph.topics[at].state == State::Latched)
-        });
-        kept.next_back().map(|cell| cell.span.end)
+        let activity = &self.mission.activity;
+        let rows = activity.graphs.rows(Element::Topic(topic));
+        let kept = rows.filter(|(_, row)| row.state == State::Latched).last();
+        kept.map(|(at, _)| activity.cells()[at].end)
     }
 
     /// Messages of a publication per cell.
     pub(crate) fn sent(&self, edge: EdgeId) -> Vec<f64> {
-        let cells = self.mission.activity.cells.iter();
-        let count = cells.map(|cell| {
-            let found = cell.graph.publishes.binary_search_by_key(&edge, |e| e.id);
-            let state = found.ok().map(|at| &cell.graph.publishes[at]);
-            let seconds = cell.span.nanos() as f64 / 1e9;
-            state.map_or(0.0, |s| match (s.count, s.hz) {
+        let activity = &self.mission.activity;
+        let cells = activity.cells();
+        let mut sent = vec![0.0; cells.len()];
+        for (at, row) in activity.graphs.rows(Element::Publish(edge)) {
+            let seconds = cells[at].nanos() as f64 / 1e9;
+            sent[at] = match (row.count, row.hz(cells[at])) {
                 (Some(count), _) => count as f64,
                 (None, Some(hz)) => hz * seconds,
                 (None, None) => 0.0,
-            })
-        });
-        count.collect()
+            };
+        }
+        sent
     }
 
     /// Messages of a topic per cell.
     pub(crate) fn topic_sent(&self, topic: TopicId) -> Vec<f64> {
-        let cells = self.mission.activity.cells.iter();
-        let count = cells.map(|cell| {
-            let found = cell.graph.topics.binary_search_by_key(&topic, |t| t.id);
-            found.map_or(0.0, |at| cell.graph.topics[at].count as f64)
-        });
-        count.collect()
+        let activity = &self.mission.activity;
+        let mut sent = vec![0.0; activity.cells().len()];
+        for (at, row) in activity.graphs.rows(Element::Topic(topic)) {
+            sent[at] = row.count.unwrap_or(0) as f64;
+        }
+        sent
     }
 
     /// The stretches of consecutive cells for which `is` holds.
-    pub(crate) fn runs(&self, is: impl Iterator<Item = bool>) -> Vec<Span> {
+    pub(crate) fn runs(&self, is: impl IntoIterator<Item = bool>) -> Vec<Span> {
         let mut runs: Vec<Span> = Vec::new();
         let mut before = false;
-        for (cell, is) in self.mission.activity.cells.iter().zip(is) {
+        for (cell, is) in self.mission.activity.cells().iter().zip(is) {
             match runs.last_mut() {
-                Some(run) if is && before => run.end = cell.span.end,
-                _ if is => runs.push(cell.span),
+                Some(run) if is && before => run.end = cell.end,
+                _ if is => runs.push(*cell),
                 _ => {}
             }
             before = is;

@@ -7,7 +7,7 @@ use super::tracks::Track;
 use crate::base::name::last_part;
 use crate::base::words;
 use crate::evidence::Degree;
-use crate::graph::{EdgeState, TopicId};
+use crate::graph::{Element, TopicId};
 
 /// All topics from one box to another.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,42 +80,26 @@ impl<'a> Talks<'a> {
                 }
             }
         }
-        let cells = &source.mission.activity.cells;
-        let heard = |edges: &[crate::graph::Edge],
-                     states: &dyn Fn(usize) -> &'a [EdgeState],
-                     sent: bool| {
-            let mut all: Vec<Option<EdgePresence>> = (0..)
-                .zip(edges)
-                .map(|(id, edge)| {
-                    let shown = source.shows(edge.topic) && !source.is_hub(edge.topic);
-                    let track = track_of.get(edge.node as usize).copied().flatten();
-                    track.filter(|_| shown).map(|track| EdgePresence {
-                        track,
-                        topic: edge.topic,
-                        cells: vec![false; cells.len()],
-                        degree: Degree::Declared,
-                        hz: if sent { rate(source, id) } else { 0.0 },
-                    })
+        let activity = &source.mission.activity;
+        let heard = |edges: &[crate::graph::Edge], what: fn(u32) -> Element, sent: bool| {
+            let heard = (0..).zip(edges).filter_map(|(id, edge)| {
+                let shown = source.shows(edge.topic) && !source.is_hub(edge.topic);
+                let track = track_of.get(edge.node as usize).copied().flatten();
+                let degrees = || activity.graphs.rows(what(id)).map(|(_, row)| row.degree);
+                track.filter(|_| shown).map(|track| EdgePresence {
+                    track,
+                    topic: edge.topic,
+                    cells: activity.presence(what(id), |_| true),
+                    degree: degrees().min().unwrap_or(Degree::Declared),
+                    hz: if sent { rate(source, id) } else { 0.0 },
                 })
-                .collect();
-            for at in 0..cells.len() {
-                for state in states(at) {
-                    if let Some(Some(heard)) = all.get_mut(state.id as usize) {
-                        heard.cells[at] = true;
-                        heard.degree = heard.degree.min(state.degree);
-                    }
-                }
-            }
-            all.into_iter().flatten().collect::<Vec<EdgePresence>>()
+            });
+            heard.collect::<Vec<EdgePresence>>()
         };
         Self {
             source,
-            sends: heard(&elements.publishes, &|at| &cells[at].graph.publishes, true),
-            hears: heard(
-                &elements.subscribes,
-                &|at| &cells[at].graph.subscribes,
-                false,
-            ),
+            sends: heard(&elements.publishes, Element::Publish, true),
+            hears: heard(&elements.subscribes, Element::Subscribe, false),
         }
     }
 

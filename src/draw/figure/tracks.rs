@@ -6,7 +6,7 @@ use super::levels::levels;
 use super::source::{FigureSource, merged};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
-use crate::graph::{NodeId, TopicId};
+use crate::graph::{Element, NodeId, TopicId};
 
 /// The length from which on a silence interrupts a bar: in nanoseconds, and as one in so many parts of the mission.
 const SILENCE: (i64, i64) = (4_000_000_000, 83);
@@ -82,7 +82,7 @@ fn node(source: &FigureSource<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
     let edges = source.publications(nodes);
     let whole = source.span();
     let mut spans = Vec::new();
-    let mut sent = vec![0.0; source.mission.activity.cells.len()];
+    let mut sent = vec![0.0; source.mission.activity.cells().len()];
     let mut rates = Vec::new();
     for edge in edges {
         let sending = source.sending(edge);
@@ -159,23 +159,22 @@ fn capped(span: Span, whole: Span, is_inferred: bool) -> TrackLife {
 
 /// The lives of some nodes that are one role: runs of cells, their ends sharpened by exact signs.
 fn lives(source: &FigureSource<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<TrackLife> {
-    let cells = &source.mission.activity.cells;
-    let known: Vec<Option<Degree>> = cells
+    let activity = &source.mission.activity;
+    let cells = activity.cells();
+    let mut known: Vec<Option<Degree>> = vec![None; cells.len()];
+    for (at, row) in nodes
         .iter()
-        .map(|cell| {
-            let states = &cell.graph.nodes;
-            let place = |id: &NodeId| states.binary_search_by_key(id, |n| n.id).ok();
-            let own = nodes.iter().filter_map(place);
-            own.map(|at| states[at].degree).min()
-        })
-        .collect();
+        .flat_map(|id| activity.graphs.rows(Element::Node(*id)))
+    {
+        known[at] = known[at].into_iter().chain([row.degree]).min();
+    }
     let elements = &source.mission.elements;
     let of = |id: &NodeId| elements.nodes.get(*id as usize);
     let firsts = nodes.iter().filter_map(of).filter_map(|n| n.first);
     let lasts = nodes.iter().filter_map(of).filter_map(|n| n.last);
     let starts: Vec<Stamp> = firsts.chain(sends.iter().map(|s| s.start)).collect();
     let ends: Vec<Stamp> = lasts.chain(sends.iter().map(|s| s.end)).collect();
-    let step = source.mission.activity.step();
+    let step = activity.step();
     let whole = source.span();
     let runs = source.runs(known.iter().map(Option::is_some));
     let sharpened = runs.into_iter().map(|run| {
@@ -190,7 +189,7 @@ fn lives(source: &FigureSource<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<Tra
         let inside = cells
             .iter()
             .zip(&known)
-            .filter(|(c, _)| run.contains(c.span.start));
+            .filter(|(cell, _)| run.contains(cell.start));
         let (mut all, mut inferred) = (0, 0);
         for (_, degree) in inside {
             all += 1;
@@ -216,12 +215,12 @@ fn bars(source: &FigureSource<'_>, sends: &[Span], sent: &[f64]) -> Vec<SendingB
 
 /// One stretch of sending as pieces of one rate each; their `share` is that rate.
 pub(crate) fn steps(source: &FigureSource<'_>, stretch: Span, sent: &[f64]) -> Vec<SendingBar> {
-    let cells = &source.mission.activity.cells;
-    let from = cells.partition_point(|c| c.span.end <= stretch.start);
-    let to = cells.partition_point(|c| c.span.start < stretch.end);
+    let cells = source.mission.activity.cells();
+    let from = cells.partition_point(|cell| cell.end <= stretch.start);
+    let to = cells.partition_point(|cell| cell.start < stretch.end);
     let cells = &cells[from.min(to)..to];
     let sent = &sent[from.min(to)..to];
-    let seconds = |k: usize| overlap(cells[k].span, stretch).max(1) as f64 / 1e9;
+    let seconds = |k: usize| overlap(cells[k], stretch).max(1) as f64 / 1e9;
     let count: f64 = sent.iter().sum();
     let reach = libm::ceil(ENOUGH / (count / cells.len().max(1) as f64).max(1e-6));
     #[expect(
@@ -237,7 +236,7 @@ pub(crate) fn steps(source: &FigureSource<'_>, stretch: Span, sent: &[f64]) -> V
             (sent[around].iter().sum::<f64>() / time).max(1e-3)
         })
         .collect();
-    let all = source.mission.activity.cells.len();
+    let all = source.mission.activity.cells().len();
     let level = levels(&rates, all as f64 / STEP, (all / SHORTEST_STEP).max(1));
     let mut at = 0;
     let mut bars = Vec::new();
@@ -246,8 +245,8 @@ pub(crate) fn steps(source: &FigureSource<'_>, stretch: Span, sent: &[f64]) -> V
         let time: f64 = (at..end).map(seconds).sum();
         bars.push(SendingBar {
             span: Span {
-                start: cells[at].span.start.max(stretch.start),
-                end: cells[end - 1].span.end.min(stretch.end),
+                start: cells[at].start.max(stretch.start),
+                end: cells[end - 1].end.min(stretch.end),
             },
             share: sent[at..end].iter().sum::<f64>() / time,
         });

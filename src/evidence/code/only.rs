@@ -74,7 +74,7 @@ pub(super) fn conclude(
 ) -> (usize, Undrawn) {
     let candidates = candidates(code, bag);
     let places = places(code, bag.recorded, &candidates);
-    let launches = best_launches(&candidates);
+    let launches = best_launches(code, bag.named, &candidates);
     let mut by_edge: BTreeMap<(Role, Name), Vec<&Candidate<'_>>> = BTreeMap::new();
     for candidate in &candidates {
         by_edge
@@ -180,22 +180,55 @@ fn places<'a>(
     all
 }
 
-/// The launch files that explain most edges.
-fn best_launches<'a>(candidates: &[Candidate<'a>]) -> BTreeSet<&'a str> {
-    let mut explained: BTreeMap<&str, BTreeSet<(Role, Name)>> = BTreeMap::new();
-    for candidate in candidates {
-        if let Some((path, _)) = &candidate.found.instance.launched {
-            explained
-                .entry(path)
-                .or_default()
-                .insert((candidate.found.role, candidate.found.topic));
+/// What a launch file starts.
+#[derive(Default)]
+struct LaunchFit {
+    /// The nodes that the bag names.
+    named: BTreeSet<String>,
+    /// The number of its other nodes.
+    others: usize,
+    /// The recorded edges that the other nodes explain.
+    edges: BTreeSet<(Role, Name)>,
+}
+
+impl LaunchFit {
+    /// Whether this is rather not what ran, but `other`: it starts no more of the named nodes, and more that the bag
+    /// does not name. A simulation starts the robot's nodes too.
+    fn is_beaten_by(&self, other: &Self) -> bool {
+        let starts_the_same = !self.named.is_empty() && self.named.is_subset(&other.named);
+        starts_the_same && other.others < self.others
+    }
+}
+
+/// The launch files that explain most edges, without those that another one beats.
+fn best_launches<'a>(
+    code: &'a Code,
+    named: &BTreeSet<String>,
+    candidates: &[Candidate<'a>],
+) -> BTreeSet<&'a str> {
+    let mut fits: BTreeMap<&str, LaunchFit> = BTreeMap::new();
+    for instance in &code.instances {
+        if let Some((path, _)) = &instance.launched {
+            let fit = fits.entry(path).or_default();
+            let node = full_name(instance);
+            if named.contains(&node) {
+                fit.named.insert(node);
+            } else {
+                fit.others += 1;
+            }
         }
     }
-    let most = explained.values().map(BTreeSet::len).max().unwrap_or(0);
-    explained
-        .into_iter()
-        .filter(|(_, edges)| edges.len() == most)
-        .map(|(path, _)| path)
+    for Candidate { found, .. } in candidates {
+        let path = found.instance.launched.as_ref().map(|(path, _)| path);
+        if let Some(fit) = path.and_then(|path| fits.get_mut(path.as_str())) {
+            fit.edges.insert((found.role, found.topic));
+        }
+    }
+    let is_beaten = |fit: &LaunchFit| fits.values().any(|other| fit.is_beaten_by(other));
+    let open = fits.iter().filter(|(_, fit)| !is_beaten(fit));
+    let most = open.clone().map(|(_, fit)| fit.edges.len()).max();
+    open.filter(|(_, fit)| Some(fit.edges.len()) == most)
+        .map(|(path, _)| *path)
         .collect()
 }
 

@@ -2,11 +2,14 @@
 //! subscribes the topic that had them first.
 //!
 //! The length and the first bytes are compared, by a hash; a content that is repeated in its own topic (an empty
-//! message, a constant) shows nothing and is counted once.
+//! message, a constant) shows nothing and is counted once. The budget is that of
+//! [`crate::evidence::collector::PAYLOAD_BYTES`].
 
-use std::collections::hash_map::DefaultHasher;
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
-use std::hash::Hasher as _;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::hash::BuildHasher as _;
+
+use foldhash::quality::FixedState;
+use foldhash::{HashMap, HashSet};
 
 use super::SourceContext;
 use crate::base::time::Stamp;
@@ -35,10 +38,9 @@ pub(crate) fn hear(heard: &mut SourceContext<'_>, beginning: &[u8], size: u32) {
     if beginning.is_empty() {
         return;
     }
-    let mut hasher = DefaultHasher::new();
-    hasher.write_u32(size);
-    hasher.write(beginning);
-    let [a, b, c, d, ..] = hasher.finish().to_le_bytes();
+    // A fixed seed, so that two contents that share a hash by chance share it in every run.
+    let hash = FixedState::default().hash_one((size, beginning));
+    let [a, b, c, d, ..] = hash.to_le_bytes();
     if let Some(time) = heard.time {
         let hash = u32::from_le_bytes([a, b, c, d]);
         heard.facts.payload(heard.place, time, hash);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io;
 
-use super::history::{ElementHistory, History};
+use super::history::History;
 use super::rates::{Sums, rates};
 use super::senders::sender;
 use super::windows::SortedWindows;
@@ -124,11 +124,12 @@ impl GraphAssembly<'_> {
 
     fn topic(&mut self, id: u32, sums: Option<&[Sums]>) {
         let course = &self.history.topics[id as usize];
+        let runs = &self.history.elements.topics[id as usize].runs;
         let mut list = sums.unwrap_or_default().iter().peekable();
         let mut states = ColumnWriter::default();
         for (at, window) in self.windows.0.iter().enumerate() {
             let sum = list.next_if(|sum| sum.window == at);
-            if !self.sees(course, *window) {
+            if !self.sees(runs, *window) {
                 continue;
             }
             let count = sum.map_or(0, |sum| sum.count);
@@ -151,9 +152,10 @@ impl GraphAssembly<'_> {
     fn nodes(&mut self) {
         for (name, id) in &self.history.node_ids {
             let course = &self.history.nodes[*id as usize];
+            let runs = &self.history.elements.nodes[*id as usize].runs;
             let sent = self.sent.get(name);
             for (at, window) in self.windows.0.iter().enumerate() {
-                if !self.sees(course, *window) {
+                if !self.sees(runs, *window) {
                     continue;
                 }
                 let state = NodeState {
@@ -184,7 +186,7 @@ impl GraphAssembly<'_> {
                     let row = counts.next();
                     row.and_then(|row| row.count).unwrap_or(0)
                 });
-                if self.sees(course, *window) {
+                if self.sees(&edge.runs, *window) {
                     let state = course.state(*window, count.is_some_and(|n| n > 0));
                     let state = edge_state(id, course.degree, state, *window, count);
                     self.graphs.publish(at, &state);
@@ -200,7 +202,7 @@ impl GraphAssembly<'_> {
             let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
                 let topic = topic.as_mut().and_then(ColumnCursor::next);
-                if !self.sees(course, *window) {
+                if !self.sees(&edge.runs, *window) {
                     continue;
                 }
                 let state = match topic {
@@ -214,16 +216,18 @@ impl GraphAssembly<'_> {
         }
     }
 
-    /// Whether an element exists in a window.
-    fn sees(&self, course: &ElementHistory, window: Span) -> bool {
-        let last = course.lives.len().saturating_sub(1);
-        course.lives.iter().enumerate().any(|(at, life)| {
-            let to = if at == last && self.grace > 0 {
-                self.windows.last_moment(life.to, self.grace)
+    /// Whether an element with these runs exists in a window.
+    fn sees(&self, runs: &[Span], window: Span) -> bool {
+        let last = runs.len().saturating_sub(1);
+        runs.iter().enumerate().any(|(at, run)| {
+            let end = if at == last && self.grace > 0 {
+                self.windows
+                    .last_moment(run.end.plus(-1), self.grace)
+                    .plus(1)
             } else {
-                life.to
+                run.end
             };
-            life.from < window.end && window.start <= to
+            run.start < window.end && window.start < end
         })
     }
 }

@@ -49,7 +49,6 @@ pub(crate) struct History {
 /// The history of one element over the mission, without its messages.
 #[derive(Clone, Debug)]
 pub(crate) struct ElementHistory {
-    pub(crate) lives: Vec<Lifetime>,
     pub(crate) degree: Degree,
     /// The state that it always has while it lives: declared or latched.
     fixed: Option<State>,
@@ -67,7 +66,6 @@ impl ElementHistory {
             () => None,
         };
         Self {
-            lives: track.lives.clone(),
             degree: track.degree,
             fixed,
             needs_messages: track.senders.0 == 0,
@@ -108,40 +106,68 @@ fn told(recorded: &Recorded, findings: &Findings) -> io::Result<History> {
     fall_silent(&mut tracks, &traffic, findings);
     let (proofs, restarts) = (&findings.proofs, &findings.restarts);
     settle(&mut tracks, proofs, restarts, findings.mission);
-    Ok(assembled(&tracks, &traffic, findings))
+    Ok(assembled(tracks, &traffic, findings))
 }
 
 /// Lists every element. Tracks come in the order of the elements' names.
-fn assembled(tracks: &Tracks, traffic: &Traffic, findings: &Findings) -> History {
+fn assembled(tracks: Tracks, traffic: &Traffic, findings: &Findings) -> History {
     let streams = traffic
         .iter()
         .map(|(topic, of)| (*topic, of.streams.clone()));
     let mut all = Assembly {
         history: History {
             streams: streams.collect(),
-            ..History::default()
+            ..roomy(&tracks)
         },
         findings,
         traffic,
         publishers: BTreeMap::new(),
         sent: sent(traffic),
     };
-    for (what, track) in tracks {
+    for (what, track) in &tracks {
         if let (ElementKey::Publish(_, topic), false) = (what, track.evidence.is_guess()) {
             *all.publishers.entry(*topic).or_default() += 1;
         }
     }
     for (what, track) in tracks {
-        match *what {
-            ElementKey::Node(node) => all.node(node, track),
-            ElementKey::Topic(topic) => all.topic(topic, track),
-            ElementKey::Publish(node, topic) => all.publish(node, topic, track),
-            ElementKey::Subscribe(topic, node) => all.subscribe(topic, node, track),
+        match what {
+            ElementKey::Node(node) => all.node(node, &track),
+            ElementKey::Topic(topic) => all.topic(topic, &track),
+            ElementKey::Publish(node, topic) => all.publish(node, topic, &track),
+            ElementKey::Subscribe(topic, node) => all.subscribe(topic, node, &track),
         }
     }
     all.voices();
     all.transitions();
     all.history
+}
+
+/// A history with room for exactly these elements, of which there may be very many.
+fn roomy(tracks: &Tracks) -> History {
+    let mut many = [0; 4];
+    for what in tracks.keys() {
+        many[match what {
+            ElementKey::Node(_) => 0,
+            ElementKey::Topic(_) => 1,
+            ElementKey::Publish(..) => 2,
+            ElementKey::Subscribe(..) => 3,
+        }] += 1;
+    }
+    let mut all = History::default();
+    let [nodes, topics, publishes, subscribes] = many;
+    all.elements.nodes.reserve_exact(nodes);
+    all.elements.topics.reserve_exact(topics);
+    all.elements.publishes.reserve_exact(publishes);
+    all.elements.subscribes.reserve_exact(subscribes);
+    all.lives.nodes.reserve_exact(nodes);
+    all.lives.topics.reserve_exact(topics);
+    all.lives.publishes.reserve_exact(publishes);
+    all.lives.subscribes.reserve_exact(subscribes);
+    all.nodes.reserve_exact(nodes);
+    all.topics.reserve_exact(topics);
+    all.publishes.reserve_exact(publishes);
+    all.subscribes.reserve_exact(subscribes);
+    all
 }
 
 /// The messages that each node sends, without latched ones.

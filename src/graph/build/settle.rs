@@ -9,6 +9,9 @@ use crate::evidence::claim::Name;
 use crate::evidence::proof::{ElementKey, Proof, Validity};
 use crate::evidence::restarts::Restarts;
 
+/// No edge has a smaller key: nodes and topics come before.
+const FIRST_EDGE: ElementKey = ElementKey::Publish(Name(0), Name(0));
+
 /// Computes all lives; `mission` is its first and its last moment.
 pub(crate) fn settle(
     tracks: &mut BTreeMap<ElementKey, Liveness>,
@@ -23,20 +26,21 @@ pub(crate) fn settle(
         .filter(|proof| matches!(proof.when, Validity::Like(ElementKey::Node(_))))
         .map(|proof| proof.what)
         .collect();
-    for (what, track) in edges(tracks) {
-        let (node, topic) = ends(what);
+    let mut edges = tracks.split_off(&FIRST_EDGE);
+    for (what, track) in &edges {
+        let (node, topic) = ends(*what);
         let last = closed.entry(node).or_insert(Some(Stamp::MIN));
         *last = last.and_then(|last| track.closed(last));
         let learner = tracks.entry(ElementKey::Node(node)).or_default();
-        if followers.contains(&what) && track.signs.is_empty() && track.degree > Degree::Stated {
+        if followers.contains(what) && track.signs.is_empty() && track.degree > Degree::Stated {
             learner.evidence = learner.evidence.and(track.evidence);
         } else {
-            learner.learn(&track);
+            learner.learn(track);
         }
         tracks
             .entry(ElementKey::Topic(topic))
             .or_default()
-            .know(&track);
+            .know(track);
     }
     // Whose last connection was closed, and who was not heard of again, is gone.
     for (node, end) in closed {
@@ -56,15 +60,15 @@ pub(crate) fn settle(
         }
     }
     let mut of_topics: BTreeMap<Name, Vec<Lifetime>> = BTreeMap::new();
-    for (what, mut track) in edges(tracks) {
-        let (node, topic) = ends(what);
+    for (what, track) in &mut edges {
+        let (node, topic) = ends(*what);
         let around = tracks
             .get(&ElementKey::Node(node))
             .map_or(&[][..], |t| &t.lives);
         track.live_within(around);
         of_topics.entry(topic).or_default().extend(&track.lives);
-        tracks.insert(what, track);
     }
+    tracks.append(&mut edges);
     for (what, lives) in live_like(tracks, proofs, false) {
         if !matches!(what, ElementKey::Node(_)) {
             of_topics.entry(ends(what).1).or_default().extend(lives);
@@ -99,14 +103,6 @@ fn live_like(
         }
     }
     done
-}
-
-/// All publications and subscriptions with their tracks.
-fn edges(tracks: &BTreeMap<ElementKey, Liveness>) -> Vec<(ElementKey, Liveness)> {
-    let is_edge =
-        |what: &ElementKey| matches!(what, ElementKey::Publish(..) | ElementKey::Subscribe(..));
-    let edges = tracks.iter().filter(|(what, _)| is_edge(what));
-    edges.map(|(what, track)| (*what, track.clone())).collect()
 }
 
 /// The node and the topic of an edge.

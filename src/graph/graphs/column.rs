@@ -8,7 +8,7 @@ use crate::graph::State;
 /// The rows of one element over all windows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Column {
-    bytes: Vec<u8>,
+    bytes: Box<[u8]>,
 }
 
 // The kind of the next byte; any other is a row, with bits for the parts that differ.
@@ -42,7 +42,7 @@ impl Default for Memory {
 /// A writer of the rows of an element in order of their windows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ColumnWriter {
-    column: Column,
+    bytes: Vec<u8>,
     memory: Memory,
     /// The next window.
     next: usize,
@@ -64,8 +64,8 @@ impl ColumnWriter {
         }
         self.end_run();
         if away > 0 {
-            self.column.bytes.push(AWAY);
-            put(&mut self.column.bytes, away as u64);
+            self.bytes.push(AWAY);
+            put(&mut self.bytes, away as u64);
         }
         self.row(&row);
         self.is_there = true;
@@ -73,8 +73,8 @@ impl ColumnWriter {
 
     fn end_run(&mut self) {
         if self.same > 0 {
-            self.column.bytes.push(SAME);
-            put(&mut self.column.bytes, self.same);
+            self.bytes.push(SAME);
+            put(&mut self.bytes, self.same);
             self.same = 0;
         }
     }
@@ -92,7 +92,7 @@ impl ColumnWriter {
         ];
         let tag = parts.iter().filter(|(_, differs)| *differs);
         let tag = tag.fold(0, |tag, (bit, _)| tag | bit);
-        let bytes = &mut self.column.bytes;
+        let bytes = &mut self.bytes;
         bytes.push(tag);
         if tag & LOOK != 0 {
             bytes.push(row.state as u8 | (row.degree as u8) << 4);
@@ -123,8 +123,9 @@ impl ColumnWriter {
     /// Ends the writing.
     pub(crate) fn finish(mut self) -> Column {
         self.end_run();
-        self.column.bytes.shrink_to_fit();
-        self.column
+        Column {
+            bytes: self.bytes.into(),
+        }
     }
 }
 
@@ -133,6 +134,18 @@ impl Column {
     #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.bytes.len()
+    }
+
+    /// The column of this many windows with every row changed.
+    pub(super) fn map(&self, windows: usize, change: impl Fn(Row) -> Row) -> Self {
+        let mut cursor = self.cursor();
+        let mut changed = ColumnWriter::default();
+        for at in 0..windows {
+            if let Some(row) = cursor.next() {
+                changed.push(at, change(row));
+            }
+        }
+        changed.finish()
     }
 
     /// A cursor at the first window.

@@ -129,6 +129,14 @@ proptest! {
             });
             prop_assert_eq!(topics.collect::<Vec<_>>(), put.topics.clone());
         }
+        for (got, (_, put)) in all.clone().plain().iter().zip(&graphs) {
+            let mut put = put.clone();
+            for topic in &mut put.topics {
+                (topic.bytes, topic.median_period_s, topic.max_gap_s) = (None, None, None);
+            }
+            put.nodes.iter_mut().for_each(|node| node.lifecycle = None);
+            prop_assert_eq!(got, put);
+        }
         let of_topic: Vec<_> = all.rows(Element::Topic(1)).map(|(at, row)| row.topic(1, graphs[at].0)).collect();
         let put = graphs.iter().flat_map(|(_, g)| g.topics.iter().filter(|t| t.id == 1));
         prop_assert_eq!(of_topic, put.cloned().collect::<Vec<_>>());
@@ -157,4 +165,25 @@ fn what_stays_the_same_takes_no_room() {
     };
     let all: Graphs = (0..100_000).map(|n| (second(n), graph.clone())).collect();
     assert!(all.topics[0].len() < 32, "{:?}", all.topics);
+}
+
+#[test]
+fn very_many_elements_take_only_their_own_room() {
+    let node = |id| NodeState {
+        id,
+        state: State::Active,
+        degree: Degree::Stated,
+        hz: None,
+        lifecycle: None,
+    };
+    let graph = Graph {
+        nodes: (0..1000).map(node).collect(),
+        ..Graph::default()
+    };
+    let span = Span {
+        start: Stamp(0),
+        end: Stamp(1),
+    };
+    let all: Graphs = [(span, graph)].into_iter().collect();
+    assert_eq!(all.nodes.capacity(), 1000);
 }

@@ -20,34 +20,24 @@ use super::runs::{self, In, RawElements, WithColumns};
 use super::write::List;
 use crate::base::time::{Span, Stamp};
 use crate::graph::sending::Sending;
-use crate::graph::{Edge, Element, Elements, Graphs, GraphsWriter};
-use crate::mission::activity::{Activity, Cell, MOST_CELLS};
+use crate::graph::{Edge, Element, Elements};
+use crate::mission::activity::{Activity, MOST_CELLS};
 
 /// The activity in the form for writing.
 pub(super) struct ActivityOf<'a> {
     activity: &'a Activity,
     elements: &'a Elements,
-    graphs: Graphs,
 }
 
 impl<'a> ActivityOf<'a> {
     pub(super) fn new(activity: &'a Activity, elements: &'a Elements) -> Self {
-        let cells = &activity.cells;
-        let mut graphs = GraphsWriter::new(cells.iter().map(|cell| cell.span).collect());
-        for (at, cell) in cells.iter().enumerate() {
-            graphs.graph(at, &cell.graph);
-        }
-        Self {
-            activity,
-            elements,
-            graphs: graphs.finish(),
-        }
+        Self { activity, elements }
     }
 
     fn seen<E>(&self, what: Element, element: E) -> WithColumns<'_, E> {
         let seen = In {
             what,
-            graphs: &self.graphs,
+            graphs: &self.activity.graphs,
         };
         WithColumns { element, seen }
     }
@@ -84,14 +74,11 @@ impl<'a> EdgeSending<'a> {
 
 impl Serialize for ActivityOf<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Self {
-            activity: Activity { cells, sending },
-            elements,
-            ..
-        } = self;
+        let Self { activity, elements } = self;
+        let (cells, sending) = (activity.cells(), &activity.sending);
         let mut map = serializer.serialize_map(None)?;
-        let starts = cells.iter().map(|cell| cell.span.start.0);
-        let end = cells.last().map(|cell| cell.span.end.0);
+        let starts = cells.iter().map(|cell| cell.start.0);
+        let end = cells.last().map(|cell| cell.end.0);
         map.serialize_entry("bounds_ns", &List(starts.chain(end)))?;
         let nodes = (0..).zip(&elements.nodes).map(|(id, node)| {
             let named = ElementSending {
@@ -139,10 +126,8 @@ impl Serialize for ActivityOf<'_> {
 /// The mistake in the cells, or in the intervals of sending.
 pub(super) fn read(bounds: &[i64], raw: &RawElements, ids: &Ids) -> Result<Activity, String> {
     let spans = cells(bounds)?;
-    let graphs = runs::graphs(raw, ids, &spans);
-    let cell = |(span, graph)| Cell { span, graph };
     Ok(Activity {
-        cells: spans.into_iter().zip(&graphs).map(cell).collect(),
+        graphs: runs::graphs(raw, ids, &spans),
         sending: sending(raw, ids)?,
     })
 }

@@ -299,7 +299,7 @@ mod tests {
         let good =
             r#"{"bounds_ns": [0, 5, 15], "topics": [{"name": "/t", "sending": [[1, 3], [4, 9]]}]}"#;
         let activity = said(good).unwrap().activity;
-        assert_eq!(activity.cells.len(), 2);
+        assert_eq!(activity.cells().len(), 2);
         assert_eq!(activity.sending.topics[0].len(), 2);
         assert!(
             said(&good.replace("5, 15", "5, 5"))

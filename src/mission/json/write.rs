@@ -118,7 +118,7 @@ impl Serialize for Json<'_> {
             });
             map.serialize_entry("windows", &List(windows))?;
         }
-        if !mission.activity.cells.is_empty() {
+        if !mission.activity.graphs.is_empty() {
             map.serialize_entry("activity", &ActivityOf::new(&mission.activity, elements))?;
         }
         if let Some(places) = places {

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::base::name::is_quiet;
-use crate::base::time::Stamp;
-use crate::graph::{Edge, Elements, Node, State, Topic};
+use crate::base::time::{Span, Stamp};
+use crate::graph::{Edge, Element, Elements, Node, Row, State, Topic};
 use crate::mission::activity::{Activity, is_hidden_node};
 
 /// The longest absence, as a part of the mission (one in so many), that does not count inside an element's life: a slow
@@ -62,22 +62,22 @@ pub(crate) fn presences(elements: &Elements, activity: &Activity) -> Vec<Presenc
     let subjects = Subjects::new(elements, knows_publishers(elements, activity));
     let all = subjects.sorted();
     let [nodes, publishes, topics] = subjects.places(&all);
-    let mut cells = vec![vec![false; activity.cells.len()]; all.len()];
-    for (at, cell) in activity.cells.iter().enumerate() {
-        let mut see = |places: &[Option<usize>], id: u32| {
-            if let Some(Some(place)) = places.get(id as usize) {
-                cells[*place][at] = true;
-            }
-        };
-        let graph = &cell.graph;
-        graph.nodes.iter().for_each(|node| see(&nodes, node.id));
-        let carries = |state| matches!(state, State::Active | State::Latched);
-        let sends = graph.publishes.iter().filter(|edge| carries(edge.state));
-        sends.for_each(|edge| see(&publishes, edge.id));
-        let active = graph.topics.iter().filter(|topic| topic.count > 0);
-        active.for_each(|topic| see(&topics, topic.id));
-    }
-    let widths: Vec<i64> = activity.cells.iter().map(|c| c.span.nanos()).collect();
+    let mut cells = vec![vec![false; activity.cells().len()]; all.len()];
+    let mut see = |places: &[Option<usize>], what: fn(u32) -> Element, is: fn(&Row) -> bool| {
+        for (id, place) in (0..).zip(places) {
+            let Some(place) = *place else {
+                continue;
+            };
+            let rows = activity.graphs.rows(what(id));
+            rows.filter(|(_, row)| is(row))
+                .for_each(|(at, _)| cells[place][at] = true);
+        }
+    };
+    let carries = |row: &Row| matches!(row.state, State::Active | State::Latched);
+    see(&nodes, Element::Node, |_| true);
+    see(&publishes, Element::Publish, carries);
+    see(&topics, Element::Topic, |row| row.count > Some(0));
+    let widths: Vec<i64> = activity.cells().iter().map(Span::nanos).collect();
     let most = activity.span().nanos() / FILLED;
     let seen = all
         .into_iter()
@@ -135,30 +135,29 @@ impl Subjects {
 
 /// Whether at least half of the messages are on topics of which some publisher is known.
 pub(crate) fn knows_publishers(elements: &Elements, activity: &Activity) -> bool {
-    let guess = |edge: &Edge| edge.evidence.is_guess();
-    let guesses: Vec<bool> = elements.publishes.iter().map(guess).collect();
-    let quiet = |topic: &Topic| is_quiet(topic.name.as_str());
-    let quiets: Vec<bool> = elements.topics.iter().map(quiet).collect();
-    let (mut all, mut known) = (0_u64, 0_u64);
-    let mut sent = vec![false; elements.topics.len()];
-    for cell in &activity.cells {
-        sent.fill(false);
-        for state in &cell.graph.publishes {
-            let edge = elements.publishes.get(state.id as usize);
-            let is_known = guesses.get(state.id as usize) == Some(&false);
-            let topic = edge.filter(|_| is_known).map(|edge| edge.topic);
-            if let Some(is) = topic.and_then(|t| sent.get_mut(t as usize)) {
-                *is = true;
-            }
+    let graphs = &activity.graphs;
+    // Per topic the cells in which some publisher is known; of most topics of a large mission none.
+    let mut heard = vec![Vec::new(); elements.topics.len()];
+    for (id, edge) in (0..).zip(&elements.publishes) {
+        let Some(heard) = heard.get_mut(edge.topic as usize) else {
+            continue;
+        };
+        if !edge.evidence.is_guess() {
+            heard.resize(graphs.len(), false);
+            let rows = graphs.rows(Element::Publish(id));
+            rows.for_each(|(at, _)| heard[at] = true);
         }
-        for topic in &cell.graph.topics {
-            let id = topic.id as usize;
-            if quiets.get(id) != Some(&false) {
-                continue;
-            }
-            all = all.saturating_add(topic.count);
-            if sent.get(id) == Some(&true) {
-                known = known.saturating_add(topic.count);
+    }
+    let (mut all, mut known) = (0_u64, 0_u64);
+    for ((id, topic), heard) in (0..).zip(&elements.topics).zip(&heard) {
+        if is_quiet(topic.name.as_str()) {
+            continue;
+        }
+        for (at, row) in graphs.rows(Element::Topic(id)) {
+            let count = row.count.unwrap_or(0);
+            all = all.saturating_add(count);
+            if heard.get(at) == Some(&true) {
+                known = known.saturating_add(count);
             }
         }
     }
