@@ -306,9 +306,13 @@ fn changed(path: &Path) -> Option<u128> {
         let at = fs::metadata(path).ok()?.modified().ok()?;
         Some(at.duration_since(UNIX_EPOCH).ok()?.as_nanos())
     };
+    let own = of(path);
+    if !path.is_dir() {
+        return own;
+    }
     let inside = fs::read_dir(path).into_iter().flatten().flatten();
     let newest = inside.filter_map(|file| of(&file.path())).max();
-    of(path).max(newest)
+    own.max(newest)
 }
 
 /// The number of hexadecimal digits of a digest, 64 bits: among a million bags the chance that two share a name is one
