@@ -62,8 +62,13 @@ impl<W: Write + Send> Rows<W> {
         } else {
             properties.set_compression(Compression::ZSTD(ZstdLevel::default()))
         };
+        // A dictionary of one value is longer than the value.
+        let properties = properties.set_dictionary_enabled(batch.rows != 1);
         let properties = batch.columns.iter().fold(properties, encoded).build();
-        let options = ArrowWriterOptions::new().with_properties(properties);
+        // Parquet's own types tell all that our columns are.
+        let options = ArrowWriterOptions::new()
+            .with_properties(properties)
+            .with_skip_arrow_metadata(true);
         let writer = ArrowWriter::try_new_with_options(to, schema, options);
         Ok(Self {
             writer: writer.map_err(io::Error::other)?,
