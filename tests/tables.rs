@@ -292,7 +292,7 @@ mod parquet {
     use ::parquet::arrow::arrow_reader::ParquetRecordBatchReader;
     use arrow_array::cast::AsArray as _;
     use arrow_array::types::{Int64Type, TimestampNanosecondType};
-    use arrow_array::{RecordBatch, RecordBatchReader as _};
+    use arrow_array::{Array as _, RecordBatch, RecordBatchReader as _};
     use arrow_schema::DataType;
 
     use super::*;
@@ -307,7 +307,7 @@ mod parquet {
     fn parquet_holds_what_csv_holds() {
         let dir = tempfile::tempdir().unwrap();
         for name in ["m.csv", "m.parquet", "again.parquet"] {
-            ends(dir.path(), &["extract", WAREHOUSE, "-o", name], 0);
+            ends(dir.path(), &["extract", WAREHOUSE, COURIER, "-o", name], 0);
         }
         let bytes = |name: &str| fs::read(dir.path().join(name)).unwrap();
         assert!(
@@ -321,11 +321,16 @@ mod parquet {
         let times = column("time_ns").as_primitive::<TimestampNanosecondType>();
         assert_eq!(times.timezone(), Some("UTC"));
         let sizes = column("size_bytes").as_primitive::<Int64Type>();
-        let topics = column("topic").as_string::<i32>();
+        let texts = ["topic", "type", "publisher"].map(|name| column(name).as_string::<i32>());
+        // Only the bag of ROS 1 says who publishes.
+        assert!(texts[2].null_count() > 0 && texts[2].null_count() < rows.len() - 1);
         assert_eq!(times.len(), rows.len() - 1);
         for (at, row) in rows[1..].iter().enumerate() {
             assert_eq!(row[0], times.value(at).to_string());
-            assert_eq!(row[1], topics.value(at));
+            for (text, texts) in row[1..4].iter().zip(texts) {
+                assert_eq!(text, texts.value(at));
+                assert_eq!(text.is_empty(), texts.is_null(at));
+            }
             assert_eq!(row[4], sizes.value(at).to_string());
         }
     }

@@ -214,8 +214,8 @@ impl<G: Grammar> Indexed<G> {
         in_order(groups.len(), threads, &work, sink, |at, sink| {
             sink.progress(at as u64 + 1, total);
         });
-        let samples = [chunks.first(), chunks.get(chunks.len() / 2), chunks.last()];
-        let samples = samples.into_iter().flatten();
+        let samples = BTreeSet::from([0, chunks.len() / 2, chunks.len().saturating_sub(1)]);
+        let samples = samples.into_iter().filter_map(|at| chunks.get(at));
         let compression = samples
             .filter_map(|c| Some(query.body(c).ok()??.how))
             .collect();

@@ -79,10 +79,10 @@ pub fn size_on_disk(input: &Input) -> Option<u64> {
         let told = std::fs::metadata(path).ok();
         told.filter(std::fs::Metadata::is_file).map(|m| m.len())
     };
-    match std::fs::read_dir(path) {
-        Ok(files) => Some(files.flatten().filter_map(|file| size(&file.path())).sum()),
-        Err(_) => size(path),
-    }
+    size(path).or_else(|| {
+        let files = std::fs::read_dir(path).ok()?.flatten();
+        Some(files.filter_map(|file| size(&file.path())).sum())
+    })
 }
 
 /// A row of `FORMATS`.

@@ -164,8 +164,10 @@ pub(crate) struct ByteStream<'a> {
     from: From<'a>,
     /// The position of `buffer[used]`.
     at: u64,
+    /// Of which `used..filled` has been read ahead. It keeps its length, so that it is not cleared at every step.
     buffer: Vec<u8>,
     used: usize,
+    filled: usize,
     /// The number of bytes read at a time.
     step: usize,
 }
@@ -193,6 +195,7 @@ impl<'a> ByteStream<'a> {
             at,
             buffer: Vec::new(),
             used: 0,
+            filled: 0,
             step,
         }
     }
@@ -207,10 +210,10 @@ impl<'a> ByteStream<'a> {
     /// # Errors
     /// An error of the system, or of a decompressor.
     pub(crate) fn peek(&mut self, n: usize) -> io::Result<&[u8]> {
-        if self.buffer.len() - self.used < n {
+        if self.ahead() < n {
             self.fill(n)?;
         }
-        let end = self.buffer.len().min(self.used + n);
+        let end = self.filled.min(self.used + n);
         Ok(&self.buffer[self.used..end])
     }
 
@@ -224,30 +227,34 @@ impl<'a> ByteStream<'a> {
 
     /// The number of bytes that have been read ahead and not taken.
     fn ahead(&self) -> usize {
-        self.buffer.len() - self.used
+        self.filled - self.used
     }
 
     /// Reads on until `n` bytes are ahead or the stream ends.
     fn fill(&mut self, n: usize) -> io::Result<()> {
-        self.buffer.drain(..self.used);
+        self.buffer.copy_within(self.used..self.filled, 0);
+        self.filled = self.ahead();
         self.used = 0;
-        while self.buffer.len() < n {
-            let old = self.buffer.len();
-            let next = self.at + old as u64;
-            let mut size = self.step.max(n) - old;
+        while self.filled < n {
+            let next = self.at + self.filled as u64;
+            let mut size = self.step.max(n) - self.filled;
             if let From::File { end, .. } = self.from {
                 let left = end.saturating_sub(next);
                 size = size.min(usize::try_from(left).unwrap_or(usize::MAX));
             }
-            self.buffer.resize(old + size, 0);
+            let end = self.filled + size;
+            if self.buffer.len() < end {
+                self.buffer.resize(end, 0);
+            }
+            let into = &mut self.buffer[self.filled..end];
             let got = match &mut self.from {
-                From::File { source, .. } => source.read_at(next, &mut self.buffer[old..]),
-                From::Reader(reader) => read_some(reader, &mut self.buffer[old..]),
+                From::File { source, .. } => source.read_at(next, into)?,
+                From::Reader(reader) => read_some(reader, into)?,
             };
-            self.buffer.truncate(old + *got.as_ref().unwrap_or(&0));
-            if got? == 0 {
+            if got == 0 {
                 break;
             }
+            self.filled += got;
         }
         Ok(())
     }

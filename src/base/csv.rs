@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use csv::{ReaderBuilder, Terminator, WriterBuilder};
 
-use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
+use super::table::{Batch, ColumnKind, ColumnValues, TableColumn, span};
 use super::words::visible;
 
 /// A table being written: the names of its columns, then a row a line. A list is written as JSON, with `NaN` and
@@ -85,7 +85,8 @@ fn value(column: &TableColumn, at: usize, in_list: bool, to: &mut Vec<u8>) -> io
         ColumnValues::F64(v) => odd(v[at], in_list, to),
         ColumnValues::Texts(v) if column.kind == ColumnKind::Bytes => bytes(v.get(at), to),
         // Columns in which nothing is unknown are a message's fields.
-        ColumnValues::Texts(v) => text(v, at, in_list, column.valid.is_none(), to),
+        ColumnValues::Texts(v) => text(v.get(at), in_list, column.valid.is_none(), to),
+        ColumnValues::Words(v) => text(v.get(at), in_list, column.valid.is_none(), to),
     }
 }
 
@@ -118,20 +119,14 @@ fn bytes(bytes: &[u8], to: &mut Vec<u8>) -> io::Result<()> {
     write!(to, "{}", if bytes.is_empty() { "[]" } else { "]" })
 }
 
-fn text(
-    texts: &TextColumn,
-    at: usize,
-    in_list: bool,
-    is_data: bool,
-    to: &mut Vec<u8>,
-) -> io::Result<()> {
+fn text(text: &[u8], in_list: bool, is_data: bool, to: &mut Vec<u8>) -> io::Result<()> {
     if !in_list {
-        let text = String::from_utf8_lossy(texts.get(at));
+        let text = String::from_utf8_lossy(text);
         to.extend_from_slice(cell(&text, is_data).as_bytes());
         return Ok(());
     }
     to.push(b'"');
-    for byte in texts.get(at) {
+    for byte in text {
         match byte {
             b'"' | b'\\' => to.extend([b'\\', *byte]),
             0..0x20 => write!(to, "\\u{byte:04x}")?,

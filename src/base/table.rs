@@ -54,6 +54,20 @@ impl TextColumn {
     }
 }
 
+/// Texts of which many are equal: each by its number among the different ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct WordColumn {
+    pub(crate) words: TextColumn,
+    pub(crate) numbers: Vec<u32>,
+}
+
+impl WordColumn {
+    /// The text at place `at`.
+    pub(crate) fn get(&self, at: usize) -> &[u8] {
+        self.words.get(self.numbers[at] as usize)
+    }
+}
+
 /// The values of a column, the elements of its lists if it holds lists.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ColumnValues {
@@ -70,6 +84,7 @@ pub(crate) enum ColumnValues {
     F32(Vec<f32>),
     F64(Vec<f64>),
     Texts(TextColumn),
+    Words(WordColumn),
 }
 
 impl ColumnValues {
@@ -104,6 +119,7 @@ impl ColumnValues {
             Self::U64(v) => v.truncate(len),
             Self::F64(v) => v.truncate(len),
             Self::Texts(v) => v.truncate(len),
+            Self::Words(v) => v.numbers.truncate(len),
         }
     }
 
@@ -122,6 +138,7 @@ impl ColumnValues {
             Self::U64(v) => v.push(0),
             Self::F64(v) => v.push(0.0),
             Self::Texts(v) => v.push(b""),
+            Self::Words(v) => v.numbers.push(0),
         }
     }
 }
@@ -163,6 +180,19 @@ impl TableColumn {
         }
     }
 
+    /// A column of texts that are all among `words`; some rows may have none.
+    pub(crate) fn words<'a>(
+        name: impl Into<Cow<'static, str>>,
+        words: impl Iterator<Item = &'a str>,
+    ) -> Self {
+        let mut column = WordColumn::default();
+        words.for_each(|word| column.words.push(word.as_bytes()));
+        Self {
+            values: ColumnValues::Words(column),
+            ..Self::known(name, ColumnKind::Text)
+        }
+    }
+
     /// Ends a list of `count` elements on this level.
     pub(crate) fn end_list(&mut self, level: usize, count: usize) {
         let ends = &mut self.lists[level];
@@ -201,6 +231,10 @@ impl TableColumn {
                 to.push(value.as_bytes());
                 true
             }
+            (ColumnValues::Words(to), TableCell::Word(number)) => {
+                to.numbers.push(*number);
+                true
+            }
             (other, _) => {
                 other.push_blank();
                 false
@@ -222,6 +256,8 @@ pub(crate) enum TableCell<'a> {
     Float(f64),
     Text(Cow<'a, str>),
     Time(Stamp),
+    /// A text, by its number in a column of words.
+    Word(u32),
 }
 
 impl<'a> TableCell<'a> {

@@ -54,7 +54,10 @@ impl OutputSink {
             Target::Path(path) => hidden(folder_of(path)),
         };
         let place = match target {
-            Target::Path(path) => path.canonicalize().unwrap_or_else(|_| path.clone()),
+            Target::Path(path) if path.is_symlink() => {
+                path.canonicalize().unwrap_or_else(|_| path.clone())
+            }
+            Target::Path(path) => path.clone(),
             Target::Stdout => "-".into(),
         };
         Ok(Self {
@@ -173,6 +176,10 @@ fn publish(way: SinkTarget, path: &Path) -> io::Result<()> {
         }
         #[cfg(target_os = "linux")]
         SinkTarget::Nameless(file) => {
+            // A name that is taken is taken over from a second one, since a link replaces nothing.
+            if link(&file, path).is_ok() {
+                return Ok(());
+            }
             let mut left = None;
             let named = temporary().make_in(folder_of(path), |name| {
                 left = Some(Leftover::at(name));

@@ -70,7 +70,7 @@ def theirs_index(bag):
 
 
 def theirs_fields(bag):
-    """By topic, the rows in the order of the bag, and how many messages they cannot decode."""
+    """By topic and type the rows in order of time, and how many messages they cannot decode."""
     rows, lost = {}, 0
     with reader(bag) as bag:
         for connection, at, data in bag.messages():
@@ -79,11 +79,22 @@ def theirs_fields(bag):
             except Exception:
                 lost += 1
                 continue
-            rows.setdefault(connection.topic, []).append((at, connection.msgtype, message))
+            rows.setdefault((connection.topic, connection.msgtype), []).append((at, message))
         return {
-            topic: [(at, flat(bag.typestore, kind, message)) for at, kind, message in all]
-            for topic, all in rows.items()
+            (topic, of): [(at, flat(bag.typestore, of, message)) for at, message in all]
+            for (topic, of), all in rows.items()
         }, lost
+
+
+def ours_fields(folder):
+    """The tables by topic and type; rows of one time in the order of the bag."""
+    tables = {}
+    for file in folder.glob("*.parquet"):
+        facts = pq.read_metadata(file).metadata
+        table = pq.read_table(file)
+        order = sorted(range(table.num_rows), key=nanos(table).__getitem__)
+        tables[facts[b"topic"].decode(), kind(facts[b"type"].decode())] = table.take(order)
+    return tables
 
 
 def nanos(table):
@@ -117,13 +128,13 @@ def compare_fields(binary, bag, folder):
     done = subprocess.run([binary, "--quiet", "extract", bag, "-o", folder / "t", "--fields"], check=False)
     assert done.returncode in (0, 3), done
     theirs, lost = theirs_fields(bag)
+    ours = ours_fields(folder / "t")
     values, wrong, absent = 0, [], []
-    for topic, rows in theirs.items():
-        file = folder / "t" / (topic.strip("/").replace("/", ".") + ".parquet")
-        if not file.exists():
+    for (topic, of), rows in theirs.items():
+        table = ours.get((topic, kind(of)))
+        if table is None:
             absent.append(topic)
             continue
-        table = pq.read_table(file)
         columns = {name: table[name].to_pylist() for name in table.column_names if name != "time_ns"}
         rows = sorted(rows, key=lambda row: row[0])
         if nanos(table) != [at for at, _ in rows]:
@@ -172,9 +183,9 @@ def decode_all(bag):
 
 def write_all(bag, folder):
     Path(folder).mkdir(exist_ok=True)
-    for topic, rows in theirs_fields(bag)[0].items():
+    for (topic, of), rows in theirs_fields(bag)[0].items():
         columns = {"time_ns": [at for at, _ in rows]} | {name: [row[name] for _, row in rows] for name in rows[0][1]}
-        pq.write_table(pa.table(columns), Path(folder) / (topic.strip("/").replace("/", ".") + ".parquet"), compression="zstd")
+        pq.write_table(pa.table(columns), Path(folder) / f"{topic} {of}.parquet".replace("/", "."), compression="zstd")
 
 
 def main():

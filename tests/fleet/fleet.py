@@ -202,13 +202,19 @@ def dask(fleet, folder, expected):
 def s3(fleet, folder, expected):
     import s3 as server
 
-    server.run(fleet, folder, expected, tell, of_folder, COMMAND)
+    server.run(fleet, folder, expected, tell, 20 * COPIES, COMMAND)
+
+
+def workers(fleet, folder, expected):
+    import workers as late
+
+    FAILED.extend(late.run(ROOT, folder, COMMAND, of_folder))
 
 
 def main():
     folder = Path(sys.argv[1]).resolve()
     fleet = bags(folder)
-    for old in ("one", "shards", "shards_killed", "s3"):
+    for old in ("one", "shards", "shards_killed", "s3", "late"):
         shutil.rmtree(folder / old, ignore_errors=True)
     print("| how | digest of `counts` | rows | | time |\n|---|---|---|---|---|")
     started = time.time()
@@ -219,7 +225,7 @@ def main():
     assert sorted(uris["uri"].to_pylist()) == sorted(map(str, fleet.iterdir())), "not each bag exactly once"
     sys.path.insert(0, str(Path(__file__).parent))
     # Spark before Sail, whose client leaves no way back to a session of its own.
-    for way in (wheel, xargs, dask, spark, sail, s3):
+    for way in (wheel, xargs, dask, spark, sail, s3, workers):
         if not ONLY or way.__name__ in ONLY:
             way(fleet, folder, expected)
     print("failed: " + ", ".join(FAILED) if FAILED else "all equal")

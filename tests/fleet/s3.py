@@ -63,8 +63,8 @@ class Server(ThreadingHTTPServer):
         pass
 
 
-def large(path, chunks=4000):
-    """A ROS 1 bag of about a gigabyte in chunks of a quarter of a megabyte, 400 s: payloads are holes in the file."""
+def large(path, chunks):
+    """A ROS 1 bag in chunks of a quarter of a megabyte, each 0.1 s: payloads are holes in the file."""
     import struct
 
     def header(**fields):
@@ -103,7 +103,7 @@ def large(path, chunks=4000):
     return path
 
 
-def run(fleet, folder, expected, tell, of_folder, command):
+def run(fleet, folder, expected, tell, chunks, command):
     import boto3
     from moto.server import ThreadedMotoServer
 
@@ -136,17 +136,17 @@ def run(fleet, folder, expected, tell, of_folder, command):
     count("plain", False)
     count("stumbling, 20 % of requests answered 503", True)
     rules.update(stumbles=False)
-    big = large(folder / "large.bag")
+    big = large(folder / "large.bag", chunks)
     size = big.stat().st_size
     s3.upload_file(str(big), "fleet", "large.bag")
     rules.update(requests=0, bytes=0)
     far = bagreel.tables("s3://fleet/large.bag")
     share = rules["bytes"] / size
-    print(f"S3, {size / 1e6:.0f} MB in 4000 chunks: {rules['requests']} requests, {rules['bytes']} bytes ({share:.2%})")
+    print(f"S3, {size / 1e6:.0f} MB in {chunks} chunks: {rules['requests']} requests, {rules['bytes']} bytes ({share:.2%})")
     assert rules["requests"] <= 100 and share <= 0.01
     near = bagreel.tables(big, tier="chunks")
     cells = lambda tables: [{k: v for k, v in row.items() if k not in ("mission", "bag")} for row in tables["counts"].to_pyarrow().to_pylist()]
-    assert cells(far) == cells(near) and sum(row["n"] for row in cells(far)) == 4000
+    assert cells(far) == cells(near) and sum(row["n"] for row in cells(far)) == chunks
 
     def refused(what):
         try:

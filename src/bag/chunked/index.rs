@@ -33,6 +33,9 @@ impl IndexSum {
     }
 }
 
+/// The step for picking records that lie close to each other: stays in a processor's cache.
+const CLOSE: usize = 64 * 1024;
+
 /// A longer index, in bytes, is not held in memory; its chunk is walked instead.
 pub(crate) const LONGEST_INDEX: u64 = 16 << 20;
 
@@ -117,7 +120,7 @@ impl<G: Grammar> Query<'_, G> {
         let sizes = if wanted.is_empty() {
             None
         } else {
-            self.fetch(&wanted, index.stamps.len(), body(), sink)
+            self.fetch(index, &wanted, body(), sink)
         };
         for (raw, entries) in &index.runs {
             let Some(id) = self.connections.get(*raw) else {
@@ -137,48 +140,40 @@ impl<G: Grammar> Query<'_, G> {
     /// The entries for which more than the stamp is wanted, in the order of the chunk.
     fn wanted(&self, index: &Index) -> Vec<Wanted> {
         let mut all = Vec::new();
-        for (raw, entries) in &index.runs {
-            let Some(id) = self.connections.get(*raw) else {
-                continue;
-            };
-            let want = self.wants[id.0 as usize];
+        for (run, (raw, entries)) in index.runs.iter().enumerate() {
+            let want = self.connections.get(*raw);
+            let want = want.map_or(Want::Stamps, |id| self.wants[id.0 as usize]);
             if want == Want::Stamps {
                 continue;
             }
-            for entry in entries.clone() {
-                let (time, offset) = (index.stamps[entry], index.offsets[entry]);
-                if self.range.is_none_or(|r| r.contains(time)) {
-                    all.push(Wanted {
-                        offset,
-                        entry,
-                        raw: *raw,
-                        id,
-                        time,
-                        want,
-                    });
-                }
-            }
+            let is_inside = |at: &usize| self.range.is_none_or(|r| r.contains(index.stamps[*at]));
+            all.extend(entries.clone().filter(is_inside).map(|entry| Wanted {
+                offset: index.offsets[entry],
+                entry,
+                run,
+            }));
         }
-        all.sort_unstable_by_key(|w| (w.offset, w.entry));
+        // A stable sort merges what is in order already: the entries of each connection.
+        all.sort_by_key(|w| w.offset);
         all
     }
 
     /// Fetches wanted messages; returns the size per entry if all were there.
     fn fetch(
         &self,
+        index: &Index,
         wanted: &[Wanted],
-        entries: usize,
         body: Option<ChunkBody>,
         sink: &mut dyn Sink,
     ) -> Option<Vec<u32>> {
-        let mut sizes = vec![0; entries];
+        let mut sizes = vec![0; index.stamps.len()];
         let mut missing = 0;
-        let plain = body.and_then(|b| b.plain(self.source, NEAR, &self.allowance).ok());
+        let plain = body.and_then(|b| b.plain(self.source, step(wanted), &self.allowance).ok());
         match plain {
             None => missing = wanted.len(),
             Some((mut stream, base)) => {
                 for one in wanted {
-                    match pick::<G>(&mut stream, base, one, sink) {
+                    match self.pick(&mut stream, base, (index, one), sink) {
                         Some(size) => sizes[one.entry] = size,
                         None => missing += 1,
                     }
@@ -191,44 +186,55 @@ impl<G: Grammar> Query<'_, G> {
         absent(sink, missing as u64);
         None
     }
-}
 
-/// Reports one wanted message to `sink`; returns its size, or `None` if it is not there.
-fn pick<G: Grammar>(
-    stream: &mut ByteStream<'_>,
-    base: u64,
-    one: &Wanted,
-    sink: &mut dyn Sink,
-) -> Option<u32> {
-    let ahead = base
-        .checked_add(one.offset)?
-        .checked_sub(stream.position())?;
-    if stream.skip(ahead).ok()? < ahead {
-        return None;
+    /// Reports one wanted message to `sink`; returns its size, or `None` if it is not there.
+    fn pick(
+        &self,
+        stream: &mut ByteStream<'_>,
+        base: u64,
+        (index, one): (&Index, &Wanted),
+        sink: &mut dyn Sink,
+    ) -> Option<u32> {
+        let ahead = base
+            .checked_add(one.offset)?
+            .checked_sub(stream.position())?;
+        if stream.skip(ahead).ok()? < ahead {
+            return None;
+        }
+        let (expected, _) = index.runs[one.run];
+        let size = match G::next(stream).ok()? {
+            RecordHead::Message { raw, size, .. } if raw == expected => size,
+            _ => return None,
+        };
+        let connection = self.connections.get(expected)?;
+        let want = self.wants[connection.0 as usize];
+        if let Some(data) = wanted_part(stream, size, want, sink).ok()? {
+            sink.message(Message {
+                connection,
+                time: index.stamps[one.entry],
+                data,
+                size,
+            });
+        }
+        Some(size)
     }
-    let size = match G::next(stream).ok()? {
-        RecordHead::Message { raw, size, .. } if raw == one.raw => size,
-        _ => return None,
-    };
-    if let Some(data) = wanted_part(stream, size, one.want, sink).ok()? {
-        sink.message(Message {
-            connection: one.id,
-            time: one.time,
-            data,
-            size,
-        });
-    }
-    Some(size)
 }
 
 /// A message to be fetched.
 struct Wanted {
     offset: u64,
+    /// The place of its entry in the index, and of the run that the entry is in.
     entry: usize,
-    raw: u32,
-    id: ConnectionId,
-    time: Stamp,
-    want: Want,
+    run: usize,
+}
+
+/// The number of bytes to read at a time for these messages, in order: far if the next one lies in the next few pages.
+fn step(wanted: &[Wanted]) -> usize {
+    let [first, .., last] = wanted else {
+        return NEAR;
+    };
+    let between = (last.offset - first.offset) / wanted.len() as u64;
+    if between <= NEAR as u64 { CLOSE } else { NEAR }
 }
 
 /// Reports messages of a connection that the bag does not describe.

@@ -118,28 +118,28 @@ impl Unindexed {
 }
 
 /// The numbers of the connections that chunks are stated to hold messages of.
+#[derive(Default)]
 pub(crate) struct Used {
-    /// Flags by number, for all numbers that real bags use.
+    /// Flags by number, up to the largest one of those that real bags use.
     small: Vec<bool>,
     large: BTreeSet<u32>,
 }
 
-impl Default for Used {
-    fn default() -> Self {
-        Self {
-            small: vec![false; 1 << 16],
-            large: BTreeSet::new(),
-        }
-    }
-}
+/// Numbers below this have flags.
+const SMALL: usize = 1 << 16;
 
 impl Used {
     /// Adds the number of a connection.
     pub(crate) fn add(&mut self, raw: u32) {
-        match self.small.get_mut(raw as usize) {
-            Some(used) => *used = true,
-            None => drop(self.large.insert(raw)),
+        let at = raw as usize;
+        if at >= SMALL {
+            self.large.insert(raw);
+            return;
         }
+        if self.small.len() <= at {
+            self.small.resize(at + 1, false);
+        }
+        self.small[at] = true;
     }
 
     /// Checks that all of them are described. If not, the chunks themselves may describe the others.

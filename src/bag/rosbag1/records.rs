@@ -115,76 +115,98 @@ pub(super) fn parse(header: &[u8]) -> Option<Header> {
     while !rest.is_empty() {
         let (name, value, after) = field(rest)?;
         rest = after;
-        if fields.count < MOST_FIELDS {
-            fields.all[fields.count] = (name, value);
-            fields.count += 1;
+        if let Some(known) = fields.known(name) {
+            known.get_or_insert(value);
         }
     }
     Some(fields.record().unwrap_or(Header::Other))
 }
 
-/// The most fields in a header; real ones have up to six.
-const MOST_FIELDS: usize = 12;
-
-/// An iterator over the names and values in a header.
+/// The values of a header's fields, of two of one name the first. There is a header before every message.
 #[derive(Default)]
 struct HeaderFields<'a> {
-    all: [(&'a [u8], &'a [u8]); MOST_FIELDS],
-    count: usize,
+    chunk_count: Option<&'a [u8]>,
+    chunk_pos: Option<&'a [u8]>,
+    compression: Option<&'a [u8]>,
+    conn: Option<&'a [u8]>,
+    conn_count: Option<&'a [u8]>,
+    count: Option<&'a [u8]>,
+    encryptor: Option<&'a [u8]>,
+    end_time: Option<&'a [u8]>,
+    index_pos: Option<&'a [u8]>,
+    op: Option<&'a [u8]>,
+    size: Option<&'a [u8]>,
+    start_time: Option<&'a [u8]>,
+    time: Option<&'a [u8]>,
+    topic: Option<&'a [u8]>,
+    ver: Option<&'a [u8]>,
 }
 
 impl<'a> HeaderFields<'a> {
-    fn get(&self, name: &[u8]) -> Option<&'a [u8]> {
-        let mut all = self.all[..self.count].iter();
-        all.find(|(found, _)| *found == name)
-            .map(|(_, value)| *value)
-    }
-
-    fn u32(&self, name: &[u8]) -> Option<u32> {
-        self.get(name)?.try_into().ok().map(u32::from_le_bytes)
-    }
-
-    fn u64(&self, name: &[u8]) -> Option<u64> {
-        self.get(name)?.try_into().ok().map(u64::from_le_bytes)
-    }
-
-    fn time(&self, name: &[u8]) -> Option<Stamp> {
-        time_at(self.get(name)?, 0)
+    /// The place of the value of this field; `None` for one that does not concern us.
+    fn known(&mut self, name: &[u8]) -> Option<&mut Option<&'a [u8]>> {
+        Some(match name {
+            b"chunk_count" => &mut self.chunk_count,
+            b"chunk_pos" => &mut self.chunk_pos,
+            b"compression" => &mut self.compression,
+            b"conn" => &mut self.conn,
+            b"conn_count" => &mut self.conn_count,
+            b"count" => &mut self.count,
+            b"encryptor" => &mut self.encryptor,
+            b"end_time" => &mut self.end_time,
+            b"index_pos" => &mut self.index_pos,
+            b"op" => &mut self.op,
+            b"size" => &mut self.size,
+            b"start_time" => &mut self.start_time,
+            b"time" => &mut self.time,
+            b"topic" => &mut self.topic,
+            b"ver" => &mut self.ver,
+            _ => return None,
+        })
     }
 
     fn record(&self) -> Option<Header> {
-        Some(match self.get(b"op")?.first()? {
+        let is_version_1 = || u32_of(self.ver) == Some(1);
+        Some(match self.op?.first()? {
             2 => Header::Message {
-                raw: self.u32(b"conn")?,
-                time: self.time(b"time")?,
+                raw: u32_of(self.conn)?,
+                time: time_at(self.time?, 0)?,
             },
             3 => Header::Bag {
-                index_pos: self.u64(b"index_pos")?,
-                connections: self.u32(b"conn_count")?,
-                chunks: self.u32(b"chunk_count")?,
-                encryptor: text(self.get(b"encryptor").unwrap_or_default()),
+                index_pos: u64_of(self.index_pos)?,
+                connections: u32_of(self.conn_count)?,
+                chunks: u32_of(self.chunk_count)?,
+                encryptor: text(self.encryptor.unwrap_or_default()),
             },
-            4 if self.u32(b"ver")? == 1 => Header::Index {
-                raw: self.u32(b"conn")?,
-                count: self.u32(b"count")?,
+            4 if is_version_1() => Header::Index {
+                raw: u32_of(self.conn)?,
+                count: u32_of(self.count)?,
             },
             5 => Header::Chunk {
-                compression: self.get(b"compression")?.to_vec(),
-                size: self.u32(b"size")?,
+                compression: self.compression?.to_vec(),
+                size: u32_of(self.size)?,
             },
-            6 if self.u32(b"ver")? == 1 => Header::ChunkInfo {
-                pos: self.u64(b"chunk_pos")?,
-                start: self.time(b"start_time")?,
-                end: self.time(b"end_time")?,
-                count: self.u32(b"count")?,
+            6 if is_version_1() => Header::ChunkInfo {
+                pos: u64_of(self.chunk_pos)?,
+                start: time_at(self.start_time?, 0)?,
+                end: time_at(self.end_time?, 0)?,
+                count: u32_of(self.count)?,
             },
             7 => Header::Connection {
-                raw: self.u32(b"conn")?,
-                topic: self.get(b"topic")?.to_vec(),
+                raw: u32_of(self.conn)?,
+                topic: self.topic?.to_vec(),
             },
             _ => return None,
         })
     }
+}
+
+fn u32_of(value: Option<&[u8]>) -> Option<u32> {
+    value?.try_into().ok().map(u32::from_le_bytes)
+}
+
+fn u64_of(value: Option<&[u8]>) -> Option<u64> {
+    value?.try_into().ok().map(u64::from_le_bytes)
 }
 
 /// The first field of a header and the rest.
@@ -257,5 +279,31 @@ fn blank(topic: TopicName) -> Connection {
         latching: false,
         qos: None,
         encoding: Encoding::Ros1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_fields_of_one_name_the_first_counts() {
+        let mut header = Vec::new();
+        for (name, value) in [
+            ("op", 2),
+            ("conn", 7),
+            ("conn", 8),
+            ("other", 1),
+            ("time", 0),
+        ] {
+            let value = [value, 0, 0, 0, 0, 0, 0, 0];
+            let value = &value[..if name == "time" { 8 } else { 4 }];
+            let len = u32::try_from(name.len() + 1 + value.len()).unwrap();
+            header.extend(len.to_le_bytes());
+            header.extend([name.as_bytes(), b"=", value].concat());
+        }
+        let (raw, time) = (7, Stamp(0));
+        assert_eq!(parse(&header), Some(Header::Message { raw, time }));
+        assert_eq!(parse(&header[..header.len() - 20]), None);
     }
 }

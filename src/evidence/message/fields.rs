@@ -351,7 +351,7 @@ fn numbers(
         ColumnValues::U64(to) => add!(to, u64),
         ColumnValues::F32(to) => add!(to, f32),
         ColumnValues::F64(to) => add!(to, f64),
-        ColumnValues::Texts(_) => {}
+        ColumnValues::Texts(_) | ColumnValues::Words(_) => {}
     }
     Ok(())
 }

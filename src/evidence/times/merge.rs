@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 use std::io;
 
 use super::{SeriesId, StampBlock, Stamps};
@@ -18,12 +19,22 @@ pub(crate) struct Timed {
     pub size: u32,
 }
 
-/// A block being read: ordered by its next stamp, then by the place of its sequence.
+/// The next stamp of a block being read, in the order in which they are passed on. Small, since each step moves some.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct OpenBlock {
-    next: (Stamp, usize, u32),
-    at: usize,
-    run: Vec<(Stamp, u32)>,
+struct Next {
+    time: Stamp,
+    series: usize,
+    size: u32,
+    /// The place of its block among those being read.
+    block: u32,
+}
+
+/// The blocks being read, and the places of those that were read to their ends.
+#[derive(Default)]
+struct OpenBlocks {
+    runs: Vec<std::vec::IntoIter<(Stamp, u32)>>,
+    free: Vec<u32>,
+    heap: BinaryHeap<Reverse<Next>>,
 }
 
 impl Stamps {
@@ -33,19 +44,18 @@ impl Stamps {
     /// If the unnamed file cannot be read.
     pub(crate) fn merge(&self, ids: &[SeriesId], mut each: impl FnMut(Timed)) -> io::Result<()> {
         let mut waiting = self.blocks(ids);
-        let mut open: BinaryHeap<Reverse<OpenBlock>> = BinaryHeap::new();
+        let mut open = OpenBlocks::default();
         loop {
-            let top = open.peek().map(|o| o.0.next.0);
+            let top = open.heap.peek().map(|next| next.0.time);
             let next = waiting.last().map(|(_, block)| block.first);
             match (top, next) {
                 (None, None) => return Ok(()),
                 (top, Some(next)) if top.is_none_or(|top| next <= top) => {
                     if let Some((series, block)) = waiting.pop() {
-                        let run = self.load(&block)?;
-                        open.extend(enter(series, run).map(Reverse));
+                        open.enter(series, self.load(&block)?);
                     }
                 }
-                _ => drain(&mut open, next, &mut each),
+                _ => open.drain(next, &mut each),
             }
         }
     }
@@ -63,37 +73,42 @@ impl Stamps {
     }
 }
 
-fn enter(series: usize, run: Vec<(Stamp, u32)>) -> Option<OpenBlock> {
-    let (time, size) = *run.first()?;
-    Some(OpenBlock {
-        next: (time, series, size),
-        at: 0,
-        run,
-    })
-}
-
-/// Passes on the earliest block's stamps as long as no other block, open or waiting, comes before them.
-fn drain(
-    open: &mut BinaryHeap<Reverse<OpenBlock>>,
-    waiting: Option<Stamp>,
-    each: &mut impl FnMut(Timed),
-) {
-    let Some(Reverse(mut block)) = open.pop() else {
-        return;
-    };
-    let rival = open.peek().map(|o| o.0.next);
-    loop {
-        let (time, series, size) = block.next;
-        each(Timed { time, series, size });
-        block.at += 1;
-        let Some((time, size)) = block.run.get(block.at) else {
+impl OpenBlocks {
+    /// Begins to read a block.
+    fn enter(&mut self, series: usize, run: Vec<(Stamp, u32)>) {
+        let mut run = run.into_iter();
+        let Some((time, size)) = run.next() else {
             return;
         };
-        block.next = (*time, series, *size);
-        let behind = rival.is_some_and(|rival| rival < block.next);
-        if behind || waiting.is_some_and(|waiting| waiting <= *time) {
-            open.push(Reverse(block));
-            return;
+        let block = self.free.pop().unwrap_or_else(|| {
+            self.runs.push(Vec::new().into_iter());
+            u32::try_from(self.runs.len() - 1).unwrap_or(u32::MAX)
+        });
+        self.runs[block as usize] = run;
+        self.heap.push(Reverse(Next {
+            time,
+            series,
+            size,
+            block,
+        }));
+    }
+
+    /// Passes on stamps as long as no block that waits comes before them.
+    fn drain(&mut self, waiting: Option<Stamp>, each: &mut impl FnMut(Timed)) {
+        while let Some(mut top) = self.heap.peek_mut() {
+            let next = &mut top.0;
+            if waiting.is_some_and(|waiting| waiting <= next.time) {
+                return;
+            }
+            let (time, series, size) = (next.time, next.series, next.size);
+            each(Timed { time, series, size });
+            let block = next.block;
+            if let Some((time, size)) = self.runs[block as usize].next() {
+                (next.time, next.size) = (time, size);
+            } else {
+                self.free.push(block);
+                PeekMut::pop(top);
+            }
         }
     }
 }

@@ -1,14 +1,11 @@
 //! A table in memory as an Arrow record batch, for programs that share our memory; and rows of one taken back.
 
-use std::sync::Arc;
-
 pub use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::Int64Type;
 use arrow_array::{Array as _, ArrayRef};
-use arrow_schema::{ArrowError, Schema};
 
-use super::{array, field};
+use super::record_batch;
 use crate::base::error::{Error, Result};
 use crate::base::table::{Batch, ColumnKind, TableCell};
 
@@ -17,11 +14,7 @@ use crate::base::table::{Batch, ColumnKind, TableCell};
 /// # Errors
 /// [`Error::Usage`] if they do not fit Arrow's columns of texts, 2 GB each.
 pub(crate) fn to_arrow(batch: &Batch) -> Result<RecordBatch> {
-    let fields: Vec<_> = batch.columns.iter().map(field).collect();
-    let columns: std::result::Result<Vec<ArrayRef>, ArrowError> =
-        batch.columns.iter().map(array).collect();
-    let made = columns.and_then(|c| RecordBatch::try_new(Arc::new(Schema::new(fields)), c));
-    made.map_err(|e| Error::usage(format!("no Arrow table can be made: {e}"), ""))
+    record_batch(batch).map_err(|e| Error::usage(format!("no Arrow table can be made: {e}"), ""))
 }
 
 /// The rows of `from`, whose columns of these names hold texts and whole numbers.

@@ -5,7 +5,7 @@ use crate::bag::{Connection, ConnectionId, Message, Sink as Takes, Want};
 use crate::base::error::{Error, Result};
 use crate::base::name::{NodeName, TopicName};
 use crate::base::notice::{Notice, Notices};
-use crate::base::table::{Batch, ColumnKind, TableCell};
+use crate::base::table::{Batch, ColumnKind, TableCell, TableColumn};
 use crate::base::time::Stamp;
 use crate::evidence::times::{SeriesId, Stamps, Timed};
 use crate::export::sink::OutputSink;
@@ -14,15 +14,6 @@ use crate::pipeline::Watch;
 use crate::view::NameFilter;
 use std::path::Path;
 use std::sync::Arc;
-
-/// The columns of the table.
-const COLUMNS: &[(&str, ColumnKind)] = &[
-    ("time_ns", ColumnKind::Time),
-    ("topic", ColumnKind::Text),
-    ("type", ColumnKind::Text),
-    ("publisher", ColumnKind::Text),
-    ("size_bytes", ColumnKind::I64),
-];
 
 /// The number of rows that are gathered before they are written.
 const MOST_ROWS: usize = 16 * 1024;
@@ -125,15 +116,29 @@ impl Takes for OfBag<'_> {
     }
 }
 
+/// The table without rows. A text is written down once per source, and stands in a row by the source's number.
+fn table(sources: &[RowSource]) -> Batch {
+    let topics = sources.iter().map(|s| s.topic.as_str());
+    let types = sources.iter().map(|s| &*s.type_name);
+    let publishers = sources.iter().map(|s| s.publisher.as_deref().unwrap_or(""));
+    Batch::of([
+        TableColumn::full("time_ns", ColumnKind::Time, 0),
+        TableColumn::words("topic", topics),
+        TableColumn::words("type", types),
+        TableColumn::words("publisher", publishers),
+        TableColumn::known("size_bytes", ColumnKind::I64),
+    ])
+}
+
 /// Writes all rows in order of time, those of one time in the order of their connections.
 fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Watch) -> Result<u64> {
     let spool = |e| Error::io("read", Path::new("temporary file of times"))(e);
     taken.stamps.finish().map_err(spool)?;
     let failed = || Error::io("write", job.target.path());
-    let mut batch = Batch::new(COLUMNS);
+    let sources = &taken.sources;
+    let mut batch = table(sources);
     let mut writer = Writer::new(job.format, sink, &batch, &[]).map_err(failed())?;
     let (mut rows, mut result) = (0, Ok(()));
-    let sources = &taken.sources;
     let each = |timed: Timed| {
         if result.is_err() {
             return;
@@ -153,12 +158,13 @@ fn write(job: &Extract, taken: &mut Taken, sink: OutputSink, watch: &mut dyn Wat
     Ok(rows)
 }
 
-fn row<'a>(source: &'a RowSource, timed: &Timed) -> [TableCell<'a>; 5] {
+fn row(source: &RowSource, timed: &Timed) -> [TableCell<'static>; 5] {
+    let number = u32::try_from(timed.series).unwrap_or(u32::MAX);
     [
         TableCell::Time(timed.time),
-        TableCell::text(source.topic.as_str()),
-        TableCell::text(&*source.type_name),
-        TableCell::known(source.publisher.as_deref(), TableCell::text),
+        TableCell::Word(number),
+        TableCell::Word(number),
+        TableCell::known(source.publisher.as_ref(), |_| TableCell::Word(number)),
         TableCell::known(source.is_sized.then_some(timed.size), TableCell::count),
     ]
 }

@@ -266,13 +266,17 @@ impl BagTally {
             .collect();
         let mut open: Option<(Stamp, InWindow)> = None;
         self.stamps.merge(&sent.series, |timed| {
-            let start = lumps.window(timed.time);
             let size = sized[timed.series].then_some(u64::from(timed.size));
+            // They come in order of time. A start before the range of time is held at its end, and says less.
+            let is_open =
+                |start: Stamp| start > Stamp::MIN && timed.time.since(start) < self.period.nanos();
+            let start = match &open {
+                Some((start, _)) if is_open(*start) => *start,
+                _ => lumps.window(timed.time),
+            };
             match &mut open {
                 Some((at, window)) if *at == start => window.take(timed.time, size),
-                _ => {
-                    all.extend(open.replace((start, InWindow::of(timed.time, size))));
-                }
+                _ => all.extend(open.replace((start, InWindow::of(timed.time, size)))),
             }
         })?;
         all.extend(open);

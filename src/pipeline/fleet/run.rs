@@ -302,13 +302,17 @@ impl BagVersion {
 
 /// When a file, or the newest in a folder, was written last, in nanoseconds since 1970.
 fn changed(path: &Path) -> Option<u128> {
-    let of = |path: &Path| {
-        let at = fs::metadata(path).ok()?.modified().ok()?;
+    let of = |meta: &fs::Metadata| {
+        let at = meta.modified().ok()?;
         Some(at.duration_since(UNIX_EPOCH).ok()?.as_nanos())
     };
+    let own = fs::metadata(path).ok()?;
+    if !own.is_dir() {
+        return of(&own);
+    }
     let inside = fs::read_dir(path).into_iter().flatten().flatten();
-    let newest = inside.filter_map(|file| of(&file.path())).max();
-    of(path).max(newest)
+    let inside = inside.filter_map(|file| of(&fs::metadata(file.path()).ok()?));
+    inside.chain(of(&own)).max()
 }
 
 /// The number of hexadecimal digits of a digest, 64 bits: among a million bags the chance that two share a name is one
