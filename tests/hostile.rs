@@ -221,16 +221,18 @@ fn files_that_never_end_are_refused() {
     let zero = |name: &str| std::os::unix::fs::symlink("/dev/zero", dir.path().join(name)).unwrap();
     zero("zero.yaml");
     zero("zero.txt");
-    for option in [
-        ["--style", "zero.txt"],
-        ["--font", "zero.txt"],
-        ["--topology", "zero.yaml"],
+    let no_text = "not UTF-8 text";
+    for (option, says) in [
+        (["--style", "zero.txt"], no_text),
+        (["--font", "zero.txt"], "too many"),
+        (["--topology", "zero.yaml"], "too many"),
+        (["--layout-from", "zero.txt"], no_text),
     ] {
         let args = [&["render", COURIER, "-o", "x.gif"][..], &option].concat();
         let output = bagreel(dir.path(), &args);
         let said = errors(&output);
         assert_eq!(output.status.code(), Some(1), "{option:?}: {said}");
-        assert!(said.contains("too many"), "{option:?}: {said}");
+        assert!(said.contains(says), "{option:?}: {said}");
     }
 }
 
