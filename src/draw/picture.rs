@@ -11,6 +11,7 @@ pub(crate) use legend::{LegendSign, signs};
 mod measured;
 mod options;
 pub(crate) mod page;
+mod replicas;
 mod room;
 mod timeline;
 pub(crate) mod title;
@@ -313,7 +314,8 @@ impl<'a> Picture<'a> {
         for (at, (space, place)) in spaces.enumerate() {
             let id = encoded(&space.name);
             let roll = (!space.replicas.is_empty()).then(|| rolls.next()).flatten();
-            let roll = roll.map(|who| boxes.roll(space, *place, &id, who));
+            let now = view.place_in_time(frame.index);
+            let roll = roll.map(|who| boxes.roll(space, *place, &id, (now, who)));
             let mut space = boxes.space(space, *place, &id, !full[at]);
             titles.push(boxes.title_of(&mut space));
             titles.extend(roll.filter(|roll| !roll.pieces.is_empty()));

@@ -1,6 +1,6 @@
 //! Nodes, topics, groups and collapsed namespaces, and the boxes around namespaces.
 
-use super::measured::{CHIP_TEXT, LINE, Label, Space, Tells, pendant, roll, second_line};
+use super::measured::{LINE, Label, Space, Tells, pendant, second_line};
 use super::options::{self, BoxLook};
 use super::page::GraphFit;
 use super::{badge, chips};
@@ -9,7 +9,7 @@ use crate::draw::scene::{Anchor, Fade, Form, Group, Piece, Shape, Stroke, Text};
 use crate::draw::style::{Body, Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::graph::State;
-use crate::view::{Attendance, Item, ItemKind, Mark, Shown};
+use crate::view::{Item, ItemKind, Mark, Shown};
 
 /// The opacity of a namespace in which nothing is there.
 const EMPTY: f64 = 0.35;
@@ -69,64 +69,6 @@ impl Boxes<'_> {
             halo: None,
             text: space.title.clone(),
         });
-        group
-    }
-
-    /// The chips of several equal namespaces: one for each, filled while it is there, in the colour of its change.
-    pub(crate) fn roll(&self, space: &Space, place: Rect, id: &str, who: &[Attendance]) -> Group {
-        let style = self.style;
-        let size = style.cluster.size;
-        let (place, scale) = (self.fit.rect(place), self.fit.scale);
-        let here = who
-            .iter()
-            .filter(|w| matches!(w, Attendance::Here | Attendance::Joined));
-        let mut group = Group {
-            id: format!("s{id}..roll"),
-            class: "roll".to_owned(),
-            data: vec![("name", space.name.clone())],
-            title: format!("{} of {} are there", here.count(), who.len()),
-            ..Group::default()
-        };
-        let chips = roll(space, self.fonts, size);
-        for ((index, who), (x, width)) in space.replicas.iter().zip(who).zip(chips) {
-            let (fill, line, text) = match who {
-                Attendance::Here => (style.node.fill, style.node.stroke, style.node.text),
-                Attendance::Away => (Color::NONE, style.silent.stroke, style.silent.text),
-                Attendance::Joined => (style.added.fill, style.added.color, style.added.text),
-                Attendance::Left => (style.removed.fill, style.removed.color, style.removed.text),
-            };
-            let chip = Rect::new(
-                place.x + (8.0 + x) * scale,
-                place.y + 3.0 * scale,
-                width * scale,
-                size * 1.15 * scale,
-            );
-            let dash = match who {
-                Attendance::Here | Attendance::Joined => Vec::new(),
-                Attendance::Away => style.silent.dash.clone(),
-                Attendance::Left => style.removed.dash.clone(),
-            };
-            let stroke = Stroke {
-                color: line,
-                width: 1.0,
-                dash,
-            };
-            group.shape(Shape {
-                form: Form::Rect(chip, 3.0 * scale),
-                fill,
-                stroke: stroke.scaled(self.fit.pen),
-            });
-            let letters = size * CHIP_TEXT * scale;
-            group.text(Text {
-                at: Point::new(chip.centre().x, chip.centre().y + letters * 0.36),
-                anchor: Anchor::Middle,
-                size: letters,
-                weight: Weight::SemiBold,
-                color: text,
-                halo: None,
-                text: index.clone(),
-            });
-        }
         group
     }
 

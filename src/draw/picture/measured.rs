@@ -1,6 +1,6 @@
 //! The plan to lay out: every label at its widest, every namespace that gets a box.
 
-use super::chips;
+use super::{chips, replicas};
 use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
@@ -58,27 +58,10 @@ pub(crate) struct Space {
     pub(crate) title: String,
     /// The indices of the equal namespaces drawn as this one; empty for a single one.
     pub(crate) replicas: Vec<String>,
+    /// Their number over time, if it changes: parts of the time from 0 to 1, each with the share of them that is there
+    /// from then on.
+    pub(crate) course: Vec<(f64, f64)>,
 }
-
-/// The chips of the roll call of a namespace that stands for several: left edges and widths, from where the title begins.
-pub(crate) fn roll(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
-    if space.replicas.len() > MOST_CHIPS {
-        return Vec::new();
-    }
-    let mut x = fonts.width(&space.title, size, Weight::SemiBold) + size;
-    let chip = |index: &String| {
-        let width = fonts.width(index, size * CHIP_TEXT, Weight::SemiBold) + size * 0.6;
-        let at = x;
-        x += width + size * 0.2;
-        (at, width)
-    };
-    space.replicas.iter().map(chip).collect()
-}
-
-/// The largest number of equal namespaces with a chip each; more are only counted.
-const MOST_CHIPS: usize = 32;
-/// The font size of a chip over that of the title.
-pub(crate) const CHIP_TEXT: f64 = 0.8;
 
 /// The labels of a view, and the plan that follows from them.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,8 +145,9 @@ impl Measurer<'_> {
     fn title(&self, space: &Space) -> Size {
         let size = self.style.cluster.size;
         let title = self.fonts.width(&space.title, size, Weight::SemiBold);
-        let roll = roll(space, self.fonts, size);
-        let end = roll.last().map_or(title, |(x, width)| x + width);
+        let chips = replicas::chips(space, self.fonts, size).pop();
+        let last = replicas::course(space, self.fonts, size).or(chips);
+        let end = last.map_or(title, |(x, width)| x + width);
         Size::new(end, size * LINE)
     }
 
@@ -440,8 +424,13 @@ fn spaces(view: &View, fonts: &Fonts) -> Vec<Space> {
             .and_then(|p| view.namespaces.get(p));
         around.map_or(name, |p| name.strip_prefix(&*p.name).unwrap_or(name))
     };
+    let mut fleets = 0..;
     (0..view.namespaces.len())
         .map(|at| Space {
+            course: Some(at)
+                .filter(|&at| !view.namespaces[at].replicas.is_empty())
+                .and_then(|_| fleets.next())
+                .map_or_else(Vec::new, |nth| replicas::shares(view, nth)),
             name: view.namespaces[at].name.to_string(),
             title: match view.namespaces[at].replicas.len() {
                 0 => fonts.shown(title(at)).into_owned(),

@@ -292,3 +292,36 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_number_of_equal_namespaces_is_drawn_over_time() {
+    let robots = |n: usize| -> String {
+        let one = |k: usize| format!("/r{k}/drive>/r{k}/odom@2 /r{k}/plan</r{k}/odom");
+        (1..=n).map(one).collect::<Vec<_>>().join(" ")
+    };
+    let lines = |counts: &[usize]| {
+        let windows: Vec<String> = counts.iter().map(|n| robots(*n)).collect();
+        let windows: Vec<&str> = windows.iter().map(String::as_str).collect();
+        let scenes = scenes(&windows);
+        let rolls = scenes.iter().map(|scene| {
+            let roll = scene.groups.iter().find(|group| group.class == "roll");
+            let shapes = roll.into_iter().flat_map(|roll| &roll.pieces);
+            let paths = shapes.filter_map(|piece| match piece {
+                Piece::Shape(shape) => match &shape.form {
+                    Form::Path(steps) => Some(steps.clone()),
+                    _ => None,
+                },
+                Piece::Text(_) => None,
+            });
+            paths.collect::<Vec<_>>()
+        });
+        rolls.collect::<Vec<_>>()
+    };
+    let told = lines(&[3, 4, 4]);
+    assert!(told.iter().all(|paths| paths.len() == 2));
+    // Up once, and on to the end; the same in every window, in which only the mark of the time moves.
+    assert_eq!(told[0][0].len(), 4);
+    assert_eq!(told[0][0], told[2][0]);
+    assert_ne!(told[0][1], told[2][1]);
+    assert!(lines(&[3, 3]).iter().all(Vec::is_empty));
+}

@@ -1,0 +1,172 @@
+//! The roll call of equal namespaces that are drawn as one: a chip for each, and their number over time.
+
+use super::boxes::Boxes;
+use super::measured::Space;
+use crate::base::geometry::{Point, Rect};
+use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line};
+use crate::draw::style::Color;
+use crate::draw::text::{Fonts, Weight};
+use crate::view::{Attendance, View};
+
+/// The chips of the roll call of a namespace that stands for several: left edges and widths, from where the title begins.
+pub(crate) fn chips(space: &Space, fonts: &Fonts, size: f64) -> Vec<(f64, f64)> {
+    if space.replicas.len() > MOST_CHIPS {
+        return Vec::new();
+    }
+    let mut x = fonts.width(&space.title, size, Weight::SemiBold) + size;
+    let chip = |index: &String| {
+        let width = fonts.width(index, size * CHIP_TEXT, Weight::SemiBold) + size * 0.6;
+        let at = x;
+        x += width + size * 0.2;
+        (at, width)
+    };
+    space.replicas.iter().map(chip).collect()
+}
+
+/// The largest number of equal namespaces with a chip each; more are only counted.
+const MOST_CHIPS: usize = 32;
+/// The font size of a chip over that of the title.
+const CHIP_TEXT: f64 = 0.8;
+
+/// The width of the line of their number over time, over the font size of the title.
+const COURSE: f64 = 6.0;
+
+/// The left edge and the width of the line of their number over time, from where the title begins; `None` where it does
+/// not change.
+pub(crate) fn course(space: &Space, fonts: &Fonts, size: f64) -> Option<(f64, f64)> {
+    if space.course.len() < 2 {
+        return None;
+    }
+    let title = fonts.width(&space.title, size, Weight::SemiBold);
+    let end = chips(space, fonts, size).pop();
+    let end = end.map_or(title, |(x, width)| x + width);
+    Some((end + size * 0.7, size * COURSE))
+}
+
+/// The share of the equal namespaces of one kind that is there at the end of each window, where it changes.
+pub(crate) fn shares(view: &View, nth: usize) -> Vec<(f64, f64)> {
+    let mut shares: Vec<(f64, f64)> = Vec::new();
+    for (k, who) in view
+        .frames
+        .iter()
+        .map(|frame| frame.rolls.get(nth))
+        .enumerate()
+    {
+        let Some(who) = who.filter(|who| !who.is_empty()) else {
+            continue;
+        };
+        let here = who
+            .iter()
+            .filter(|w| matches!(w, Attendance::Here | Attendance::Joined));
+        let share = here.count() as f64 / who.len() as f64;
+        if shares
+            .last()
+            .is_none_or(|last| (last.1 - share).abs() > 1e-9)
+        {
+            shares.push((view.place_in_time(k), share));
+        }
+    }
+    shares
+}
+
+/// A line in steps, as high as the share at each time.
+fn steps(course: &[(f64, f64)], area: &Rect) -> Form {
+    let y = |share: f64| area.bottom() - share * area.h;
+    let mut steps: Vec<Step> = Vec::new();
+    let mut before = None;
+    for &(at, share) in course {
+        let x = area.x + at * area.w;
+        match before {
+            None => steps.push(Step::Move(Point::new(x, y(share)))),
+            Some(before) => {
+                steps.push(Step::Line(Point::new(x, y(before))));
+                steps.push(Step::Line(Point::new(x, y(share))));
+            }
+        }
+        before = Some(share);
+    }
+    if let Some(last) = before {
+        steps.push(Step::Line(Point::new(area.right(), y(last))));
+    }
+    Form::Path(steps)
+}
+
+impl Boxes<'_> {
+    /// The chips of several equal namespaces: one for each, filled while it is there, in the colour of its change.
+    pub(crate) fn roll(
+        &self,
+        space: &Space,
+        place: Rect,
+        id: &str,
+        (now, who): (f64, &[Attendance]),
+    ) -> Group {
+        let style = self.style;
+        let size = style.cluster.size;
+        let (place, scale) = (self.fit.rect(place), self.fit.scale);
+        let here = who
+            .iter()
+            .filter(|w| matches!(w, Attendance::Here | Attendance::Joined));
+        let mut group = Group {
+            id: format!("s{id}..roll"),
+            class: "roll".to_owned(),
+            data: vec![("name", space.name.clone())],
+            title: format!("{} of {} are there", here.count(), who.len()),
+            ..Group::default()
+        };
+        let chips = chips(space, self.fonts, size);
+        for ((index, who), (x, width)) in space.replicas.iter().zip(who).zip(chips) {
+            let (fill, line, text) = match who {
+                Attendance::Here => (style.node.fill, style.node.stroke, style.node.text),
+                Attendance::Away => (Color::NONE, style.silent.stroke, style.silent.text),
+                Attendance::Joined => (style.added.fill, style.added.color, style.added.text),
+                Attendance::Left => (style.removed.fill, style.removed.color, style.removed.text),
+            };
+            let chip = Rect::new(
+                place.x + (8.0 + x) * scale,
+                place.y + 3.0 * scale,
+                width * scale,
+                size * 1.15 * scale,
+            );
+            let dash = match who {
+                Attendance::Here | Attendance::Joined => Vec::new(),
+                Attendance::Away => style.silent.dash.clone(),
+                Attendance::Left => style.removed.dash.clone(),
+            };
+            let stroke = Stroke {
+                color: line,
+                width: 1.0,
+                dash,
+            };
+            group.shape(Shape {
+                form: Form::Rect(chip, 3.0 * scale),
+                fill,
+                stroke: stroke.scaled(self.fit.pen),
+            });
+            let letters = size * CHIP_TEXT * scale;
+            group.text(Text {
+                at: Point::new(chip.centre().x, chip.centre().y + letters * 0.36),
+                anchor: Anchor::Middle,
+                size: letters,
+                weight: Weight::SemiBold,
+                color: text,
+                halo: None,
+                text: index.clone(),
+            });
+        }
+        if let Some((x, width)) = course(space, self.fonts, size) {
+            let area = Rect::new(
+                place.x + (8.0 + x) * scale,
+                place.y + 3.0 * scale,
+                width * scale,
+                size * 1.15 * scale,
+            );
+            let color = style.cluster.text;
+            let pen = |width| Stroke::solid(color, width).scaled(self.fit.pen);
+            group.shape(Shape::line(steps(&space.course, &area), pen(1.2)));
+            let at = area.x + now * area.w;
+            let head = line(Point::new(at, area.y), Point::new(at, area.bottom()));
+            group.shape(Shape::line(head, pen(2.0)));
+        }
+        group
+    }
+}
