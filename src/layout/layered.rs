@@ -243,12 +243,15 @@ fn best_block(
     let Some(best) = usual.reduce(better) else {
         return PlacedPart::empty();
     };
-    let is_long = wrap::is_long(best.1.size, options, orientation);
     if links > MANY {
         return best.1;
     }
+    let is_long = wrap::is_long(best.1.size, options, orientation);
     let inside = inside::inside(plan, options, part, is_long, orientation);
+    // Orderings that differ in the lanes of edges are cut into the same rows.
+    let mut seen = BTreeSet::new();
     let ways = orderings.iter().filter(|_| is_long);
+    let ways = ways.filter(|way| seen.insert(&way.layers.rank[..way.layers.vertices]));
     let wraps = ways.flat_map(|way| wrap::wraps(plan, options, part, &way.layers, orientation));
     let others = inside.into_iter().chain(wraps).map(judged);
     others.fold(best, better).1

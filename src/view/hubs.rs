@@ -67,6 +67,8 @@ impl View {
         } else {
             most.and_then(|(home, _)| *home)
         };
+        // The hub's own box shows less than the hub from its turn on.
+        let whole = self.items_shown.get(hub as usize).cloned();
         for (home, arrows) in uses {
             let at = if home == stays {
                 hub
@@ -80,7 +82,9 @@ impl View {
                     _ => arrow.from = at,
                 }
             }
-            self.show(hub, at, &arrows);
+            if let Some(whole) = &whole {
+                self.show(whole, at, &arrows);
+            }
         }
         let hub_item = &mut self.items[hub as usize];
         hub_item.hub = Some(hub);
@@ -108,10 +112,7 @@ impl View {
 
     /// Shows the box of a hub in the windows in which one of its arrows is there. It came or went with its arrows if all
     /// of them did.
-    fn show(&mut self, hub: u32, at: u32, arrows: &[usize]) {
-        let Some(whole) = self.items_shown.get(hub as usize).cloned() else {
-            return;
-        };
+    fn show(&mut self, whole: &Showing, at: u32, arrows: &[usize]) {
         let arrows: Vec<&Showing> = arrows
             .iter()
             .filter_map(|&arrow| self.arrows_shown.get(arrow))
@@ -201,6 +202,17 @@ mod tests {
             ("/b/@tf", vec![Some(Mark::Added), Some(Mark::Removed)]),
         ];
         assert_eq!(hubs, want.map(|(name, marks)| (name.to_owned(), marks)));
+    }
+
+    #[test]
+    fn a_box_stays_where_another_box_of_its_hub_goes() {
+        let hubs = boxes(&[
+            "/a/x>/tf /a/y>/tf /a/z>/tf /m</tf /n</tf /o</tf",
+            "/a/x>/tf /a/y>/tf /a/z>/tf",
+        ]);
+        let there: Vec<usize> = hubs.iter().map(|(_, marks)| marks.len()).collect();
+        assert_eq!(hubs[1].0, "/a/@tf");
+        assert_eq!(hubs[1].1, [None, None], "{there:?}");
     }
 
     #[test]
