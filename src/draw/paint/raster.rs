@@ -1,15 +1,16 @@
 //! A scene as pixels: its SVG, group by group, through usvg and resvg with the bundled font only.
 
 mod canvas;
+mod drawn;
 mod tiles;
 
 use std::collections::HashMap;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use resvg::usvg::{self, Tree, fontdb};
-use tiny_skia::{PixmapMut, Transform};
 
 pub use self::canvas::Canvas;
+use self::drawn::Drawn;
 use self::tiles::Tiles;
 use crate::base::error::{Error, Result};
 use crate::draw::paint::svg;
@@ -32,13 +33,15 @@ pub struct Pixels {
 const MOST_SIDE: f64 = 65_535.0;
 /// The most pixels in a picture: 256 MB of memory.
 const MOST_PIXELS: f64 = 64e6;
-/// The number of drawn groups that are kept twice over, so that a later frame need not read their SVG again: more than
+/// The number of drawn groups that are kept twice over, so that a later frame need not draw them again: more than
 /// a page holds, few enough for 20 MB.
 const MOST_KEPT: usize = 1000;
+/// The bytes of their pixels that are kept twice over: about what a page holds.
+const MOST_BYTES: usize = 10 << 20;
 
-/// A group, read once: its tree and the tiles of the page that it may touch.
+/// A group, drawn once, and the tiles of the page that it may touch.
 struct RasterGroup {
-    tree: Tree,
+    drawn: Drawn,
     tiles: Tiles,
 }
 
@@ -49,23 +52,39 @@ pub struct Painter {
     kept: RwLock<Kept>,
 }
 
-/// Drawn groups by their SVG: the recent ones, and those that were recent before them.
+/// Drawn groups by their SVG, all of one scale: the recent ones, and those that were recent before them.
 #[derive(Default)]
 struct Kept {
+    scale: f64,
     new: HashMap<String, Arc<RasterGroup>>,
+    /// The bytes of the pixels of the new ones.
+    bytes: usize,
     old: HashMap<String, Arc<RasterGroup>>,
 }
 
 impl Kept {
-    fn get(&self, text: &str) -> Option<Arc<RasterGroup>> {
-        self.new.get(text).or_else(|| self.old.get(text)).cloned()
+    fn get(&self, text: &str, scale: f64) -> Option<Arc<RasterGroup>> {
+        let known = self.new.get(text).or_else(|| self.old.get(text));
+        known.filter(|_| self.is_of(scale)).cloned()
     }
 
-    fn insert(&mut self, text: String, drawn: Arc<RasterGroup>) {
-        if self.new.len() >= MOST_KEPT {
-            self.old = std::mem::take(&mut self.new);
+    fn is_of(&self, scale: f64) -> bool {
+        self.scale.to_bits() == scale.to_bits()
+    }
+
+    fn insert(&mut self, text: String, group: Arc<RasterGroup>, scale: f64) {
+        if !self.is_of(scale) {
+            *self = Self {
+                scale,
+                ..Self::default()
+            };
         }
-        self.new.insert(text, drawn);
+        if self.new.len() >= MOST_KEPT || self.bytes >= MOST_BYTES {
+            self.old = std::mem::take(&mut self.new);
+            self.bytes = 0;
+        }
+        self.bytes += group.drawn.bytes();
+        self.new.insert(text, group);
     }
 }
 
@@ -95,16 +114,14 @@ impl Painter {
     /// [`Error::Usage`] where the picture would have no pixels, a side of more than 65,535, or more than 64 million
     /// pixels.
     pub fn paint(&self, scene: &Scene, scale: f64) -> Result<Pixels> {
-        let read = |group| self.read(scene, group);
-        let drawn: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
-        Ok(PixelSheet::covered(scene, &drawn, scale)?.pixels)
+        Ok(PixelSheet::covered(self, scene, scale)?.0.pixels)
     }
 
-    /// The group's tree, from memory where it was drawn before.
-    fn read(&self, scene: &Scene, group: &Group) -> Result<Arc<RasterGroup>> {
+    /// The group in pixels, from memory where it was drawn before.
+    fn read(&self, scene: &Scene, group: &Group, sheet: &PixelSheet) -> Result<Arc<RasterGroup>> {
         let text = svg::write_alone(scene, group);
         let known = self.kept.read().unwrap_or_else(PoisonError::into_inner);
-        if let Some(drawn) = known.get(&text) {
+        if let Some(drawn) = known.get(&text, sheet.scale) {
             return Ok(drawn);
         }
         drop(known);
@@ -117,10 +134,12 @@ impl Painter {
             )
         })?;
         let tiles = Tiles::under(group, scene.size, &self.fonts);
-        let drawn = Arc::new(RasterGroup { tree, tiles });
+        let page = (sheet.pixels.width, sheet.pixels.height);
+        let drawn = Drawn::new(tree, sheet.scale, page);
+        let group = Arc::new(RasterGroup { drawn, tiles });
         let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
-        kept.insert(text, Arc::clone(&drawn));
-        Ok(drawn)
+        kept.insert(text, Arc::clone(&group), sheet.scale);
+        Ok(group)
     }
 }
 
@@ -161,13 +180,19 @@ impl PixelSheet {
         Ok(Self { pixels, scale })
     }
 
-    /// A sheet with the whole scene on it.
-    fn covered(scene: &Scene, drawn: &[Arc<RasterGroup>], scale: f64) -> Result<Self> {
+    /// A sheet with the whole scene on it, and the scene's groups.
+    fn covered(
+        painter: &Painter,
+        scene: &Scene,
+        scale: f64,
+    ) -> Result<(Self, Vec<Arc<RasterGroup>>)> {
         let mut sheet = Self::of(scene, scale)?;
-        for group in drawn {
+        let read = |group| painter.read(scene, group, &sheet);
+        let groups: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
+        for group in &groups {
             sheet.draw(group);
         }
-        Ok(sheet)
+        Ok((sheet, groups))
     }
 
     /// Draws the whole scene over the former pixels.
@@ -181,18 +206,8 @@ impl PixelSheet {
         }
     }
 
-    fn draw(&mut self, drawn: &RasterGroup) {
-        #[expect(clippy::cast_possible_truncation, reason = "a scale near 1")]
-        let scale = self.scale as f32;
-        let transform = Transform::from_scale(scale, scale);
-        let Pixels {
-            width,
-            height,
-            rgba,
-        } = &mut self.pixels;
-        if let Some(mut map) = PixmapMut::from_bytes(rgba, *width, *height) {
-            resvg::render(&drawn.tree, transform, &mut map);
-        }
+    fn draw(&mut self, group: &RasterGroup) {
+        group.drawn.lay(self.scale, &mut self.pixels);
     }
 }
 

@@ -69,10 +69,9 @@ impl<'a> Canvas<'a> {
 
 impl Last {
     fn first(scene: Scene, painter: &Painter, scale: f64) -> Result<Self> {
-        let read = |group| painter.read(&scene, group);
-        let drawn: Vec<_> = scene.groups.iter().map(read).collect::<Result<_>>()?;
+        let (sheet, drawn) = PixelSheet::covered(painter, &scene, scale)?;
         Ok(Self {
-            sheet: PixelSheet::covered(&scene, &drawn, scale)?,
+            sheet,
             scratch: PixelSheet::of(&scene, scale)?,
             scene,
             drawn,
@@ -89,7 +88,7 @@ impl Last {
         let groups = scene.groups.iter().zip(&stays);
         let drawn = groups.map(|(group, stays)| match stays {
             Some(at) => Ok(Arc::clone(&self.drawn[*at])),
-            None => painter.read(&scene, group),
+            None => painter.read(&scene, group, &self.sheet),
         });
         let drawn: Vec<_> = drawn.collect::<Result<_>>()?;
         let dirty = self.dirty(&scene, &drawn, &stays);
