@@ -61,7 +61,7 @@ pub(crate) const EVIDENCE_LINE: usize = 500;
 
 #[cfg(feature = "video")]
 /// The most bytes that are kept of a child process's error output: its last ones.
-pub(crate) const LAST_WORDS: usize = 1 << 16;
+pub(crate) const MESSAGES_OF_A_CHILD: usize = 1 << 16;
 
 /// The most bytes that may be unpacked of any bag: seconds of work.
 pub(crate) const UNPACKED: u64 = 4 << 30;

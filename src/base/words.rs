@@ -254,7 +254,8 @@ pub fn visible(text: &str) -> Cow<'_, str> {
 /// JSON with the invisible characters of its texts as `\uXXXX`, for printing; JSON has such characters only inside
 /// texts.
 pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
-    if !json.contains(|c: char| c != '\n' && is_invisible(c)) {
+    let is_plain = |byte: u8| matches!(byte, b' '..=b'~' | b'\n');
+    if json.bytes().all(is_plain) || !json.contains(|c: char| c != '\n' && is_invisible(c)) {
         return Cow::Borrowed(json);
     }
     let mut out = String::with_capacity(json.len());

@@ -33,7 +33,7 @@ pub(crate) fn start<'a>(
             sequence.view,
             &sequence.mission.ledger.phases,
             (&whole.union, whole.style),
-            whole.title,
+            sequence.picture.title().unwrap_or_default(),
             frame_ms,
         );
         (svg, remarks)

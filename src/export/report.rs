@@ -124,10 +124,7 @@ fn title(sequence: &Sequence<'_>) -> String {
             .first()
             .map_or(String::new(), |b| b.name.clone())
     };
-    sequence
-        .picture
-        .graph()
-        .map_or_else(bag, |whole| whole.title.to_owned())
+    sequence.picture.title().map_or_else(bag, str::to_owned)
 }
 
 /// The number of headlines of all windows, in words.

@@ -21,6 +21,11 @@ pub trait Drawings: Sync {
     /// part of the change into it that is done: 1 is the window itself.
     fn scene(&self, window: usize, phase: f64) -> Scene;
 
+    /// The title of the drawing of a graph; `None` for other drawings.
+    fn title(&self) -> Option<&str> {
+        None
+    }
+
     /// The graph of all windows, for outputs that draw the graph once; `None` where there is none.
     fn graph(&self) -> Option<UnionDrawings<'_>> {
         None
@@ -39,8 +44,6 @@ pub struct UnionDrawings<'a> {
     pub union: Union,
     /// The style of the drawing.
     pub style: &'a Style,
-    /// The title of the picture.
-    pub title: &'a str,
 }
 
 impl Drawings for Picture<'_> {
@@ -48,11 +51,14 @@ impl Drawings for Picture<'_> {
         self.between(window, phase)
     }
 
+    fn title(&self) -> Option<&str> {
+        Some(self.title_text())
+    }
+
     fn graph(&self) -> Option<UnionDrawings<'_>> {
         Some(UnionDrawings {
             union: self.union(),
             style: self.style(),
-            title: self.title_text(),
         })
     }
 }

@@ -96,6 +96,15 @@ impl OutputSink {
         handle.transpose().map_err(self.error())
     }
 
+    #[cfg(feature = "video")]
+    /// Whether a file that a child process wrote to is empty.
+    ///
+    /// # Errors
+    /// Where the system cannot tell.
+    pub(crate) fn is_empty_file(&self) -> io::Result<bool> {
+        Ok(self.to.get_ref().size()? == Some(0))
+    }
+
     /// Finishes the file: it appears under its final name, replacing a file that was there. Returns its size in bytes.
     ///
     /// # Errors
@@ -111,7 +120,7 @@ impl OutputSink {
         } = self;
         let (way, _) = to.into_parts();
         // A child process may have written more than went through our hands.
-        let size = way.size().unwrap_or(written);
+        let size = way.size().ok().flatten().unwrap_or(written);
         publish(way, &place).map_err(Error::io("write", &path))?;
         Ok(size)
     }
@@ -134,14 +143,14 @@ impl Write for OutputSink {
 
 impl SinkTarget {
     /// The size of the file that will be renamed; `None` for everything else.
-    fn size(&self) -> Option<u64> {
+    fn size(&self) -> io::Result<Option<u64>> {
         let file = match self {
             #[cfg(target_os = "linux")]
             Self::Nameless(file) => file,
             Self::Named(file, _) => file.as_file(),
-            _ => return None,
+            _ => return Ok(None),
         };
-        file.metadata().ok().map(|m| m.len())
+        file.metadata().map(|m| Some(m.len()))
     }
 }
 

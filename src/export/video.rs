@@ -94,7 +94,7 @@ struct FfmpegJob {
     /// The pipe for frames.
     pipe: Option<ChildStdin>,
     /// The thread that reads its messages meanwhile: a full pipe would stop it.
-    ear: Option<JoinHandle<Vec<u8>>>,
+    messages: Option<JoinHandle<Vec<u8>>>,
     sink: OutputSink,
     /// The length of one repetition in milliseconds.
     step: u32,
@@ -188,10 +188,10 @@ impl Video<'_> {
         let mut child = child.map_err(|e| missing(self.target.path().to_owned(), &e))?;
         Ok(FfmpegJob {
             pipe: child.stdin.take(),
-            ear: child
+            messages: child
                 .stderr
                 .take()
-                .map(|pipe| thread::spawn(|| last_words(pipe))),
+                .map(|pipe| thread::spawn(|| last_messages(pipe))),
             child: Process(child),
             sink,
             step,
@@ -203,7 +203,7 @@ impl Video<'_> {
     fn complaint(&self, work: &mut FfmpegJob) -> Error {
         drop(work.pipe.take());
         let _ = work.child.0.wait();
-        let said = work.ear.take().and_then(|ear| ear.join().ok());
+        let said = work.messages.take().and_then(|all| all.join().ok());
         let said = String::from_utf8_lossy(&said.unwrap_or_default()).into_owned();
         let last = said.lines().rev().find(|l| !l.trim().is_empty());
         self.failed(format!(
@@ -260,6 +260,9 @@ impl Encoder for Video<'_> {
         if !status.success() {
             return Err(self.complaint(&mut work));
         }
+        if work.sink.is_empty_file().map_err(work.sink.error())? {
+            return Err(self.failed("ffmpeg ended without an error and wrote nothing".to_owned()));
+        }
         written.add(work.sink.commit()?);
         Ok(written)
     }
@@ -283,14 +286,14 @@ impl FfmpegJob {
 }
 
 /// The end of the messages of a child process, read until it closes the pipe.
-fn last_words(mut pipe: ChildStderr) -> Vec<u8> {
+fn last_messages(mut pipe: ChildStderr) -> Vec<u8> {
     let (mut said, mut buffer) = (Vec::new(), [0; 4096]);
     // Whatever can be read helps; a failure to read changes nothing.
     while let Ok(count) = pipe.read(&mut buffer)
         && count > 0
     {
         said.extend_from_slice(&buffer[..count]);
-        let spare = said.len().saturating_sub(budget::LAST_WORDS);
+        let spare = said.len().saturating_sub(budget::MESSAGES_OF_A_CHILD);
         said.drain(..spare);
     }
     said

@@ -232,3 +232,23 @@ fn a_hundred_thousand_nodes_fit_into_memory() {
         .unwrap();
     assert_eq!(run.status.code(), Some(0), "{}", errors(&run));
 }
+
+#[test]
+fn a_video_that_holds_nothing_is_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let bin = tempfile::tempdir().unwrap();
+    for (then, code, told) in [
+        ("exit 0", 1, "wrote nothing"),
+        ("echo no such codec >&2; exit 3", 1, "no such codec"),
+        ("echo film", 0, ""),
+    ] {
+        let path = with_program(bin.path(), "ffmpeg", &format!("cat > /dev/null; {then}"));
+        let done = command(dir.path(), &["render", COURIER, "-o", "x.mp4"])
+            .env("PATH", &path)
+            .output()
+            .unwrap();
+        assert_eq!(done.status.code(), Some(code), "{then}: {}", errors(&done));
+        assert!(errors(&done).contains(told), "{then}: {}", errors(&done));
+        assert_eq!(dir.path().join("x.mp4").exists(), code == 0, "{then}");
+    }
+}

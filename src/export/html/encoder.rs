@@ -37,7 +37,7 @@ fn page(sequence: &Sequence<'_>, style: &Style) -> String {
     let chosen = whole.as_ref().map_or(style, |(_, drawn)| drawn.style);
     let dark = Style::builtin("dark").ok().filter(|_| chosen == style);
     let board = overview.as_ref().map_or("", |o| &o.title);
-    let title = whole.as_ref().map_or(board, |(_, drawn)| drawn.title);
+    let title = sequence.picture.title().unwrap_or(board);
     let graph = |(view, drawn): (_, UnionDrawings<'_>)| PageGraph::new(view, drawn.union);
     let page = HtmlPage {
         sequence,

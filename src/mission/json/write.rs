@@ -1,6 +1,6 @@
 //! Writes an evolution as JSON, schema `bagreel.evolution/2`, window by window without a second copy in memory.
 
-use std::io::Write;
+use std::io::{BufWriter, Write};
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
@@ -78,9 +78,12 @@ impl Json<'_> {
     /// The errors of `out`.
     pub(crate) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let lines = LineFormatter::down_to(if self.is_runs() { 3 } else { 4 });
-        let mut serializer = serde_json::Serializer::with_formatter(&mut *out, lines);
+        // Its own buffer: the serializer writes a few bytes at a time.
+        let mut out = BufWriter::with_capacity(1 << 16, out);
+        let mut serializer = serde_json::Serializer::with_formatter(&mut out, lines);
         self.serialize(&mut serializer)?;
-        out.write_all(b"\n")
+        out.write_all(b"\n")?;
+        out.flush()
     }
 }
 
