@@ -279,6 +279,37 @@ impl Layout {
     }
 }
 
+impl Layout {
+    /// Every label that has a place.
+    fn labels(&self, plan: &Plan) -> impl Iterator<Item = Rect> {
+        let both = self.routes.iter().zip(&plan.links);
+        both.filter_map(|(route, link)| Some(Rect::around(route.label?, link.label?)))
+    }
+
+    /// Makes `whole` the whole: its corner becomes (0, 0), its size the size.
+    fn cropped(&mut self, whole: Rect) {
+        let by = Point::new(-whole.x, -whole.y);
+        for rect in self.boxes.iter_mut().chain(&mut self.clusters) {
+            *rect = rect.moved(by);
+        }
+        self.routes = self.routes.iter().map(|route| route.moved(by)).collect();
+        self.size = Size::new(whole.w, whole.h);
+    }
+}
+
+impl Cluster {
+    /// Its frame around what stands in it: the title stands at the top left.
+    fn frame(&self, inside: Rect, padding: f64) -> Rect {
+        let around = inside.grown(padding);
+        Rect::new(
+            around.x,
+            around.y - self.title.h,
+            around.w.max(self.title.w + 2.0 * padding),
+            around.h + self.title.h,
+        )
+    }
+}
+
 impl Route {
     /// Every point that shapes it, from its start on.
     fn points(&self) -> impl DoubleEndedIterator<Item = Point> {
@@ -292,6 +323,11 @@ impl Route {
             curves: self.curves.iter().map(|curve| curve.map(&f)).collect(),
             label: self.label.map(&f),
         }
+    }
+
+    /// This route moved by `by`.
+    fn moved(&self, by: Point) -> Self {
+        self.mapped(|p| Point::new(p.x + by.x, p.y + by.y))
     }
 
     /// About its length: that of the straight lines between the points that its pieces join.

@@ -35,7 +35,7 @@ use crate::graph::{Element, State};
 use crate::mission::Mission;
 use crate::mission::ledger::{EntryId, Kind};
 
-pub(crate) use collapse::Collapsible;
+pub(crate) use collapse::{Collapsible, headlines};
 pub(crate) use filter::NameFilter;
 pub(crate) use filtered::filtered;
 pub(crate) use nothing::nothing;
@@ -63,7 +63,8 @@ pub(crate) fn outline(mission: &Mission, options: &ViewOptions) -> View {
 fn staged(viewed: items::Viewed, options: &ViewOptions, frames: frames::Frames) -> View {
     let (mut list, shown) = (frames.list, (frames.items, frames.arrows));
     let mut items = viewed.items;
-    let mut namespaces = cluster::clusters(&mut items, options.group.namespaces);
+    let fleets = viewed.fleets.all.iter().map(|fleet| &*fleet.name).collect();
+    let mut namespaces = cluster::clusters(&mut items, options.group.namespaces, &fleets);
     let mut drawn = Vec::new();
     for namespace in &mut namespaces {
         let fleets = viewed.fleets.all.iter().zip(0_usize..);
@@ -151,6 +152,13 @@ pub enum Attendance {
     Joined,
     /// There at the beginning, no longer at the end.
     Left,
+}
+
+impl Attendance {
+    /// Whether it is there at the end.
+    pub(crate) fn is_here(self) -> bool {
+        matches!(self, Self::Here | Self::Joined)
+    }
 }
 
 /// The kind of connection that an arrow of the picture stands for.

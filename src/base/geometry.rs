@@ -84,6 +84,12 @@ impl Rect {
             && other.y < self.bottom()
     }
 
+    /// This rectangle with its corner moved by `by`.
+    #[must_use]
+    pub fn moved(&self, by: Point) -> Self {
+        Self::new(self.x + by.x, self.y + by.y, self.w, self.h)
+    }
+
     /// Grown by `by` on every side (shrunk if negative).
     #[must_use]
     pub fn grown(&self, by: f64) -> Self {

@@ -210,12 +210,12 @@ fn quality(
     options: &LayoutOptions,
 ) -> f64 {
     let links = links.max(1) as f64;
-    let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
     let fit = pack::fit(size, options.page);
-    let readable = libm::pow(fit, 0.8) * libm::pow(small, 0.2);
     if options.is_tight {
         return fit / (1.0 + TIGHT_CROSSING * crossings as f64 / links);
     }
+    let small = (options.page.w * options.page.h / (size.w * size.h).max(1.0)).sqrt();
+    let readable = libm::pow(fit, 0.8) * libm::pow(small, 0.2);
     let shortness = libm::pow((length / links).max(1.0), -LENGTH);
     readable * shortness / (1.0 + CROSSING * crossings as f64 / links)
 }
@@ -362,15 +362,14 @@ pub(crate) fn assembled(
         remarks: Vec::new(),
     };
     for ((part, block), corner) in parts.iter().zip(blocks).zip(corners) {
-        let moved = |r: &Rect| Rect::new(r.x + corner.x, r.y + corner.y, r.w, r.h);
         for (&v, at) in part.vertices.iter().zip(&block.boxes) {
-            layout.boxes[v] = moved(at);
+            layout.boxes[v] = at.moved(corner);
         }
         for (&c, at) in part.clusters.iter().zip(&block.clusters) {
-            layout.clusters[c] = moved(at);
+            layout.clusters[c] = at.moved(corner);
         }
         for (&i, route) in part.links.iter().zip(&block.routes) {
-            layout.routes[i] = route.mapped(|p| Point::new(p.x + corner.x, p.y + corner.y));
+            layout.routes[i] = route.moved(corner);
         }
     }
     (crossings, layout)

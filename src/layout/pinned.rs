@@ -170,9 +170,7 @@ impl PinnedBoxes<'_> {
             let Some(inside) = content[c] else {
                 continue;
             };
-            let mut frame = inside.grown(PADDING);
-            frame.w = frame.w.max(cluster.title.w + 2.0 * PADDING);
-            (frame.y, frame.h) = (frame.y - cluster.title.h, frame.h + cluster.title.h);
+            let frame = cluster.frame(inside, PADDING);
             frames[c] = frame;
             if let Some(parent) = cluster.parent {
                 add(&mut content[parent], frame);

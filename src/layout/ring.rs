@@ -212,16 +212,14 @@ fn part(curve: &[Point; 4], start: f64, end: f64) -> [Point; 4] {
 fn moved_to_corner(mut layout: Layout, plan: &Plan) -> Layout {
     let point = |p: Point| Rect::new(p.x, p.y, 0.0, 0.0);
     let routes = layout.routes.iter().flat_map(Route::points).map(point);
-    let labels = layout.routes.iter().zip(&plan.links);
-    let labels = labels.filter_map(|(r, l)| Some(Rect::around(r.label?, l.label?)));
-    let all = layout.boxes.iter().copied().chain(routes).chain(labels);
+    let all = layout
+        .boxes
+        .iter()
+        .copied()
+        .chain(routes)
+        .chain(layout.labels(plan));
     let whole = all.reduce(|a, b| a.union(&b)).unwrap_or_default();
-    for rect in &mut layout.boxes {
-        *rect = Rect::new(rect.x - whole.x, rect.y - whole.y, rect.w, rect.h);
-    }
-    let moved = |p: Point| Point::new(p.x - whole.x, p.y - whole.y);
-    layout.routes = layout.routes.iter().map(|r| r.mapped(moved)).collect();
-    layout.size = Size::new(whole.w, whole.h);
+    layout.cropped(whole);
     layout
 }
 

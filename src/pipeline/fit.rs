@@ -9,9 +9,10 @@ use crate::base::geometry::Size;
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::draw::picture::{self, Measured, PageOptions};
+use crate::graph::Element;
 use crate::layout::{Layout, LayoutOptions, RING, engine, extend, lay_out};
 use crate::mission::Mission;
-use crate::view::{Collapsible, Mode, View, ViewOptions, outline, view};
+use crate::view::{Collapsible, Mode, View, ViewOptions, headlines, outline, view};
 
 /// The largest page that `--fit auto` grows to.
 const LARGEST: Size = Size::new(1920.0, 1080.0);
@@ -130,6 +131,7 @@ impl Fitting<'_> {
     /// Collapses what does not change in namespaces until the text can be read. Returns the namespaces with the boxes
     /// in them that were left out.
     fn collapse_the_steady(&mut self) -> Vec<(Arc<str>, Vec<Arc<str>>)> {
+        let told: BTreeSet<Element> = headlines(self.mission).collect();
         let mut left: Vec<(Arc<str>, Vec<Arc<str>>)> = Vec::new();
         loop {
             let is_new = |name: &Arc<str>| {
@@ -144,7 +146,7 @@ impl Fitting<'_> {
             }
             let is_hopeless = self.best.text < self.drawing.readable() * HOPELESS;
             for candidate in self.at_once(fresh) {
-                let mut changing = self.best.view.changing(self.mission, &candidate.name);
+                let mut changing = self.best.view.holding(&told, &candidate.name);
                 changing.retain(|name| !is_hopeless && !self.options.expand.contains(name));
                 if changing.is_empty() || candidate.items >= changing.len() + FEWEST_STEADY {
                     self.options.collapse.push(Arc::clone(&candidate.name));
@@ -199,11 +201,17 @@ impl Fitting<'_> {
         bundled.collapse.extend(outermost);
         let boxes = outline(self.mission, &bundled);
         // Few boxes with many arrows among them stand best around the page.
-        let mut drawing = self.drawing.clone();
-        if boxes.items.len() <= RING && boxes.namespaces.is_empty() {
-            drawing.engine = engine("ring").unwrap_or(drawing.engine);
-        }
-        let attempt = Attempt::new(self.mission, &drawing, &bundled, &self.page);
+        let is_few = boxes.items.len() <= RING && boxes.namespaces.is_empty();
+        let attempt = match engine("ring").ok().filter(|_| is_few) {
+            None => self.attempt(&bundled, &self.page),
+            Some(engine) => {
+                let drawing = Drawing {
+                    engine,
+                    ..self.drawing.clone()
+                };
+                Attempt::new(self.mission, &drawing, &bundled, &self.page)
+            }
+        };
         if boxes.items.len() > 1 && attempt.text > self.best.text {
             (self.options, self.best) = (bundled, attempt);
         }

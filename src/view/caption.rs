@@ -216,11 +216,11 @@ impl<'a> Speaker<'a> {
         }
     }
 
-    /// The label of its box; its role if it has none of its own.
+    /// The label of its box; its role if it has no box of its own.
     fn node_name(&self, id: NodeId) -> Option<&str> {
         let item = self.viewed.node.get(id as usize).copied().flatten();
         let item = item.and_then(|at| self.viewed.items.get(at as usize));
-        match item.filter(|i| i.kind == ItemKind::Node) {
+        match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
             Some(item) => Some(&item.label),
             None => self.elements.nodes.get(id as usize).map(|n| &*n.role),
         }

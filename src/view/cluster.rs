@@ -12,10 +12,14 @@ const DEEPEST: usize = 16;
 ///
 /// `depth` levels follow `rqt_graph`'s rule for "Namespaces N": an item stands in the box of its first N parts, or of
 /// its whole namespace if that is shorter; names at the root stay outside. With `None` all levels are drawn, but a
-/// namespace around a single thing is left out.
-pub(crate) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespace> {
+/// namespace around a single thing is left out, unless it is one of `kept`; a thing called like one of those stands in it.
+pub(crate) fn clusters(
+    items: &mut [Item],
+    depth: Option<usize>,
+    kept: &BTreeSet<&str>,
+) -> Vec<Namespace> {
     let levels = depth.unwrap_or(DEEPEST).min(DEEPEST);
-    let homes: Vec<String> = homes(items, levels);
+    let homes: Vec<String> = homes(items, levels, kept);
     let mut spaces: BTreeSet<&str> = BTreeSet::new();
     for mut space in homes.iter().map(String::as_str) {
         while !space.is_empty() && spaces.insert(space) {
@@ -23,7 +27,7 @@ pub(crate) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespac
         }
     }
     if depth.is_none() {
-        fold(&mut spaces, &homes);
+        fold(&mut spaces, &homes, kept);
     }
     let places: BTreeMap<&str, usize> = spaces.iter().copied().zip(0..).collect();
     let innermost = |mut space| {
@@ -45,14 +49,17 @@ pub(crate) fn clusters(items: &mut [Item], depth: Option<usize>) -> Vec<Namespac
         .collect()
 }
 
-/// The namespace of each item; that of a collapsed one beside members that were kept open is itself.
-fn homes(items: &[Item], levels: usize) -> Vec<String> {
+/// The namespace of each item; that of one of `kept`, and of a collapsed one beside members that were kept open, is
+/// itself.
+fn homes(items: &[Item], levels: usize, kept: &BTreeSet<&str>) -> Vec<String> {
     let outer: Vec<String> = items.iter().map(|item| home(&item.name, levels)).collect();
     let around: BTreeSet<&str> = outer.iter().map(String::as_str).collect();
     let own = |(item, outer): (&Item, &String)| {
         let is_around = item.kind == ItemKind::Namespace && around.contains(&*item.name);
         if is_around {
             item.name.to_string()
+        } else if kept.contains(&*item.name) {
+            home(&format!("{}/", item.name), levels)
         } else {
             outer.clone()
         }
@@ -81,7 +88,7 @@ fn parent(space: &str) -> &str {
 }
 
 /// Drops namespaces around a single thing, which then stands in the one around them.
-fn fold(spaces: &mut BTreeSet<&str>, homes: &[String]) {
+fn fold(spaces: &mut BTreeSet<&str>, homes: &[String], always: &BTreeSet<&str>) {
     let mut things: BTreeMap<&str, usize> = BTreeMap::new();
     for home in homes {
         *things.entry(home).or_default() += 1;
@@ -90,7 +97,7 @@ fn fold(spaces: &mut BTreeSet<&str>, homes: &[String]) {
     // Backwards, a namespace comes after those inside it.
     for space in spaces.iter().rev().copied() {
         let inside = things.get(space).copied().unwrap_or_default();
-        if inside > 1 {
+        if inside > 1 || always.contains(space) {
             kept.insert(space);
         }
         *things.entry(parent(space)).or_default() += inside.min(1);
@@ -114,7 +121,7 @@ mod tests {
             hub: None,
         };
         let mut items: Vec<Item> = names.iter().map(item).collect();
-        let spaces = clusters(&mut items, depth);
+        let spaces = clusters(&mut items, depth, &BTreeSet::new());
         let at = |place: Option<usize>| place.map_or("-", |at| spaces[at].name.as_ref());
         let homes = items
             .iter()

@@ -77,7 +77,7 @@ pub struct Collapsible {
 }
 
 /// The node or topic that each headline is about: an edge's topic.
-fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_ {
+pub(crate) fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_ {
     let elements = &mission.elements;
     let topic = |edge: Option<&Edge>| edge.map(|edge| Element::Topic(edge.topic));
     let entries = mission.ledger.entries.iter().filter(|e| e.is_headline());
@@ -103,9 +103,8 @@ pub(crate) fn news(mission: &Mission) -> BTreeMap<&str, usize> {
 }
 
 impl View {
-    /// The boxes inside a namespace that a headline is about.
-    pub(crate) fn changing(&self, mission: &Mission, space: &str) -> Vec<Arc<str>> {
-        let told: BTreeSet<Element> = headlines(mission).collect();
+    /// The boxes inside a namespace that hold one of these elements.
+    pub(crate) fn holding(&self, told: &BTreeSet<Element>, space: &str) -> Vec<Arc<str>> {
         let is_inside = |name: &str| {
             let rest = name.strip_prefix(space);
             rest.is_some_and(|rest| rest.starts_with('/'))
@@ -222,7 +221,7 @@ mod tests {
     fn what_changes_can_stay_open_beside_the_rest() {
         let mission = mission(&["/a/x>/a/t /a/y>/a/u /a/z>/a/u", "/a/x>/a/t /a/z>/a/u"]);
         let whole = outline(&mission, &options(&[], &[]));
-        let open = whole.changing(&mission, "/a");
+        let open = whole.holding(&headlines(&mission).collect(), "/a");
         assert_eq!(open, ["/a/y".into()]);
         let view = outline(&mission, &options(&["/a"], &["/a/y"]));
         let boxes: Vec<(&str, usize)> = (view.items.iter())

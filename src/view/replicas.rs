@@ -1,4 +1,4 @@
-//! Namespaces that are the same but for their index, such as the robots of a fleet: they are drawn once for all.
+//! Namespaces and names that are the same but for their index, such as the robots of a fleet: they are drawn once for all.
 
 use std::cmp::Reverse;
 use std::collections::hash_map::DefaultHasher;
@@ -13,10 +13,13 @@ use crate::graph::{Edge, Element, Elements};
 /// The least number of equal namespaces that are drawn as one; fewer are drawn side by side.
 const FEWEST: usize = 3;
 
+/// The most digits of an index: longer numbers are times, process numbers or serial numbers.
+const MOST_DIGITS: usize = 6;
+
 /// The largest number of searches for fleets among the namespaces that are left.
 const MOST_ROUNDS: usize = 16;
 
-/// Namespaces with the same graph, drawn as one.
+/// Namespaces, or single names, with the same graph, drawn as one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Fleet {
     /// The name it is drawn under: `/robotNN`.
@@ -30,8 +33,7 @@ pub(crate) struct Fleet {
 impl Fleet {
     /// The index of each member, which tells it from the others: `01`.
     pub(crate) fn indices(&self) -> Vec<Arc<str>> {
-        let index = |member: &Arc<str>| member.get(stem(member).len()..).unwrap_or_default().into();
-        self.members.iter().map(index).collect()
+        self.members.iter().map(|m| index(m).into()).collect()
     }
 }
 
@@ -57,17 +59,28 @@ impl Fleets {
                 inside.entry(space).or_default().insert(what);
             }
         }
-        let mut fleets = Self::default();
+        let single = single_names(elements);
+        let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
         for (stem, spaces) in by_stem {
+            let many = spaces.len();
             let mut alike: BTreeMap<Inside, Vec<&str>> = BTreeMap::new();
             for (space, inside) in spaces {
                 alike.entry(inside).or_default().push(space);
             }
             // The largest, of several the one whose first name comes first; those that differ stay beside it.
             let largest = alike.into_values().max_by_key(|m| (m.len(), Reverse(m[0])));
-            if let Some(members) = largest.filter(|m| m.len() >= FEWEST) {
-                fleets.add(stem, &members, elements);
+            // Of single names a few are soon equal by chance.
+            let is_rule =
+                |m: &Vec<&str>| 2 * m.len() > many || !m.iter().all(|s| single.contains(s));
+            if let Some(members) = largest.filter(|m| m.len() >= FEWEST && is_rule(m)) {
+                found.push((stem, members));
             }
+        }
+        keep_linked(&mut found, &partners(elements));
+        let mut fleets = Self::default();
+        for (stem, mut members) in found {
+            members.sort_by_key(|m| (m.len(), *m));
+            fleets.add(stem, &members, elements);
         }
         fleets
     }
@@ -144,12 +157,13 @@ fn names(elements: &Elements) -> impl Iterator<Item = (&str, Element)> {
         .chain(topics.map(|(t, id)| (t.name.as_str(), Element::Topic(id))))
 }
 
-/// The outermost namespace around a name that ends in a number.
+/// The outermost namespace around a name that ends in a number, or else the name itself if it does.
 fn space_of(name: &str) -> Option<&str> {
     let mut found = None;
-    let mut space = namespace(name);
+    let mut space = name;
     while space.len() > 1 {
-        if stem(space).len() < space.len() && !stem(space).ends_with('/') {
+        let digits = space.len() - stem(space).len();
+        if (1..=MOST_DIGITS).contains(&digits) && !stem(space).ends_with('/') {
             found = Some(space);
         }
         space = namespace(space);
@@ -157,9 +171,14 @@ fn space_of(name: &str) -> Option<&str> {
     found
 }
 
-/// A namespace without the number at its end.
+/// A name without the number at its end.
 fn stem(space: &str) -> &str {
     space.trim_end_matches(|c: char| c.is_ascii_digit())
+}
+
+/// The number at its end.
+fn index(space: &str) -> &str {
+    &space[stem(space).len()..]
 }
 
 /// Every namespace with a number, and a hash for each thing in it and each edge of such a thing.
@@ -168,7 +187,7 @@ fn described(elements: &Elements) -> Vec<(&str, u64)> {
     for (name, element) in names(elements) {
         let kind = matches!(element, Element::Node(_));
         if let Some(space) = space_of(name) {
-            all.push((space, hash(&(kind, own(name, space)))));
+            all.push((space, hash(&(kind, seen(name, space)))));
         }
     }
     let publishes = elements.publishes.iter().map(|e| (e, '>'));
@@ -180,18 +199,85 @@ fn described(elements: &Elements) -> Vec<(&str, u64)> {
         let spaces = [space_of(node), space_of(topic)];
         let second = spaces[1].filter(|space| spaces[0] != Some(space));
         for space in [spaces[0], second].into_iter().flatten() {
-            all.push((space, hash(&(own(node, space), sign, own(topic, space)))));
+            all.push((space, hash(&(seen(node, space), sign, seen(topic, space)))));
         }
     }
     all
 }
 
-/// A name without that of the namespace around it, and whether there is one.
-fn own<'a>(name: &'a str, space: &str) -> (bool, &'a str) {
+/// A name as one of several equal namespaces sees it.
+#[derive(Hash)]
+enum Seen<'a> {
+    /// In the namespace: the rest of the name.
+    Own(&'a str),
+    /// In another one with the same index: its name without the index, and the rest.
+    Alike(&'a str, &'a str),
+    Foreign(&'a str),
+}
+
+fn seen<'a>(name: &'a str, space: &str) -> Seen<'a> {
     match name.strip_prefix(space) {
-        Some(rest) if within(name, space) => (true, rest),
-        _ => (false, name),
+        Some(rest) if within(name, space) => return Seen::Own(rest),
+        _ => {}
     }
+    match space_of(name) {
+        Some(other) if index(other) == index(space) => {
+            Seen::Alike(stem(other), &name[other.len()..])
+        }
+        _ => Seen::Foreign(name),
+    }
+}
+
+/// The namespaces that are nothing but one name.
+fn single_names(elements: &Elements) -> BTreeSet<&str> {
+    let mut single: BTreeSet<&str> = BTreeSet::new();
+    single.extend(names(elements).map(|(name, _)| name));
+    for (name, _) in names(elements) {
+        if let Some(space) = space_of(name).filter(|space| *space != name) {
+            single.remove(space);
+        }
+    }
+    single
+}
+
+/// The pairs of namespaces with the same index that an edge links.
+fn partners(elements: &Elements) -> Vec<(&str, &str)> {
+    let edges = elements.publishes.iter().chain(&elements.subscribes);
+    let pair = |edge: &Edge| {
+        let (node, topic) = ends(elements, edge)?;
+        let (a, b) = (space_of(node)?, space_of(topic)?);
+        (a != b && index(a) == index(b)).then_some((a, b))
+    };
+    edges.filter_map(pair).collect()
+}
+
+/// Drops fleets of which a member is linked to one of the same index that is in no fleet, and those linked to them: they
+/// only look alike.
+fn keep_linked(found: &mut Vec<(&str, Vec<&str>)>, partners: &[(&str, &str)]) {
+    let mut place: BTreeMap<&str, usize> = BTreeMap::new();
+    for (at, (_, members)) in found.iter().enumerate() {
+        place.extend(members.iter().map(|member| (*member, at)));
+    }
+    let mut beside: Vec<Vec<usize>> = vec![Vec::new(); found.len()];
+    let mut torn = Vec::new();
+    for (a, b) in partners {
+        match (place.get(a), place.get(b)) {
+            (Some(&a), Some(&b)) => {
+                beside[a].push(b);
+                beside[b].push(a);
+            }
+            (Some(one), None) | (None, Some(one)) => torn.push(*one),
+            (None, None) => {}
+        }
+    }
+    let mut is_torn = vec![false; found.len()];
+    while let Some(at) = torn.pop() {
+        if !std::mem::replace(&mut is_torn[at], true) {
+            torn.extend(&beside[at]);
+        }
+    }
+    let mut is_torn = is_torn.into_iter();
+    found.retain(|_| is_torn.next() == Some(false));
 }
 
 fn hash(what: &impl Hash) -> u64 {
@@ -246,6 +332,48 @@ mod tests {
         assert!(names.iter().any(|i| &*i.name == "/r2/odom"));
         let space = seen.namespaces.iter().find(|n| &*n.name == "/rN").unwrap();
         assert_eq!(space.replicas, ["1", "2", "3", "4"].map(Arc::from));
+    }
+
+    #[test]
+    fn names_with_an_index_are_one_too() {
+        let worker = |n: usize| format!("/work_{n}</jobs_{n} /chief>/jobs_{n} /work_{n}>/done");
+        let text: Vec<String> = (1..=4).map(worker).collect();
+        let numbers = ["1609459200", "1609459201", "1609459202"];
+        let anonymous = numbers.map(|n| format!("/view_{n}</done"));
+        let text = text.join(" ") + " " + &anonymous.join(" ");
+        let seen = outline(&mission(&[&text]), &ViewOptions::default());
+        let inside = |name: &str| {
+            let item = seen.items.iter().find(|item| &*item.name == name)?;
+            Some(&*seen.namespaces[item.cluster?].name)
+        };
+        assert_eq!(inside("/work_N"), Some("/work_N"));
+        assert_eq!(inside("/jobs_N"), Some("/jobs_N"));
+        assert_eq!(
+            seen.namespaces[1].replicas,
+            ["1", "2", "3", "4"].map(Arc::from)
+        );
+        // Long numbers are no index: those are told apart, or one by their role.
+        assert!(seen.items.iter().all(|item| !item.name.ends_with("NN")));
+        assert_eq!(seen.namespaces.len(), 2);
+    }
+
+    #[test]
+    fn what_is_linked_to_the_unequal_is_not_equal() {
+        let seen = |text: &str| outline(&mission(&[text]), &ViewOptions::default());
+        let chain = "/work_1>/out_1 /work_2>/out_2 /work_3>/out_3 /work_4>/out_4";
+        assert_eq!(seen(chain).items.len(), 2);
+        // Half of the topics go on to another node each: the nodes would be one, and its topics many.
+        let more = " /a</out_1 /b</out_2 /work_5>/out_5 /work_5>/x /work_6>/out_6 /work_6>/y";
+        let items = seen(&(chain.to_owned() + more)).items;
+        assert!(items.iter().all(|item| !item.is_replica), "{items:?}");
+    }
+
+    #[test]
+    fn indices_are_in_the_order_of_numbers() {
+        let text: Vec<String> = (1..=11).map(|n| robot(n, "")).collect();
+        let seen = outline(&mission(&[&text.join(" ")]), &ViewOptions::default());
+        let last = seen.namespaces[0].replicas.last();
+        assert_eq!(last.map(|index| &**index), Some("11"));
     }
 
     #[test]

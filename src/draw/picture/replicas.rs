@@ -46,19 +46,12 @@ pub(crate) fn course(space: &Space, fonts: &Fonts, size: f64) -> Option<(f64, f6
 /// The share of the equal namespaces of one kind that is there at the end of each window, where it changes.
 pub(crate) fn shares(view: &View, nth: usize) -> Vec<(f64, f64)> {
     let mut shares: Vec<(f64, f64)> = Vec::new();
-    for (k, who) in view
-        .frames
-        .iter()
-        .map(|frame| frame.rolls.get(nth))
-        .enumerate()
-    {
-        let Some(who) = who.filter(|who| !who.is_empty()) else {
+    for (k, frame) in view.frames.iter().enumerate() {
+        let Some(who) = frame.rolls.get(nth).filter(|who| !who.is_empty()) else {
             continue;
         };
-        let here = who
-            .iter()
-            .filter(|w| matches!(w, Attendance::Here | Attendance::Joined));
-        let share = here.count() as f64 / who.len() as f64;
+        let here = who.iter().filter(|who| who.is_here()).count();
+        let share = here as f64 / who.len() as f64;
         if shares
             .last()
             .is_none_or(|last| (last.1 - share).abs() > 1e-9)
@@ -100,12 +93,17 @@ impl Boxes<'_> {
         id: &str,
         (now, who): (f64, &[Attendance]),
     ) -> Group {
-        let style = self.style;
-        let size = style.cluster.size;
+        let size = self.style.cluster.size;
         let (place, scale) = (self.fit.rect(place), self.fit.scale);
-        let here = who
-            .iter()
-            .filter(|w| matches!(w, Attendance::Here | Attendance::Joined));
+        let area = |(x, width): (f64, f64)| {
+            Rect::new(
+                place.x + (8.0 + x) * scale,
+                place.y + 3.0 * scale,
+                width * scale,
+                size * 1.15 * scale,
+            )
+        };
+        let here = who.iter().filter(|who| who.is_here());
         let mut group = Group {
             id: format!("s{id}..roll"),
             class: "roll".to_owned(),
@@ -114,53 +112,12 @@ impl Boxes<'_> {
             ..Group::default()
         };
         let chips = chips(space, self.fonts, size);
-        for ((index, who), (x, width)) in space.replicas.iter().zip(who).zip(chips) {
-            let (fill, line, text) = match who {
-                Attendance::Here => (style.node.fill, style.node.stroke, style.node.text),
-                Attendance::Away => (Color::NONE, style.silent.stroke, style.silent.text),
-                Attendance::Joined => (style.added.fill, style.added.color, style.added.text),
-                Attendance::Left => (style.removed.fill, style.removed.color, style.removed.text),
-            };
-            let chip = Rect::new(
-                place.x + (8.0 + x) * scale,
-                place.y + 3.0 * scale,
-                width * scale,
-                size * 1.15 * scale,
-            );
-            let dash = match who {
-                Attendance::Here | Attendance::Joined => Vec::new(),
-                Attendance::Away => style.silent.dash.clone(),
-                Attendance::Left => style.removed.dash.clone(),
-            };
-            let stroke = Stroke {
-                color: line,
-                width: 1.0,
-                dash,
-            };
-            group.shape(Shape {
-                form: Form::Rect(chip, 3.0 * scale),
-                fill,
-                stroke: stroke.scaled(self.fit.pen),
-            });
-            let letters = size * CHIP_TEXT * scale;
-            group.text(Text {
-                at: Point::new(chip.centre().x, chip.centre().y + letters * 0.36),
-                anchor: Anchor::Middle,
-                size: letters,
-                weight: Weight::SemiBold,
-                color: text,
-                halo: None,
-                text: index.clone(),
-            });
+        for ((index, who), place) in space.replicas.iter().zip(who).zip(chips) {
+            self.chip(&mut group, index, *who, area(place));
         }
-        if let Some((x, width)) = course(space, self.fonts, size) {
-            let area = Rect::new(
-                place.x + (8.0 + x) * scale,
-                place.y + 3.0 * scale,
-                width * scale,
-                size * 1.15 * scale,
-            );
-            let color = style.cluster.text;
+        if let Some(place) = course(space, self.fonts, size) {
+            let area = area(place);
+            let color = self.style.cluster.text;
             let pen = |width| Stroke::solid(color, width).scaled(self.fit.pen);
             group.shape(Shape::line(steps(&space.course, &area), pen(1.2)));
             let at = area.x + now * area.w;
@@ -168,5 +125,41 @@ impl Boxes<'_> {
             group.shape(Shape::line(head, pen(2.0)));
         }
         group
+    }
+
+    /// The chip of one namespace.
+    fn chip(&self, group: &mut Group, index: &str, who: Attendance, area: Rect) {
+        let (style, scale) = (self.style, self.fit.scale);
+        let (fill, color, text) = match who {
+            Attendance::Here => (style.node.fill, style.node.stroke, style.node.text),
+            Attendance::Away => (Color::NONE, style.silent.stroke, style.silent.text),
+            Attendance::Joined => (style.added.fill, style.added.color, style.added.text),
+            Attendance::Left => (style.removed.fill, style.removed.color, style.removed.text),
+        };
+        let dash = match who {
+            Attendance::Here | Attendance::Joined => Vec::new(),
+            Attendance::Away => style.silent.dash.clone(),
+            Attendance::Left => style.removed.dash.clone(),
+        };
+        let stroke = Stroke {
+            color,
+            width: 1.0,
+            dash,
+        };
+        group.shape(Shape {
+            form: Form::Rect(area, 3.0 * scale),
+            fill,
+            stroke: stroke.scaled(self.fit.pen),
+        });
+        let letters = style.cluster.size * CHIP_TEXT * scale;
+        group.text(Text {
+            at: Point::new(area.centre().x, area.centre().y + letters * 0.36),
+            anchor: Anchor::Middle,
+            size: letters,
+            weight: Weight::SemiBold,
+            color: text,
+            halo: None,
+            text: index.to_owned(),
+        });
     }
 }

@@ -2,7 +2,7 @@
 
 use super::subplan::Subplan;
 use super::{Draft, PlacedPart, parts};
-use crate::base::geometry::{Point, Rect, Size};
+use crate::base::geometry::{Point, Rect};
 use crate::layout::spacing::PADDING;
 use crate::layout::{Component, LayoutOptions, Orientation, Plan};
 
@@ -29,20 +29,9 @@ pub(crate) fn inside(
     inner.put(&layout, Point::default(), &mut placed);
     let mut frame = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
     for cluster in part.around(root) {
-        frame = framed(frame, plan.clusters[part.clusters[cluster - 1]].title);
+        frame = plan.clusters[part.clusters[cluster - 1]].frame(frame, PADDING);
         placed.clusters[cluster - 1] = frame;
     }
     placed.crossings = crossings;
     Some(placed.on_page(Orientation::LeftRight))
-}
-
-/// The frame of a namespace around its inside: the title stands at the top left.
-fn framed(inside: Rect, title: Size) -> Rect {
-    let around = inside.grown(PADDING);
-    Rect::new(
-        around.x,
-        around.y - title.h,
-        around.w.max(title.w + 2.0 * PADDING),
-        around.h + title.h,
-    )
 }

@@ -76,17 +76,12 @@ pub(crate) fn place(plan: &Plan, layout: &mut Layout) {
 
 /// Moves and grows the whole where a label stands outside of it.
 pub(crate) fn make_room(plan: &Plan, layout: &mut Layout) {
-    let labels = layout.routes.iter().zip(&plan.links);
-    let labels = labels.filter_map(|(r, l)| Some(Rect::around(r.label?, l.label?)));
     let before = Rect::new(0.0, 0.0, layout.size.w, layout.size.h);
-    let whole = labels.fold(before, |all, label| all.union(&label));
-    layout.size = Size::new(whole.w, whole.h);
-    if whole.x < 0.0 || whole.y < 0.0 {
-        for rect in layout.boxes.iter_mut().chain(&mut layout.clusters) {
-            *rect = Rect::new(rect.x - whole.x, rect.y - whole.y, rect.w, rect.h);
-        }
-        let moved = |p: Point| Point::new(p.x - whole.x, p.y - whole.y);
-        layout.routes = layout.routes.iter().map(|r| r.mapped(moved)).collect();
+    let whole = layout
+        .labels(plan)
+        .fold(before, |all, label| all.union(&label));
+    if whole != before {
+        layout.cropped(whole);
     }
 }
 
@@ -300,93 +295,74 @@ mod tests {
     use crate::layout::tests::{link, vertex};
     use crate::layout::{Link, Orientation};
 
+    fn labelled(w: f64, h: f64) -> Link {
+        Link {
+            label: Some(Size::new(w, h)),
+            ..link(0, 1)
+        }
+    }
+
+    fn plan(links: Vec<Link>) -> Plan {
+        Plan {
+            vertices: vec![vertex(None); 2],
+            links,
+            clusters: vec![],
+        }
+    }
+
+    fn straight(from: Point, to: Point) -> Route {
+        let at = |part: f64| {
+            Point::new(
+                from.x + (to.x - from.x) * part,
+                from.y + (to.y - from.y) * part,
+            )
+        };
+        Route {
+            start: from,
+            curves: vec![[at(0.25), at(0.75), to]],
+            label: None,
+        }
+    }
+
+    /// Two boxes of 80 by 30, one in the corner, with these routes.
+    fn layout(orientation: Orientation, second: Point, routes: Vec<Route>) -> Layout {
+        let second = Rect::new(second.x, second.y, 80.0, 30.0);
+        Layout {
+            orientation,
+            size: Size::new(second.right(), second.bottom()),
+            boxes: vec![Rect::new(0.0, 0.0, 80.0, 30.0), second],
+            routes,
+            ..Layout::empty()
+        }
+    }
+
     #[test]
     fn two_labels_on_two_near_edges_stand_apart() {
-        let labelled = Link {
-            label: Some(Size::new(40.0, 13.0)),
-            ..link(0, 1)
-        };
-        let plan = Plan {
-            vertices: vec![vertex(None); 2],
-            links: vec![labelled; 2],
-            clusters: vec![],
-        };
-        let level = |y: f64| Route {
-            start: Point::new(80.0, y),
-            curves: vec![[
-                Point::new(110.0, y),
-                Point::new(170.0, y),
-                Point::new(200.0, y),
-            ]],
-            label: None,
-        };
-        let mut layout = Layout {
-            orientation: Orientation::LeftRight,
-            size: Size::new(280.0, 30.0),
-            boxes: vec![
-                Rect::new(0.0, 0.0, 80.0, 30.0),
-                Rect::new(200.0, 0.0, 80.0, 30.0),
-            ],
-            routes: vec![level(12.0), level(18.0)],
-            clusters: vec![],
-            remarks: vec![],
-        };
+        let plan = plan(vec![labelled(40.0, 13.0); 2]);
+        let level = |y: f64| straight(Point::new(80.0, y), Point::new(200.0, y));
+        let routes = vec![level(12.0), level(18.0)];
+        let mut layout = layout(Orientation::LeftRight, Point::new(200.0, 0.0), routes);
         place(&plan, &mut layout);
-        let rect = |i: usize| Rect::around(layout.routes[i].label.unwrap(), Size::new(40.0, 13.0));
-        assert!(!rect(0).overlaps(&rect(1)));
-        assert!(
-            layout
-                .boxes
-                .iter()
-                .all(|b| !b.overlaps(&rect(0)) && !b.overlaps(&rect(1)))
-        );
+        let [a, b] = [0, 1].map(|i| layout.labels(&plan).nth(i).unwrap());
+        assert!(!a.overlaps(&b));
+        let free = |boxed: &Rect| !boxed.overlaps(&a) && !boxed.overlaps(&b);
+        assert!(layout.boxes.iter().all(free));
     }
 
     #[test]
     fn a_label_beside_its_edge_is_on_no_other() {
-        let labelled = Link {
-            label: Some(Size::new(40.0, 13.0)),
-            ..link(0, 1)
-        };
-        let plan = Plan {
-            vertices: vec![vertex(None); 2],
-            links: vec![labelled, link(0, 1), link(0, 1)],
-            clusters: vec![],
-        };
-        let upright = |x: f64| Route {
-            start: Point::new(x, 30.0),
-            curves: vec![[
-                Point::new(x, 60.0),
-                Point::new(x, 130.0),
-                Point::new(x, 160.0),
-            ]],
-            label: None,
-        };
-        let mut layout = Layout {
-            orientation: Orientation::TopBottom,
-            size: Size::new(80.0, 190.0),
-            boxes: vec![
-                Rect::new(0.0, 0.0, 80.0, 30.0),
-                Rect::new(0.0, 160.0, 80.0, 30.0),
-            ],
-            routes: [40.0, 30.0, 50.0].map(upright).to_vec(),
-            clusters: vec![],
-            remarks: vec![],
-        };
-        place(&plan, &mut layout);
+        let crowded = plan(vec![labelled(40.0, 13.0), link(0, 1), link(0, 1)]);
+        let upright = |x: f64| straight(Point::new(x, 30.0), Point::new(x, 160.0));
+        let routes = [40.0, 30.0, 50.0].map(upright).to_vec();
+        let mut layout = layout(Orientation::TopBottom, Point::new(0.0, 160.0), routes);
+        place(&crowded, &mut layout);
         assert_eq!(layout.routes[0].label.map(|at| at.x), Some(40.0));
         // Without its neighbours it stands beside the line, and the whole grows where that needs room.
-        let plan = Plan {
-            links: vec![Link {
-                label: Some(Size::new(70.0, 50.0)),
-                ..link(0, 1)
-            }],
-            ..plan
-        };
+        let alone = plan(vec![labelled(70.0, 50.0)]);
         layout.routes.truncate(1);
-        place(&plan, &mut layout);
-        make_room(&plan, &mut layout);
-        let label = Rect::around(layout.routes[0].label.unwrap(), Size::new(70.0, 50.0));
+        place(&alone, &mut layout);
+        make_room(&alone, &mut layout);
+        let label = layout.labels(&alone).next().unwrap();
         assert!(label.x >= 0.0 && label.right() <= layout.size.w);
         assert!(layout.boxes.iter().all(|b| !b.overlaps(&label)));
     }

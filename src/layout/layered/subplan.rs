@@ -65,15 +65,14 @@ impl Subplan {
 
     /// Puts a layout of this plan into the part, moved by `by`.
     pub(crate) fn put(&self, layout: &Layout, by: Point, part: &mut PlacedPart) {
-        let moved = |r: &Rect| Rect::new(r.x + by.x, r.y + by.y, r.w, r.h);
         for (&v, at) in self.vertices.iter().zip(&layout.boxes) {
-            part.boxes[v] = moved(at);
+            part.boxes[v] = at.moved(by);
         }
         for (&c, at) in self.clusters.iter().zip(&layout.clusters) {
-            part.clusters[c - 1] = moved(at);
+            part.clusters[c - 1] = at.moved(by);
         }
         for (&link, route) in self.links.iter().zip(&layout.routes) {
-            part.routes[link] = route.mapped(|p| Point::new(p.x + by.x, p.y + by.y));
+            part.routes[link] = route.moved(by);
         }
     }
 }

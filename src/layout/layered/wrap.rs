@@ -5,7 +5,7 @@
 use super::subplan::Subplan;
 use super::{Draft, PlacedPart};
 use crate::base::geometry::{Point, Rect, Size};
-use crate::layout::routes::around;
+use crate::layout::routes::around::{End, Map};
 use crate::layout::spacing::turned;
 use crate::layout::{Component, Layers, Layout, LayoutOptions, Orientation, Plan, Route, pack};
 
@@ -143,7 +143,12 @@ impl Wrapped {
             channels[at].y = y;
             y += BESIDE + LANE * channels[at].lanes as f64;
         }
-        let boxes = placed.boxes.clone();
+        let end = |at: usize| End {
+            at,
+            rect: placed.boxes[at],
+            outline: plan.vertices[part.vertices[at]].outline,
+        };
+        let mut map = Map::new(&placed.boxes);
         let mut margin = 0.0;
         for link in cut {
             let (from, to) = part.ends[link];
@@ -152,9 +157,9 @@ impl Wrapped {
             if lanes.len() > 1 {
                 margin -= LANE;
             }
-            let via = via((&boxes[from], &boxes[to]), &lanes, margin - BESIDE);
-            let outlines = [from, to].map(|v| plan.vertices[part.vertices[v]].outline);
-            placed.routes[link] = around::via(&boxes, (from, to), outlines, &via)?;
+            let (from, to) = (end(from), end(to));
+            let via = via((&from.rect, &to.rect), &lanes, margin - BESIDE);
+            placed.routes[link] = map.via(from, to, &via)?;
         }
         // An edge that is followed through a channel costs a reader as much as a crossing does.
         placed.crossings = self.crossings + many as u64;

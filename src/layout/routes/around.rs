@@ -49,24 +49,12 @@ pub(crate) fn routes(plan: &Plan, boxes: &[Rect]) -> (Vec<Route>, usize) {
 /// The radius at which an edge with given points turns.
 const BEND: f64 = 9.0;
 
-/// A route from one box to another through these points, around whatever stands between; `None` if a way is blocked.
-pub(crate) fn via(
-    boxes: &[Rect],
-    ends: (usize, usize),
-    outlines: [Outline; 2],
-    points: &[Point],
-) -> Option<Route> {
-    let mut map = Map::new(boxes);
-    let (first, last) = (points.first()?, points.last()?);
-    let (start, end) = (boxes[ends.0].centre(), boxes[ends.1].centre());
-    let mut way = map.way(start, *first, (ends.0, ends.0))?;
-    way.extend(&points[1..]);
-    let rest = map.way(*last, end, (ends.1, ends.1))?;
-    way.extend(&rest[1..]);
-    let many = way.len();
-    way[0] = leaves(&boxes[ends.0], outlines[0], way[0], way[1]);
-    way[many - 1] = leaves(&boxes[ends.1], outlines[1], way[many - 1], way[many - 2]);
-    Some(rounded(&way))
+/// The end of a route: a place among the boxes, its rectangle and its outline.
+#[derive(Clone, Copy)]
+pub(crate) struct End {
+    pub(crate) at: usize,
+    pub(crate) rect: Rect,
+    pub(crate) outline: Outline,
 }
 
 /// A route along these points with round corners.
@@ -206,14 +194,14 @@ fn drawn((a, b): &(VertexPlace, VertexPlace), way: &[Point]) -> Route {
 }
 
 /// The obstacles in the way of edges, and the points where an edge can turn.
-struct Map {
+pub(crate) struct Map {
     obstacles: Vec<Rect>,
     corners: Vec<Point>,
     effort: usize,
 }
 
 impl Map {
-    fn new(boxes: &[Rect]) -> Self {
+    pub(crate) fn new(boxes: &[Rect]) -> Self {
         // Where a look from every corner at every box is beyond the effort, no way would be found: all edges run straight.
         if boxes.len().saturating_mul(boxes.len()) > EFFORT {
             return Self {
@@ -242,6 +230,35 @@ impl Map {
             corners,
             effort: EFFORT,
         }
+    }
+
+    /// A route from one box to another around whatever stands between; its first and its last point between the boxes
+    /// lie on level lanes and may move along them. `None` if a way is blocked.
+    pub(crate) fn via(&mut self, from: End, to: End, points: &[Point]) -> Option<Route> {
+        let [first, between @ .., last] = points else {
+            return None;
+        };
+        let mut way = self.way_to_lane(from, *first)?;
+        way.extend(between);
+        way.extend(self.way_to_lane(to, *last)?.iter().rev());
+        let many = way.len();
+        way[0] = leaves(&from.rect, from.outline, way[0], way[1]);
+        way[many - 1] = leaves(&to.rect, to.outline, way[many - 1], way[many - 2]);
+        Some(rounded(&way))
+    }
+
+    /// The way from a box to a point of a level lane. Where it has to turn on the way, it meets the lane upright from its
+    /// last turn: a way back to the point itself would be a sharp bend.
+    fn way_to_lane(&mut self, end: End, lane: Point) -> Option<Vec<Point>> {
+        let own = (end.at, end.at);
+        let mut way = self.way(end.rect.centre(), lane, own)?;
+        if let [.., _, turn, last] = &mut way[..] {
+            let upright = Point::new(turn.x, lane.y);
+            if self.clear(*turn, upright, own) {
+                *last = upright;
+            }
+        }
+        Some(way)
     }
 
     /// The shortest way around the boxes that are not its own.
@@ -331,6 +348,7 @@ fn meets(a: Point, b: Point, rect: &Rect) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::geometry::polyline;
     use crate::layout::tests::{link, vertex};
 
     #[test]
@@ -353,6 +371,33 @@ mod tests {
         let (routes, straight) = routes(&plan, &boxes);
         assert_eq!(straight, n - 1);
         assert!(routes.iter().skip(1).all(|route| route.curves.len() <= 1));
+    }
+
+    #[test]
+    fn a_way_from_a_lane_has_no_sharp_bend() {
+        let boxes = [(400.0, 0.0), (-20.0, 100.0), (0.0, 200.0)];
+        let boxes = boxes.map(|(x, y)| Rect::new(x, y, 80.0, 30.0));
+        let end = |at: usize| End {
+            at,
+            rect: boxes[at],
+            outline: Outline::Box,
+        };
+        let ends = [Point::new(440.0, 70.0), Point::new(40.0, 70.0)];
+        let route = Map::new(&boxes).via(end(0), end(2), &ends).unwrap();
+        let line = polyline(route.start, &route.curves, 4);
+        let sharp = line.windows(3).filter(|p| {
+            let (a, b) = (
+                (p[1].x - p[0].x, p[1].y - p[0].y),
+                (p[2].x - p[1].x, p[2].y - p[1].y),
+            );
+            a.0 * b.0 + a.1 * b.1 < -1e-6
+        });
+        assert_eq!(sharp.count(), 0, "{line:?}");
+        assert!(line.iter().all(|p| {
+            !boxes[1]
+                .grown(1.0)
+                .overlaps(&Rect::around(*p, Size::new(0.1, 0.1)))
+        }));
     }
 
     #[test]
