@@ -168,6 +168,10 @@ impl<G: Grammar> Query<'_, G> {
     ) -> Option<Vec<u32>> {
         let mut sizes = vec![0; index.stamps.len()];
         let mut missing = 0;
+        if let Some(body) = body.as_ref().filter(|_| self.source.is_far()) {
+            // What cannot be had now is asked for again, and told then.
+            let _ = self.source.expect(&ahead(body, wanted));
+        }
         let plain = body.and_then(|b| b.plain(self.source, step(wanted), &self.allowance).ok());
         match plain {
             None => missing = wanted.len(),
@@ -227,6 +231,27 @@ struct Wanted {
     entry: usize,
     run: usize,
 }
+
+/// The most messages of a chunk whose places are asked for at once.
+const MOST_AHEAD: usize = 256;
+
+/// The places of the beginnings of these messages, or of the whole chunk where they are packed.
+fn ahead(body: &ChunkBody, wanted: &[Wanted]) -> Vec<Range<u64>> {
+    let Range { start, end } = body.range;
+    if body.how != Compression::None {
+        let last = start.saturating_add(MOST_PACKED);
+        return vec![start..end.min(last)];
+    }
+    let step = step(wanted) as u64;
+    let place = |one: &Wanted| {
+        let at = start.saturating_add(one.offset).min(end);
+        at..at.saturating_add(step).min(end)
+    };
+    wanted.iter().take(MOST_AHEAD).map(place).collect()
+}
+
+/// The most packed bytes that are asked for at once.
+const MOST_PACKED: u64 = 4 << 20;
 
 /// The number of bytes to read at a time for these messages, in order: far if the next one lies in the next few pages.
 fn step(wanted: &[Wanted]) -> usize {
