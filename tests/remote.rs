@@ -417,6 +417,52 @@ fn what_is_refused_is_an_error_and_no_row() {
 }
 
 #[test]
+fn a_prefix_is_no_bag() {
+    let server = server_of_large();
+    let error = read(&Reading::of([server.url("day/")])).unwrap_err();
+    assert!(
+        error.is_usage() && error.hint().contains("bagreel tables"),
+        "{error}"
+    );
+    assert_eq!(server.state().requests, 0);
+}
+
+/// A bag of four chunks with one message each: the tail, and one request for each chunk's index and the next one's head.
+#[test]
+fn sizes_cost_no_request_of_their_own_where_a_chunk_holds_one_message() {
+    let server = Server::with(&[("a.bag", one_message_in_each_chunk())]);
+    let output = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args([
+            "extract",
+            &server.url("a.bag"),
+            "-o",
+            "-",
+            "--format",
+            "csv",
+        ])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let sizes: Vec<&str> = text
+        .lines()
+        .skip(1)
+        .filter_map(|l| l.rsplit(',').next())
+        .collect();
+    assert_eq!(sizes, ["300004"; 4], "{text}");
+    let state = server.state();
+    assert!(state.requests <= 2 + 5, "{:?}", state.asked);
+    assert!(state.bytes < 160_000, "{} bytes", state.bytes);
+}
+
+fn one_message_in_each_chunk() -> Vec<u8> {
+    let mut recording = Recording::default();
+    let talks = recording.publisher("/talker", "/chatter", "std_msgs/String");
+    let text = [&300_000u32.to_le_bytes()[..], &[b'a'; 300_000]].concat();
+    recording.send(talks, (0, 4000), 1000, &text);
+    rosbag1::write(&recording, rosbag1::Pack::None, 1000)
+}
+
+#[test]
 fn an_object_that_is_replaced_while_it_is_read_is_an_error() {
     use Versions::{Careless, Dated, Told, Untold, Weak};
     for versions in [Told, Careless, Weak, Dated] {

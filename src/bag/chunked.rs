@@ -23,7 +23,7 @@ use crate::bag::input::{BagPlace, file_name};
 use crate::bag::model::{
     Connection, ConnectionId, Lumps, OpenOptions, Reader, Report, Sink, Tier, Want,
 };
-use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
+use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
@@ -235,19 +235,16 @@ impl<G: Grammar> Indexed<G> {
         }
     }
 
-    /// The places of the heads of those of these chunks that hold messages whose payloads are wanted, if they are far away.
-    fn heads<'a>(
-        &self,
-        plan: &'a ChunkPlan,
-        chunks: &'a [&Chunk],
-        wants: &'a [Want],
-    ) -> impl Iterator<Item = Range<u64>> + use<'a, G> {
-        let is_far = self.source.is_far();
-        let is_wanted = move |id: ConnectionId| wants[id.0 as usize] > Want::Stamps;
-        let chunks = chunks
-            .iter()
-            .filter(move |chunk| is_far && plan.holds(chunk, is_wanted));
-        chunks.map(|chunk| chunk.start..chunk.start.saturating_add(NEAR as u64).min(chunk.end))
+    /// The places of the heads, with a first message's, of those of these chunks that hold messages of which more than the
+    /// time is wanted, if they are far away.
+    fn heads(&self, plan: &ChunkPlan, chunks: &[&Chunk], wants: &[Want]) -> Vec<Range<u64>> {
+        if !self.source.is_far() {
+            return Vec::new();
+        }
+        let is_wanted = |id: ConnectionId| wants[id.0 as usize] > Want::Stamps;
+        let chunks = chunks.iter().filter(|chunk| plan.holds(chunk, is_wanted));
+        let head = |chunk: &&Chunk| chunk.start..chunk.start + 2 * GLANCE as u64;
+        chunks.map(head).collect()
     }
 
     /// Counts chunks as a whole where that is asked for and enough; returns the other chunks, and the way the bag is

@@ -186,6 +186,8 @@ pub(crate) struct ByteStream<'a> {
 pub(crate) const FAR: usize = 256 * 1024;
 /// The step for picking small records here and there.
 pub(crate) const NEAR: usize = 4096;
+/// The step for the heads of records in a source that is far away.
+pub(crate) const GLANCE: usize = 512;
 
 impl<'a> ByteStream<'a> {
     /// The bytes `start..end` of a file, `step` at a time.

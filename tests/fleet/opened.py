@@ -1,7 +1,7 @@
 """What `extract` and `render` write as Parquet, opened by other programs: the same values in each, those of the CSV files.
 
-Usage: opened.py, in an environment with the wheel, pyarrow, pandas, DuckDB and Polars; PySpark where that is installed.
-Ends with 1 if anything differs.
+Usage: opened.py [spark], in an environment with the wheel, pyarrow, pandas, DuckDB and Polars, and with PySpark if that
+is named. Ends with 1 if anything differs.
 """
 
 import csv
@@ -118,17 +118,14 @@ def same(name, path, readers):
 
 def main():
     readers = [pandas, duckdb, polars]
-    try:
+    if "spark" in sys.argv[1:]:
         from pyspark.sql import SparkSession
 
-        session = (
-            SparkSession.builder.master("local[2]").config("spark.ui.enabled", "false")
-            # Spark has no times in nanoseconds and refuses such a column otherwise.
-            .config("spark.sql.legacy.parquet.nanosAsLong", "true").getOrCreate()
-        )  # fmt: skip
+        session = SparkSession.builder.master("local[2]").config("spark.ui.enabled", "false")
+        # Spark has no times in nanoseconds and refuses such a column otherwise.
+        session = session.config("spark.sql.legacy.parquet.nanosAsLong", "true").getOrCreate()
+        session.sparkContext.setLogLevel("OFF")
         readers.append(spark_of(session))
-    except (ImportError, AttributeError, RuntimeError) as why:
-        print(f"(not by Spark: {why})")
     names = ", ".join(reader.__name__ for reader in readers)
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)

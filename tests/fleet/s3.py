@@ -148,6 +148,16 @@ def run(fleet, folder, expected, tell, chunks, command):
     cells = lambda tables: [{k: v for k, v in row.items() if k not in ("mission", "bag")} for row in tables["counts"].to_pyarrow().to_pylist()]
     assert cells(far) == cells(near) and sum(row["n"] for row in cells(far)) == chunks
 
+    # A picture of it needs nothing else.
+    few = bagreel.finish(far["counts"])
+    assert bagreel.to_dict(few)["messages"] == chunks and len(few) > 5
+    rules.update(requests=0, bytes=0)
+    whole = bagreel.read("s3://fleet/large.bag", period="10s").to_json()
+    share = rules["bytes"] / size
+    print(f"S3, the mission of the same with every message's time: {rules['requests']} requests, {rules['bytes']} bytes ({share:.2%})")
+    assert rules["requests"] <= chunks + 20 and share <= 0.01
+    assert whole == bagreel.read(big, period="10s").to_json()
+
     def refused(what):
         try:
             bagreel.tables("s3://fleet/large.bag", tier="index")
