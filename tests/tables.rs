@@ -80,6 +80,17 @@ fn topics_and_times_choose_rows_with_their_sizes() {
     );
     assert!(said.contains("leave nothing"), "{said}");
     assert!(!dir.path().join("x.csv").exists());
+    // A name that is mistyped is told.
+    let nothing = [
+        "extract",
+        WAREHOUSE,
+        "-o",
+        "x.csv",
+        "--topic-filter",
+        "/robot1/odm",
+    ];
+    let said = ends(dir.path(), &nothing, 0);
+    assert!(said.contains("a topic that `/robot1/odm` takes"), "{said}");
 }
 
 #[test]
