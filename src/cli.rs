@@ -482,19 +482,14 @@ fn info(args: &InfoArgs, given: &Given, terminal: &mut Terminal) -> Result<u8, E
         return Ok(code(&mission));
     }
     let mission = read(&reading, terminal)?;
-    let info = crate::mission::info::info(&mission);
+    let info = || crate::mission::info::info(&mission);
     match args.format {
-        InfoFormat::Text => terminal.results(&crate::mission::info::text(&info))?,
-        InfoFormat::Json => terminal.results(&json(&info))?,
+        InfoFormat::Text => terminal.results(&crate::mission::info::text(&info()))?,
+        InfoFormat::Json => terminal.results(&json(&info()))?,
         table => {
-            let row = SurveyRow {
-                path: mission
-                    .bags
-                    .first()
-                    .map_or_else(String::new, |b| b.name.clone()),
-                error: None,
-                info: Some(info),
-            };
+            let bag = mission.bags.first();
+            let name = bag.map_or_else(String::new, |bag| bag.name.clone());
+            let row = SurveyRow::of(name, &mission);
             terminal.table(&survey_file(&[row], table.of_table())?)?;
         }
     }

@@ -175,6 +175,38 @@ fn every_bag_has_exactly_one_row() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn odd_names_are_counted_too() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt as _;
+    let dir = tempfile::tempdir().unwrap();
+    let names: &[&[u8]] = &[
+        b"a b/\xc3\xbc 'q\".mcap",
+        b"line\nend/x,y.mcap",
+        b"-d/--help.mcap",
+        b"%20#?.mcap",
+        b"s3:",
+        b"gr\xfc\xdfe/\xff.mcap",
+    ];
+    let mut list = Vec::new();
+    for name in names {
+        let path = dir.path().join("odd").join(OsStr::from_bytes(name));
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::copy(COURIER, path).unwrap();
+        list.extend([b"odd/", *name, b"\0"].concat());
+    }
+    let said = ends(dir.path(), &["tables", "odd", "-o", "t"], 0);
+    assert!(said.contains("6 bags, 19416 messages"), "{said}");
+    // A list with zero bytes, as `find -print0` makes it.
+    fs::write(dir.path().join("list"), list).unwrap();
+    ends(dir.path(), &["tables", "--manifest", "list", "-o", "u"], 0);
+    assert_eq!(
+        rows(&dir.path().join("t"), "counts"),
+        rows(&dir.path().join("u"), "counts")
+    );
+}
+
+#[test]
 fn columns_are_those_that_are_promised() {
     let dir = tempfile::tempdir().unwrap();
     ends(dir.path(), &["tables", WAREHOUSE, "-o", "t"], 0);

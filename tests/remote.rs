@@ -8,11 +8,13 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread;
+use std::time::Duration;
 
-use bagreel::Error;
 use bagreel::bag::{Input, Tier};
-use bagreel::fleet::{CountDetail, CountedBag, PlannedBag, Tally, count};
-use bagreel::values::{Period, Stamp};
+use bagreel::fleet::{CountDetail, CountedBag, PlannedBag, Planning, Tally, count, plan};
+use bagreel::internals::mission::write_json;
+use bagreel::values::{Align, Length, Period, Stamp};
+use bagreel::{Error, Reading, read};
 
 use crate::support::rosbag1::{self, SparseBag};
 use crate::support::{self, ORIGIN, Recording};
@@ -34,6 +36,11 @@ struct State {
     /// Sends every request there.
     redirects: Option<String>,
     versions: Versions,
+    /// Answers so late.
+    late: Duration,
+    /// The requests that wait for an answer now, and the most that ever did.
+    under_way: usize,
+    most_under_way: usize,
 }
 
 /// What a server says of versions.
@@ -136,7 +143,18 @@ fn serve(stream: TcpStream, state: &Mutex<State>) {
             }
             head.push(line.trim().to_owned());
         }
-        let (status, fields, body) = answer(&head, &mut state.lock().unwrap());
+        let late = {
+            let mut state = state.lock().unwrap();
+            state.under_way += 1;
+            state.most_under_way = state.most_under_way.max(state.under_way);
+            state.late
+        };
+        thread::sleep(late);
+        let (status, fields, body) = {
+            let mut state = state.lock().unwrap();
+            state.under_way -= 1;
+            answer(&head, &mut state)
+        };
         let fields: Vec<String> = fields
             .iter()
             .map(|(k, v)| format!("{k}: {v}\r\n"))
@@ -304,6 +322,74 @@ fn a_large_bag_takes_few_requests_and_few_bytes() {
     println!("12 GB: {requests} requests, {read} bytes");
 }
 
+/// The mission of a bag as JSON. Payloads that are far away are not compared with each other, so here none are.
+fn mission(bag: &str) -> String {
+    let mut reading = Reading::of([bag]);
+    reading.collect.payload_bytes = 0;
+    reading.division.length = Length::Fixed(Period::parse("10").unwrap());
+    let mut text = Vec::new();
+    write_json(&read(&reading).unwrap(), &mut text).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+#[test]
+fn the_mission_of_an_object_is_that_of_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let own = |name: &str| fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+    let small = support::small();
+    let mut objects = vec![
+        ("warehouse.bag", own("examples/warehouse.bag")),
+        ("courier.mcap", own("examples/courier.mcap")),
+        ("courier_0.db3", own("examples/courier/courier_0.db3")),
+    ];
+    let packs = [
+        ("plain.bag", rosbag1::Pack::None),
+        ("lz4.bag", rosbag1::Pack::Lz4),
+        ("bz2.bag", rosbag1::Pack::Bz2),
+    ];
+    // Many chunks, so that several threads read them.
+    objects.extend(packs.map(|(name, pack)| (name, rosbag1::write(&small, pack, 200))));
+    let plain = &objects[3].1;
+    let cut = plain[..plain.len() / 2].to_vec();
+    objects.push(("cut.bag", cut));
+    let server = Server::with(&objects);
+    for (name, bytes) in &objects {
+        let path = dir.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        let (far, near) = (mission(&server.url(name)), mission(&path.to_string_lossy()));
+        assert!(far == near, "{name}");
+    }
+}
+
+#[test]
+fn a_mission_of_a_large_bag_takes_a_request_for_each_chunk_and_many_at_a_time() {
+    let server = server_of_large();
+    server.state().late = Duration::from_millis(5);
+    let mut reading = Reading::of([server.url("large.bag")]);
+    reading.division.length = Length::Fixed(Period::parse("10").unwrap());
+    let mission = read(&reading).unwrap();
+    assert_eq!(mission.messages, 2000 * 21);
+    let state = server.state();
+    let (requests, read, most) = (state.requests, state.bytes, state.most_under_way);
+    assert!(requests <= 2000 + 20, "{requests} requests");
+    assert!((read as u64) * 100 < large().len, "{read} bytes");
+    assert!((16..=128).contains(&most), "{most} at a time");
+    println!("12 GB: {requests} requests, {read} bytes, {most} at a time");
+}
+
+#[test]
+fn the_beginning_of_a_large_bag_takes_few_requests() {
+    let server = server_of_large();
+    let planning = Planning {
+        align: Align::Bag,
+        ..Planning::default()
+    };
+    let planned = plan(&[server.url("large.bag")], &planning).unwrap();
+    assert_eq!(planned.bags[0].origin, Stamp(ORIGIN));
+    let requests = server.state().requests;
+    assert!(requests <= 8, "{requests} requests");
+}
+
 #[test]
 fn a_server_that_stumbles_is_asked_again() {
     let server = server_of_large();
@@ -328,6 +414,52 @@ fn what_is_refused_is_an_error_and_no_row() {
     // What is not there is a fact about the bag.
     let gone = server.count("gone.bag", CountDetail::Auto).unwrap();
     assert!(gone.bag.error.unwrap().contains("no such object"));
+}
+
+#[test]
+fn a_prefix_is_no_bag() {
+    let server = server_of_large();
+    let error = read(&Reading::of([server.url("day/")])).unwrap_err();
+    assert!(
+        error.is_usage() && error.hint().contains("bagreel tables"),
+        "{error}"
+    );
+    assert_eq!(server.state().requests, 0);
+}
+
+/// A bag of four chunks with one message each: the tail, and one request for each chunk's index and the next one's head.
+#[test]
+fn sizes_cost_no_request_of_their_own_where_a_chunk_holds_one_message() {
+    let server = Server::with(&[("a.bag", one_message_in_each_chunk())]);
+    let output = Command::new(env!("CARGO_BIN_EXE_bagreel"))
+        .args([
+            "extract",
+            &server.url("a.bag"),
+            "-o",
+            "-",
+            "--format",
+            "csv",
+        ])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let sizes: Vec<&str> = text
+        .lines()
+        .skip(1)
+        .filter_map(|l| l.rsplit(',').next())
+        .collect();
+    assert_eq!(sizes, ["300004"; 4], "{text}");
+    let state = server.state();
+    assert!(state.requests <= 2 + 5, "{:?}", state.asked);
+    assert!(state.bytes < 160_000, "{} bytes", state.bytes);
+}
+
+fn one_message_in_each_chunk() -> Vec<u8> {
+    let mut recording = Recording::default();
+    let talks = recording.publisher("/talker", "/chatter", "std_msgs/String");
+    let text = [&300_000u32.to_le_bytes()[..], &[b'a'; 300_000]].concat();
+    recording.send(talks, (0, 4000), 1000, &text);
+    rosbag1::write(&recording, rosbag1::Pack::None, 1000)
 }
 
 #[test]
@@ -419,13 +551,22 @@ fn the_command_tells_of_an_object_as_of_a_file() {
     let (far, near) = (server.url("warehouse.bag"), path.to_string_lossy());
     let rows = |bag: &str| tells(&["extract", bag, "-o", "-", "--format", "csv"]);
     assert_eq!(rows(&far), rows(&near));
-    // Payloads that are far away are not compared with each other, which tells one subscription more.
+    // Payloads that are far away are not compared with each other, which tells one subscription more, unless they are
+    // asked for.
     let info = |bag: &str| -> Vec<String> {
         let row = tells(&["info", bag, "--format", "csv"]);
         let cells = row.lines().nth(1).unwrap().split(',');
         cells.take(12).map(str::to_owned).collect()
     };
     assert_eq!(info(&far), info(&near));
+    let all = |bag: &str| -> serde_json::Value {
+        let text = tells(&["info", bag, "--format", "json", "--infer", "payloads"]);
+        let mut info: serde_json::Value = serde_json::from_str(&text).unwrap();
+        // The version of the object, which a file has not.
+        info["bags"][0]["facts"].take();
+        info
+    };
+    assert!(all(&far) == all(&near));
 }
 
 #[test]

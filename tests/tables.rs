@@ -80,6 +80,17 @@ fn topics_and_times_choose_rows_with_their_sizes() {
     );
     assert!(said.contains("leave nothing"), "{said}");
     assert!(!dir.path().join("x.csv").exists());
+    // A name that is mistyped is told.
+    let nothing = [
+        "extract",
+        WAREHOUSE,
+        "-o",
+        "x.csv",
+        "--topic-filter",
+        "/robot1/odm",
+    ];
+    let said = ends(dir.path(), &nothing, 0);
+    assert!(said.contains("a topic that `/robot1/odm` takes"), "{said}");
 }
 
 #[test]
@@ -231,9 +242,41 @@ fn a_survey_loses_no_recording() {
         failed,
         ["a.bag", "broken.db3", "deep/er/b.bag", "ros2/stranger.bag"]
     );
+    // What cannot be read is as large as it is, and not whole.
+    let cell = |path: &str, column: &str| {
+        let at = rows[0].iter().position(|c| c == column).unwrap();
+        let row = rows.iter().find(|r| r[0] == path).unwrap();
+        row[at].clone()
+    };
+    assert_eq!(cell("a.bag", "file_bytes"), "13");
+    assert_eq!(cell("a.bag", "is_complete"), "false");
+    assert_eq!(cell("loose.mcap", "is_complete"), "true");
     // A recording with nothing beside it is no survey.
     let one = bagreel(dir.path(), &["info", "parts"]);
     assert!(String::from_utf8(one.stdout).unwrap().contains("messages"));
+}
+
+#[test]
+#[cfg(unix)]
+fn a_link_to_a_bag_is_a_bag_and_a_link_to_a_folder_is_none() {
+    use std::os::unix::fs::symlink;
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir(dir.path().join("fleet")).unwrap();
+    symlink(COURIER, dir.path().join("fleet/a.mcap")).unwrap();
+    symlink(COURIER, dir.path().join("fleet/b.mcap")).unwrap();
+    symlink(dir.path().join("gone"), dir.path().join("fleet/c.mcap")).unwrap();
+    symlink("/dev/zero", dir.path().join("fleet/d.mcap")).unwrap();
+    symlink(dir.path(), dir.path().join("fleet/round")).unwrap();
+    let output = bagreel(dir.path(), &["info", "fleet", "--format", "csv"]);
+    fs::write(dir.path().join("survey.csv"), &output.stdout).unwrap();
+    let rows = csv(&dir.path().join("survey.csv"));
+    let paths: Vec<&str> = rows[1..].iter().map(|r| r[0].as_str()).collect();
+    assert_eq!(paths, ["a.mcap", "b.mcap", "c.mcap"]);
+    let said = ends(dir.path(), &["tables", "fleet", "-o", "t"], 3);
+    assert!(
+        said.contains("3 bags (1 unreadable), 6472 messages"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -20,14 +20,17 @@ use std::sync::Arc;
 use crate::bag::adapters::{Clip, GROUP, in_order};
 use crate::bag::decompress::Compression;
 use crate::bag::input::{BagPlace, file_name};
-use crate::bag::model::{Connection, Lumps, OpenOptions, Reader, Report, Sink, Tier, Want};
-use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
+use crate::bag::model::{
+    Connection, ConnectionId, Lumps, OpenOptions, Reader, Report, Sink, Tier, Want,
+};
+use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
 use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
+use plan::MOST_LOOKED_INTO;
 pub(crate) use plan::{Chunk, ChunkPlan, MOST_CHUNKS, Unindexed, Used};
 pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass};
 
@@ -158,6 +161,11 @@ impl<G: Grammar> Reader for Indexed<G> {
         };
         let wants = vec![Want::Stamps; plan.connections.list().len()];
         let query = self.query(plan, &wants, None);
+        if plan.chunks.len() <= MOST_LOOKED_INTO {
+            let chunks: Vec<&Chunk> = plan.chunks.iter().collect();
+            // As in `by_index`.
+            let _ = self.source.expect(&indexes(&chunks));
+        }
         Ok(plan.span(|chunk, sink| query.read(chunk, sink)))
     }
 
@@ -206,11 +214,13 @@ impl<G: Grammar> Indexed<G> {
         let groups: Vec<&[&Chunk]> = chunks.chunks(GROUP).collect();
         let work = |at: usize, sink: &mut dyn Sink| {
             // What cannot be had now is asked for again, and told then.
-            let _ = self.source.expect(&indexes(groups[at]));
+            let mut places = indexes(groups[at]);
+            places.extend(self.heads(plan, groups[at], &wants));
+            let _ = self.source.expect(&places);
             groups[at].iter().for_each(|chunk| query.read(chunk, sink));
         };
         let total = groups.len() as u64;
-        let threads = threads(chunks.len(), plan.longest_index());
+        let threads = threads(chunks.len(), plan.longest_index(), self.source.is_far());
         in_order(groups.len(), threads, &work, sink, |at, sink| {
             sink.progress(at as u64 + 1, total);
         });
@@ -223,6 +233,18 @@ impl<G: Grammar> Indexed<G> {
             complete: !sink.lost,
             ..self.report(tier, &compression)
         }
+    }
+
+    /// The places of the heads, with a first message's, of those of these chunks that hold messages of which more than the
+    /// time is wanted, if they are far away.
+    fn heads(&self, plan: &ChunkPlan, chunks: &[&Chunk], wants: &[Want]) -> Vec<Range<u64>> {
+        if !self.source.is_far() {
+            return Vec::new();
+        }
+        let is_wanted = |id: ConnectionId| wants[id.0 as usize] > Want::Stamps;
+        let chunks = chunks.iter().filter(|chunk| plan.holds(chunk, is_wanted));
+        let head = |chunk: &&Chunk| chunk.start..chunk.start + 2 * GLANCE as u64;
+        chunks.map(head).collect()
     }
 
     /// Counts chunks as a whole where that is asked for and enough; returns the other chunks, and the way the bag is
@@ -347,10 +369,13 @@ impl<G: Grammar> Reader for Piped<G> {
 }
 
 /// The number of threads worth using for `chunks` chunks of which the longest index takes `index` bytes: the reads wait
-/// for the disk, and a long index takes memory.
-fn threads(chunks: usize, index: u64) -> usize {
+/// for the disk, or for a store, and a long index takes memory.
+fn threads(chunks: usize, index: u64, is_far: bool) -> usize {
     if index > LONGEST_INDEX / 16 {
         return 1;
+    }
+    if is_far {
+        return (chunks / GROUP).clamp(1, 16);
     }
     (chunks / 256).clamp(1, 8)
 }

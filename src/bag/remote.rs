@@ -145,6 +145,10 @@ impl Ranges for Remote {
             .chunks(TOGETHER)
             .try_for_each(|ranges| self.fetch(ranges).map(drop))
     }
+
+    fn is_far(&self) -> bool {
+        true
+    }
 }
 
 impl Remote {

@@ -20,6 +20,11 @@ pub(crate) trait Ranges: Debug + Send + Sync {
     fn expect(&self, _ranges: &[Range<u64>]) -> io::Result<()> {
         Ok(())
     }
+
+    /// Whether each answer is waited for so long that asking for much at a time is worth it.
+    fn is_far(&self) -> bool {
+        false
+    }
 }
 
 /// A regular file, or an object somewhere else, that several threads read at any place at once. It counts the bytes it
@@ -59,6 +64,11 @@ impl FileSource {
     /// An error of the system.
     pub(crate) fn expect(&self, ranges: &[Range<u64>]) -> io::Result<()> {
         self.from.expect(ranges)
+    }
+
+    /// As [`Ranges::is_far`].
+    pub(crate) fn is_far(&self) -> bool {
+        self.from.is_far()
     }
 
     /// The path, as it was opened.
@@ -176,6 +186,8 @@ pub(crate) struct ByteStream<'a> {
 pub(crate) const FAR: usize = 256 * 1024;
 /// The step for picking small records here and there.
 pub(crate) const NEAR: usize = 4096;
+/// The step for the heads of records in a source that is far away.
+pub(crate) const GLANCE: usize = 512;
 
 impl<'a> ByteStream<'a> {
     /// The bytes `start..end` of a file, `step` at a time.

@@ -3,6 +3,7 @@
 use crate::bag::Input;
 use crate::base::error::Error;
 use crate::base::notice::Notices;
+use crate::base::words::visible;
 use crate::cli::args::ExtractArgs;
 use crate::cli::terminal::Terminal;
 use crate::export::check;
@@ -20,6 +21,12 @@ pub(super) fn extract(
     let job = job(args, inputs)?;
     let done = pipeline::extract(&job, terminal)?;
     terminal.notices(&done.notices);
+    if let Some(filter) = args.topic_filter.as_ref().filter(|_| done.rows == 0) {
+        let filter = visible(filter);
+        terminal.say(&format!(
+            "no message in that time is of a topic that `{filter}` takes"
+        ));
+    }
     if job.target != Target::Stdout {
         let tables = match (job.fields, done.tables) {
             (false, _) => String::new(),

@@ -1,10 +1,9 @@
 //! `bagreel tables`: its arguments, turned into the tables of a fleet.
 
-use std::io::Read as _;
 use std::path::Path;
 
 use super::{DONE, FAILED, SKIPPED};
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::base::{budget, file, words};
 use crate::cli::args::tables::TablesArgs;
 use crate::cli::terminal::Terminal;
@@ -69,16 +68,13 @@ fn told(done: &Tabled) -> String {
 
 /// The bags in a list: zero bytes stand between names that may hold line ends.
 fn listed(manifest: &Path) -> Result<Vec<String>> {
-    let text = if manifest == Path::new("-") {
-        let mut text = String::new();
-        let read = std::io::stdin()
-            .take(budget::MANIFEST)
-            .read_to_string(&mut text);
-        read.map_err(Error::io("read", manifest))?;
-        text
+    let bytes = if manifest == Path::new("-") {
+        file::read_from(std::io::stdin(), manifest, budget::MANIFEST)?
     } else {
-        file::read_text(manifest, budget::MANIFEST)?
+        file::read(manifest, budget::MANIFEST)?
     };
+    // A name that is no UTF-8 is told, and found, by what is left of it.
+    let text = String::from_utf8_lossy(&bytes);
     let between = if text.contains('\0') { '\0' } else { '\n' };
     let lines = text.split(between).map(|line| line.trim_end_matches('\r'));
     let lines = lines.filter(|line| !line.trim().is_empty());

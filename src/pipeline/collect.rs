@@ -54,14 +54,15 @@ pub(super) fn collect(reading: &Reading, verify: bool, watch: &mut dyn Watch) ->
     })
 }
 
-/// The options of collecting, without the payloads of bags too large to be compared: an index would be of no use if
-/// every payload were read.
+/// The options of collecting, without the payloads of bags that are too large, or too far away, to be compared: an index
+/// would be of no use if every payload were read. Where all are asked for they are read.
 fn affordable(reading: &Reading) -> collector::CollectOptions {
     let mut options = reading.collect.clone();
     let sizes = reading.inputs.iter().filter_map(bag::size_on_disk);
     let is_far = |input: &Input| matches!(input, Input::Url(_));
     let is_large = sizes.fold(0, u64::saturating_add) > options.payload_bytes;
-    if is_large || reading.inputs.iter().any(is_far) {
+    let is_bounded = options.payload_bytes < u64::MAX;
+    if is_bounded && (is_large || reading.inputs.iter().any(is_far)) {
         options.payload_bytes = 0;
     }
     options

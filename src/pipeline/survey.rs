@@ -8,7 +8,8 @@ use super::{Reading, Watch, read};
 use crate::bag::{self, Input, InputKind};
 use crate::base::error::{Error, Result};
 use crate::export::tables::{TableFormat, writer};
-use crate::mission::info::{SurveyRow, info, survey_table};
+use crate::mission::Mission;
+use crate::mission::info::{SurveyRow, survey_table};
 
 /// The rows of a survey as a file of this format.
 ///
@@ -65,32 +66,40 @@ pub fn survey(folder: &Path, reading: &Reading, watch: &mut dyn Watch) -> Result
             own if own == Path::new("") => ".".to_owned(),
             below => below.display().to_string(),
         };
+        let input = Input::Path(path);
+        let size = bag::size_on_disk(&input);
         let one = Reading {
-            inputs: vec![Input::Path(path)],
+            inputs: vec![input],
             ..reading.clone()
         };
-        let read = read(&one, watch);
-        skipped |= match &read {
-            Ok(mission) => mission.notices.any_loss(),
-            // An empty bag may be a whole one.
-            Err(Error::NoMessages { hint, .. }) => hint != NOTHING_RECORDED,
-            Err(_) => true,
-        };
-        match read {
-            Ok(mission) => SurveyRow {
-                path: shown,
-                error: None,
-                info: Some(info(&mission)),
-            },
-            Err(error) => SurveyRow {
-                path: shown,
-                error: Some(error.to_string()),
-                info: None,
-            },
-        }
+        let row = surveyed(shown, size, read(&one, watch));
+        skipped |= !row.is_complete;
+        row
     };
     let rows = bags.into_iter().map(row).collect();
     Ok(Survey { rows, skipped })
+}
+
+/// The row of a bag that was read, or not.
+fn surveyed(path: String, size: Option<u64>, read: Result<Mission>) -> SurveyRow {
+    let row = SurveyRow {
+        path,
+        file_bytes: size,
+        ..SurveyRow::default()
+    };
+    match read {
+        Ok(mission) => SurveyRow::of(row.path, &mission),
+        // An empty bag may be a whole one.
+        Err(Error::NoMessages { path, hint }) => SurveyRow {
+            is_complete: hint == NOTHING_RECORDED,
+            error: Some(format!("`{}` holds no messages: {hint}", path.display())),
+            ..row
+        },
+        Err(error) => SurveyRow {
+            error: Some(error.to_string()),
+            ..row
+        },
+    }
 }
 
 /// Every recording below `folder`, a path each, in order of names; the folder itself where it is one.
@@ -104,7 +113,9 @@ pub(super) fn recordings(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Adds every recording in `folder` in order of names: the folder itself where it is one, each other file that is a
-/// bag, and those of the folders in it. Links are not followed.
+/// bag, and those of the folders in it. A link to a file is that file, as tools that keep large files elsewhere leave
+/// them (DVC, git-annex), and a bag that cannot be read where that is not there; links to folders, which may lead round,
+/// are not followed.
 fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
     let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
@@ -115,12 +126,11 @@ fn find(folder: &Path, deeper: usize, bags: &mut Vec<PathBuf>) -> Result<()> {
         paths.retain(|path| !parts.contains(path));
     }
     for path in paths {
-        let Ok(meta) = fs::symlink_metadata(&path) else {
-            continue;
-        };
-        if meta.is_file() && is_bag(&path) {
+        let is_own = fs::symlink_metadata(&path).is_ok_and(|meta| !meta.is_symlink());
+        let is_gone = !is_own && !path.exists();
+        if (path.is_file() && is_bag(&path)) || (is_gone && is_named(&path)) {
             bags.push(path);
-        } else if meta.is_dir() && deeper > 0 {
+        } else if is_own && path.is_dir() && deeper > 0 {
             // A folder below that may not be read hides its bags, not the others.
             let _ = find(&path, deeper - 1, bags);
         }
@@ -168,16 +178,16 @@ fn numbered(path: &Path) -> Option<String> {
 
 /// Whether a path is a bag by its first bytes, or has the ending of one: a broken bag has its row too.
 fn is_bag(path: &Path) -> bool {
-    let named = path.is_file()
-        && bag::FORMATS
-            .iter()
-            .flat_map(|f| f.extensions)
-            .any(|e| ends_in(path, e));
-    named
+    is_named(path)
         || matches!(
             bag::sniff(&Input::Path(path.to_owned())),
             Ok(InputKind::Bag(_))
         )
+}
+
+fn is_named(path: &Path) -> bool {
+    let mut endings = bag::FORMATS.iter().flat_map(|format| format.extensions);
+    endings.any(|ending| ends_in(path, ending))
 }
 
 fn ends_in(path: &Path, extension: &str) -> bool {

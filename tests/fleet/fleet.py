@@ -90,10 +90,13 @@ def children(pid):
     return found
 
 
-def kill_one(pid, what, after, until=30):
-    """Kills the first process below `pid` whose command line holds `what`, `after` seconds from when it is there."""
+def kill_one(pid, what, after, until=30, once=lambda: True):
+    """Kills the first process below `pid` whose command line holds `what`, `after` seconds from when it is there, not
+    before `once`."""
     def run():
         end = time.time() + until
+        while not once() and time.time() < end:
+            time.sleep(0.001)
         while time.time() < end:
             found = [child for child, command in children(pid) if what in command]
             if found:
@@ -119,10 +122,14 @@ def xargs(fleet, folder, expected):
     to = folder / "shards_killed"
     started = time.time()
     process = shards(fleet, to)
-    killer = kill_one(process.pid, "--shard", 0.1)
+    # A worker is there for a tenth of a second.
+    begun = lambda: len(list((to / "bags").glob("*.parquet"))) >= COPIES // 16
+    killer = kill_one(process.pid, "--shard", 0, once=begun)
     process.wait()
     killer.join()
     before = len(list((to / "bags").glob("*.parquet")))
+    if before == COPIES:
+        FAILED.append("the worker had done all when it was killed")
     for file in [*(to / "counts").glob("*"), *(to / "bags").glob("*")]:
         assert file.suffix == ".parquet" and pq.read_metadata(file).num_rows >= 0, file
     shards(fleet, to).wait()
@@ -148,6 +155,7 @@ def sail(fleet, folder, expected):
     from pyspark.sql import SparkSession
 
     os.environ.setdefault("SAIL_MODE", "local-cluster")
+    os.environ.setdefault("RUST_LOG", "warn")
     server = SparkConnectServer("127.0.0.1", 0)
     server.start(background=True)
     spark = SparkSession.builder.remote(f"sc://127.0.0.1:{server.listening_address[1]}").getOrCreate()

@@ -103,6 +103,10 @@ def large(path, chunks):
     return path
 
 
+MANY = 100
+"""Chunks of a bag of which all indexes are read."""
+
+
 def run(fleet, folder, expected, tell, chunks, command):
     import boto3
     from moto.server import ThreadedMotoServer
@@ -147,6 +151,19 @@ def run(fleet, folder, expected, tell, chunks, command):
     near = bagreel.tables(big, tier="chunks")
     cells = lambda tables: [{k: v for k, v in row.items() if k not in ("mission", "bag")} for row in tables["counts"].to_pyarrow().to_pylist()]
     assert cells(far) == cells(near) and sum(row["n"] for row in cells(far)) == chunks
+
+    # A picture of it needs nothing else.
+    few = bagreel.finish(far["counts"])
+    assert bagreel.to_dict(few)["messages"] == chunks and len(few) > 5
+    # Every message's time, of a smaller one: moto reads all of an object for each part of it.
+    many = large(folder / "many.bag", MANY)
+    s3.upload_file(str(many), "fleet", "many.bag")
+    rules.update(requests=0, bytes=0)
+    mission = bagreel.read("s3://fleet/many.bag", period="10s").to_json()
+    share = rules["bytes"] / many.stat().st_size
+    print(f"S3, the mission of a bag of {MANY} chunks: {rules['requests']} requests, {rules['bytes']} bytes ({share:.2%})")
+    assert rules["requests"] <= MANY + 20 and share <= 0.01
+    assert mission == bagreel.read(many, period="10s").to_json()
 
     def refused(what):
         try:

@@ -54,6 +54,14 @@ def duckdb_takes_them():
     assert duckdb.sql("SELECT sum(n) FROM counts").fetchall() == [(26_719,)]
 
 
+def polars_takes_them():
+    import polars
+
+    counts = bagreel.tables(WAREHOUSE)["counts"]
+    frame = polars.DataFrame(counts)
+    assert frame["n"].sum() == 26_719 and frame.columns == counts.column_names
+
+
 def parts_make_the_whole():
     whole = bagreel.tables(WAREHOUSE)["counts"].to_pyarrow()
     starts = sorted(set(whole["start_ns"].to_pylist()))
@@ -135,7 +143,7 @@ def the_command_is_there():
 def main():
     failed = 0
     for test in (
-        tables_are_arrow, tables_outlive_their_owner, duckdb_takes_them, parts_make_the_whole, missions_are_read,
+        tables_are_arrow, tables_outlive_their_owner, duckdb_takes_them, polars_takes_them, parts_make_the_whole, missions_are_read,
         plans_name_every_bag, pictures_are_drawn, errors_have_their_types, other_threads_go_on, the_command_is_there,
     ):  # fmt: skip
         try:

@@ -10,7 +10,7 @@ use super::record::{NoRecord, RecordHead};
 use super::unpack::{Visitor, unpack};
 use crate::bag::adapters::Gather;
 use crate::bag::model::{Sink, Want, lost};
-use crate::bag::source::{ByteStream, FAR, NEAR};
+use crate::bag::source::{ByteStream, FAR, GLANCE, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
@@ -103,7 +103,8 @@ impl<G: Grammar> Query<'_, G> {
 
     /// The chunk's compression and the place of its body.
     pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<ChunkBody>> {
-        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, NEAR);
+        let step = if self.source.is_far() { GLANCE } else { NEAR };
+        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, step);
         let head = match G::next(&mut stream) {
             Ok(RecordHead::Chunk(head)) => head,
             Err(NoRecord::Io(e)) => return Err(e),

@@ -9,7 +9,7 @@ use super::Grammar;
 use super::record::{Connections, RecordHead};
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{ConnectionId, MOST_PAYLOAD, Message, Sink, Want};
-use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
+use crate::bag::source::{ByteStream, FAR, FileSource, GLANCE, NEAR};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::{Span, Stamp};
 
@@ -168,7 +168,12 @@ impl<G: Grammar> Query<'_, G> {
     ) -> Option<Vec<u32>> {
         let mut sizes = vec![0; index.stamps.len()];
         let mut missing = 0;
-        let plain = body.and_then(|b| b.plain(self.source, step(wanted), &self.allowance).ok());
+        let step = self.step(index, wanted);
+        if let Some(body) = body.as_ref().filter(|_| self.source.is_far()) {
+            // What cannot be had now is asked for again, and told then.
+            let _ = self.source.expect(&ahead(body, wanted, step));
+        }
+        let plain = body.and_then(|b| b.plain(self.source, step, &self.allowance).ok());
         match plain {
             None => missing = wanted.len(),
             Some((mut stream, base)) => {
@@ -185,6 +190,18 @@ impl<G: Grammar> Query<'_, G> {
         }
         absent(sink, missing as u64);
         None
+    }
+
+    /// The number of bytes to read at a time for these messages.
+    fn step(&self, index: &Index, wanted: &[Wanted]) -> usize {
+        let is_size = |one: &Wanted| {
+            let id = self.connections.get(index.runs[one.run].0);
+            id.is_none_or(|id| self.wants[id.0 as usize] <= Want::Sizes)
+        };
+        match step(wanted) {
+            NEAR if self.source.is_far() && wanted.iter().all(is_size) => GLANCE,
+            step => step,
+        }
     }
 
     /// Reports one wanted message to `sink`; returns its size, or `None` if it is not there.
@@ -227,6 +244,27 @@ struct Wanted {
     entry: usize,
     run: usize,
 }
+
+/// The most messages of a chunk whose places are asked for at once.
+const MOST_AHEAD: usize = 256;
+
+/// The places of the beginnings of these messages, or of the whole chunk where they are packed.
+fn ahead(body: &ChunkBody, wanted: &[Wanted], step: usize) -> Vec<Range<u64>> {
+    let Range { start, end } = body.range;
+    if body.how != Compression::None {
+        let last = start.saturating_add(MOST_PACKED);
+        return vec![start..end.min(last)];
+    }
+    let step = step as u64;
+    let place = |one: &Wanted| {
+        let at = start.saturating_add(one.offset).min(end);
+        at..at.saturating_add(step).min(end)
+    };
+    wanted.iter().take(MOST_AHEAD).map(place).collect()
+}
+
+/// The most packed bytes that are asked for at once.
+const MOST_PACKED: u64 = 4 << 20;
 
 /// The number of bytes to read at a time for these messages, in order: far if the next one lies in the next few pages.
 fn step(wanted: &[Wanted]) -> usize {

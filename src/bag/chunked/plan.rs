@@ -50,6 +50,9 @@ pub(crate) struct ChunkPlan {
 /// The most chunks that are planned for: a tail of at most 100 MB in memory, a bag of at least 768 GB.
 pub(crate) const MOST_CHUNKS: usize = 1 << 20;
 
+/// The most chunks that are all looked into to know the time that they cover.
+pub(super) const MOST_LOOKED_INTO: usize = 512;
+
 /// The most message counts of chunks that are kept, 16 MB: a bag of 30,000 chunks with 60 connections in each.
 const MOST_COUNTS: usize = 1 << 21;
 
@@ -76,6 +79,13 @@ impl ChunkPlan {
         (Some(sum) == chunk.promised.map(|p| p.messages)).then_some(lump)
     }
 
+    /// Whether `chunk` is stated to hold messages of a wanted connection; `false` if its counts are not kept.
+    pub(super) fn holds(&self, chunk: &Chunk, is_wanted: impl Fn(ConnectionId) -> bool) -> bool {
+        let counts = self.counts.get(chunk.counts.clone());
+        let mut counts = counts.into_iter().flatten();
+        counts.any(|(raw, count)| *count > 0 && self.connections.get(*raw).is_some_and(&is_wanted))
+    }
+
     /// The number of bytes of the longest index.
     pub(super) fn longest_index(&self) -> u64 {
         let len = |c: &Chunk| c.index.end - c.index.start;
@@ -87,7 +97,7 @@ impl ChunkPlan {
     pub(super) fn span(&self, read: impl Fn(&Chunk, &mut dyn Sink)) -> Option<Span> {
         let mut seen = Extremes::default();
         let full: Vec<&Chunk> = self.chunks.iter().filter(|c| c.holds_messages()).collect();
-        if full.len() <= 512 {
+        if full.len() <= MOST_LOOKED_INTO {
             for chunk in full {
                 read(chunk, &mut seen);
             }

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use super::{Opened, Refused};
-use crate::bag::input::{BagPlace, HEAD, Medium};
+use crate::bag::input::{BagPlace, HEAD, Medium, told_url};
 use crate::bag::model::{ETAG, OpenOptions, Reader, Report, Sink};
 use crate::bag::source::{FAR, FileSource, Temporary};
 use crate::bag::unknown::explain;
@@ -26,6 +26,13 @@ struct Watched {
 
 /// Opens the bag at `url`.
 pub(crate) fn open(url: &str, options: &OpenOptions) -> Result<Box<dyn Reader>> {
+    if url.ends_with('/') {
+        let what = format!("`{}` is the beginning of names, and no bag", told_url(url));
+        return Err(Error::usage(
+            what,
+            "name one bag; `bagreel tables` counts all of a store",
+        ));
+    }
     let Opened {
         source,
         etag,

@@ -19,6 +19,7 @@ use object_store::{
     ObjectStoreExt as _, RetryConfig,
 };
 use tokio::runtime::{Builder, Runtime};
+use tokio::sync::Semaphore;
 use url::Url;
 
 use crate::base::error::Error;
@@ -28,6 +29,8 @@ use crate::base::error::Error;
 const RETRIES: usize = 5;
 /// See [`RETRIES`].
 const RETRY_SECONDS: u64 = 60;
+/// The most requests under way at a time, whoever asks: each is an open connection, of which a process may have few.
+const MOST_ASKED: usize = 128;
 /// The most objects below one prefix.
 const MOST_LISTED: usize = 1 << 20;
 
@@ -127,6 +130,8 @@ fn innermost(error: &StoreError) -> String {
     }
     inner.to_string().chars().take(MOST_SAID).collect()
 }
+
+static ASKED: Semaphore = Semaphore::const_new(MOST_ASKED);
 
 type StoreResult<T> = Result<T, StoreRefusal>;
 
@@ -266,6 +271,8 @@ impl Object {
     }
 
     async fn part(&self, range: Range<u64>) -> StoreResult<Vec<u8>> {
+        // It is never closed.
+        let _turn = ASKED.acquire().await;
         let is_strong = |etag: &&String| !etag.starts_with("W/");
         let is_dated = self.etag.is_none() && self.meta.last_modified.timestamp() > 0;
         let options = GetOptions {

@@ -18,7 +18,11 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
     let (header, len) = match records::header(&mut stream) {
         Ok(found) => found,
         Err(NoRecord::Io(e)) => return Err(e),
-        Err(_) => return Ok(Unindexed::because("its head is damaged")),
+        Err(error) => {
+            let cut = matches!(error, NoRecord::End | NoRecord::Cut);
+            let why = "its head is damaged".to_owned();
+            return Ok(Err(Unindexed { why, cut }));
+        }
     };
     let Header::Bag {
         index_pos,

@@ -2,20 +2,39 @@
 
 use serde::Serialize;
 
-use super::Info;
+use super::{Info, info};
 use crate::base::table::{Batch, ColumnKind, TableCell};
 use crate::base::time::Stamp;
 use crate::base::words::{self, visible};
+use crate::mission::Mission;
 
 /// A bag in a survey.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SurveyRow {
     /// The path relative to the folder surveyed.
     pub path: String,
-    /// The reason why it could not be read; everything below is then empty.
+    /// Its size in bytes; `None` where that is not known.
+    pub file_bytes: Option<u64>,
+    /// Whether nothing of it was lost; an empty bag may be a whole one.
+    pub is_complete: bool,
+    /// The reason why there is no summary, which is then empty.
     pub error: Option<String>,
     /// The summary of the bag.
     pub info: Option<Info>,
+}
+
+impl SurveyRow {
+    /// The row of what was read.
+    pub(crate) fn of(path: String, mission: &Mission) -> Self {
+        let info = info(mission);
+        Self {
+            path,
+            file_bytes: Some(info.bags.iter().map(|bag| bag.file_bytes).sum()),
+            is_complete: !mission.notices.any_loss(),
+            error: None,
+            info: Some(info),
+        }
+    }
 }
 
 const COLUMNS: &[(&str, ColumnKind)] = &[
@@ -40,6 +59,9 @@ const COLUMNS: &[(&str, ColumnKind)] = &[
     ("error", ColumnKind::Text),
 ];
 
+/// The place of the column `is_complete`, behind which `file_bytes` stands.
+const COMPLETE: usize = 4;
+
 /// The survey as a table, a row per bag, readable or not.
 pub(crate) fn survey_table(rows: &[SurveyRow]) -> Batch {
     let mut table = Batch::new(COLUMNS);
@@ -54,6 +76,8 @@ fn cells(row: &SurveyRow) -> Vec<TableCell<'_>> {
     let Some(info) = &row.info else {
         let mut cells = vec![TableCell::Null; COLUMNS.len()];
         cells[0] = path;
+        cells[COMPLETE] = TableCell::Flag(row.is_complete);
+        cells[COMPLETE + 1] = TableCell::known(row.file_bytes, TableCell::count);
         cells[COLUMNS.len() - 1] = TableCell::known(row.error.as_deref(), TableCell::text);
         return cells;
     };
@@ -64,8 +88,8 @@ fn cells(row: &SurveyRow) -> Vec<TableCell<'_>> {
         TableCell::known(bag, |b| TableCell::text(&b.format)),
         TableCell::known(bag, |b| TableCell::text(b.compression.join(" "))),
         TableCell::known(bag, |b| TableCell::text(b.tier)),
-        TableCell::known(bag, |b| TableCell::Flag(b.complete)),
-        TableCell::known(bag, |b| TableCell::count(b.file_bytes)),
+        TableCell::Flag(row.is_complete),
+        TableCell::known(row.file_bytes, TableCell::count),
         TableCell::Time(Stamp(info.start_ns)),
         TableCell::Float(info.duration_s),
         TableCell::count(info.messages),
@@ -122,7 +146,7 @@ fn text_row(row: &SurveyRow) -> Vec<String> {
     vec![
         visible(&row.path).into_owned(),
         bag.map(|b| b.format.clone()).unwrap_or_default(),
-        bag.map(|b| words::bytes(b.file_bytes)).unwrap_or_default(),
+        row.file_bytes.map(words::bytes).unwrap_or_default(),
         Stamp(info.start_ns).to_string().chars().take(19).collect(),
         words::offset_seconds(info.end_ns.saturating_sub(info.start_ns)),
         info.messages.to_string(),

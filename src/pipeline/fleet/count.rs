@@ -66,7 +66,7 @@ pub fn count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBag> {
 /// As [`count()`], with an error for a bag that cannot be read.
 pub(super) fn try_count(planned: &PlannedBag, tally: &Tally) -> Result<CountedBag> {
     let mut taken = BagTally::new(planned.origin, tally.period);
-    let report = read(&Input::parse(&planned.uri), planned, tally, &mut taken)?;
+    let report = read(&planned.input(), planned, tally, &mut taken)?;
     let counts = taken.counts(planned, &report).map_err(spool_error)?;
     let mut bag = row(planned, tally);
     bag.take(&report, &taken);
@@ -81,7 +81,7 @@ pub(super) fn unreadable(planned: &PlannedBag, tally: &Tally, error: Error) -> R
     if matches!(error, Error::Remote { .. }) {
         return Err(error);
     }
-    let (file_bytes, etag) = version(&Input::parse(&planned.uri)).unwrap_or_default();
+    let (file_bytes, etag) = version(&planned.input()).unwrap_or_default();
     let bag = FleetBag {
         file_bytes,
         etag,

@@ -78,6 +78,45 @@ pub struct PlannedBag {
     pub origin: Stamp,
 }
 
+impl PlannedBag {
+    /// The bag itself.
+    pub(super) fn input(&self) -> Input {
+        match Input::parse(&self.uri) {
+            Input::Path(path) if self.uri.contains(UNKNOWN) && !path.exists() => {
+                Input::Path(named(&path).unwrap_or(path))
+            }
+            input => input,
+        }
+    }
+}
+
+/// The character that stands in a table for what is no UTF-8.
+const UNKNOWN: char = '\u{fffd}';
+
+/// The path whose name is no UTF-8 and told as `path`; `None` unless there is exactly one.
+fn named(path: &Path) -> Option<PathBuf> {
+    let mut real = PathBuf::new();
+    for part in path.components() {
+        let next = real.join(part);
+        if next.exists() || part.as_os_str() == "." {
+            real = next;
+            continue;
+        }
+        let folder = if real.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            &real
+        };
+        let told = part.as_os_str().to_string_lossy();
+        let names = std::fs::read_dir(folder).ok()?.flatten();
+        let names = names.map(|entry| entry.file_name());
+        let mut names = names.filter(|name| name.to_string_lossy() == told);
+        let name = names.next().filter(|_| names.next().is_none())?;
+        real.push(name);
+    }
+    Some(real)
+}
+
 /// The bags to count, sorted by mission and name, none twice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FleetPlan {
@@ -257,7 +296,7 @@ fn begin_with_missions(bags: &mut [PlannedBag]) -> Result<()> {
     for mission in bags.chunk_by_mut(|a, b| a.mission == b.mission) {
         let mut first: Option<Stamp> = None;
         for bag in mission.iter() {
-            let own = match begins(&Input::parse(&bag.uri)) {
+            let own = match begins(&bag.input()) {
                 Err(error @ Error::Remote { .. }) => return Err(error),
                 own => own.ok().flatten(),
             };

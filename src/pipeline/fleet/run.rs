@@ -205,7 +205,7 @@ impl FleetWork<'_> {
     }
 
     fn one(&self, bag: &PlannedBag) -> Result<BagOutcome> {
-        let input = Input::parse(&bag.uri);
+        let input = bag.input();
         let before = self.version(&input)?;
         if let Some(version) = &before
             && self.job.skip_existing
