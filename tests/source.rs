@@ -513,6 +513,13 @@ fn a_simulation_is_not_what_ran_where_another_launch_file_starts_the_same_nodes(
     let alone = folder(&recorded, &["/steer"], &files[..5]);
     let found = edges(alone.path(), &["--infer", "source"]);
     assert!(found.contains("/sim ? -> /out"), "{found:?}");
+    // Where the bag names nobody, either may have run: the robot, or its simulation.
+    let neither = folder(&recorded, &[], &files);
+    let shared = set(&["/steer ? -> /in", "/out -> /steer ?"]);
+    assert_eq!(edges(neither.path(), &["--infer", "source"]), shared);
+    let text = said(neither.path(), &["--infer", "source"]);
+    let why = "a launch file that fits too does without its node";
+    assert!(text.contains(why), "{text}");
 }
 
 #[test]

@@ -201,8 +201,8 @@ impl Collector {
         let Belief { span, jump } = believed(self.messages.days());
         self.notices
             .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));
-        self.notices
-            .extend(publishers::judge(&mut self.streams, &self.facts));
+        let judged = publishers::judge(&mut self.streams, &mut self.facts, &mut self.messages);
+        self.notices.extend(judged.map_err(spool_error)?);
         if self.facts.dropped > 0 {
             self.notices.add(Notice {
                 kind: NoticeKind::Damaged,
