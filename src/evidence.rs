@@ -120,7 +120,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "diagnostics",
-        about: "status names of `diagnostic_msgs/DiagnosticArray`, and its aggregator",
+        about: "statuses are named after their nodes; what publishes `/diagnostics_agg` subscribes `/diagnostics`",
         reads: &[
             (diagnostics::SHAPE, diagnostics::read),
             (diagnostics::SHAPE2, diagnostics::read),
@@ -161,7 +161,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "dynamic_reconfigure",
-        about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1",
+        about: "`<node>/parameter_descriptions` and `<node>/parameter_updates` of ROS 1 are one node's",
         conclude: &[dynamic_reconfigure::conclude],
         ..NOTHING
     },
@@ -173,14 +173,14 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "action",
-        about: "the topics of actions, and the clients in `actionlib_msgs/GoalStatusArray`",
+        about: "an action's server publishes status, feedback and result and subscribes goal and cancel; its client does the reverse",
         reads: &[(action::SHAPE, action::read)],
         conclude: &[action::conclude],
         ..NOTHING
     },
     Source {
         word: "bond",
-        about: "topics of type `bond/Status`",
+        about: "both ends of a bond (`bond/Status`) publish its topic and subscribe it",
         conclude: &[bond::conclude],
         ..NOTHING
     },
@@ -255,7 +255,7 @@ pub const SOURCES: &[Source] = &[
     },
     Source {
         word: "rosout_rule",
-        about: "every node of ROS 1 publishes `/rosout`",
+        about: "every node of ROS 1 publishes `/rosout`; the node `/rosout` passes it on to `/rosout_agg`",
         conclude: &[rosout_rule::conclude],
         ..NOTHING
     },

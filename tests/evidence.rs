@@ -1,6 +1,6 @@
 //! What bags say about the graph, against what really happened where that is known.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
@@ -89,9 +89,12 @@ fn names(built: &Built, window: usize) -> [Names; 3] {
 /// Right and wrong states of each degree, over all kinds and all windows of ten seconds.
 fn by_degree(bag: &str, truth: &str) -> Option<[[u32; 2]; 4]> {
     let (bag, truth) = (shared(bag)?, shared(truth)?);
+    Some(degrees(&graphs(&bag), &truth))
+}
+
+fn degrees((built, windows): &(Built, Vec<Span>), truth: &Path) -> [[u32; 2]; 4] {
     let truth: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(truth).unwrap()).unwrap();
-    let (built, windows) = graphs(&bag);
     let all = &built.elements;
     let node = |id: u32| all.nodes[id as usize].name.as_str();
     let topic = |id: u32| all.topics[id as usize].name.as_str();
@@ -124,7 +127,22 @@ fn by_degree(bag: &str, truth: &str) -> Option<[[u32; 2]; 4]> {
             }
         }
     }
-    Some(counts)
+    counts
+}
+
+/// Asserts that each degree is as often right as it promises.
+fn assert_promise(counts: &[[u32; 2]; 4], of: &str) {
+    for (degree, least) in [(0, 0.98), (1, 0.98), (2, 0.95), (3, 0.95)] {
+        let [right, wrong] = counts[degree].map(f64::from);
+        assert!(
+            right >= least * (right + wrong),
+            "{of}, {degree}: {counts:?}"
+        );
+    }
+    assert!(
+        counts[..3].iter().all(|[right, _]| *right > 80),
+        "{of}: {counts:?}"
+    );
 }
 
 #[test]
@@ -142,19 +160,64 @@ fn every_degree_keeps_its_promise() {
         let Some(more) = by_degree(bag, truth) else {
             return;
         };
+        // The windows of `mini_bz2.bag` begin a quarter of a second after the truth's.
+        if !bag.ends_with("norosout.bag") && !bag.ends_with("mini_bz2.bag") {
+            assert_promise(&more, bag);
+        }
         for (sum, more) in counts.iter_mut().flatten().zip(more.iter().flatten()) {
             *sum += more;
         }
     }
-    for (degree, least) in [(0, 0.98), (1, 0.98), (2, 0.95), (3, 0.95)] {
-        let [right, wrong] = counts[degree].map(f64::from);
-        println!("{degree}: {right} right, {wrong} wrong");
-        assert!(right >= least * (right + wrong), "{degree}: {counts:?}");
+    assert_promise(&counts, "all");
+}
+
+/// One connection per topic, with the header of the first: so tools write bags anew.
+fn merged(tape: &mut Tape) {
+    let mut first: BTreeMap<String, ConnectionId> = BTreeMap::new();
+    let mut order: Vec<_> = tape
+        .stamps
+        .iter()
+        .map(|(id, time, _)| (*time, *id))
+        .collect();
+    order.sort_unstable();
+    for (_, id) in order {
+        let topic = tape.connections[id.0 as usize].topic.as_str().to_owned();
+        first.entry(topic).or_insert(id);
     }
-    assert!(
-        counts[..3].iter().all(|[right, _]| *right > 100),
-        "{counts:?}"
-    );
+    let connections = tape.connections.clone();
+    let to = |id: &ConnectionId| first[connections[id.0 as usize].topic.as_str()];
+    for (id, ..) in &mut tape.stamps {
+        *id = to(id);
+    }
+    for (id, ..) in &mut tape.messages {
+        *id = to(id);
+    }
+}
+
+#[test]
+fn a_node_ends_though_its_topic_goes_on_under_its_name() {
+    let (Some(bag), Some(truth)) = (
+        shared("warehouse/warehouse.bag"),
+        shared("warehouse/truth_windows.json"),
+    ) else {
+        return;
+    };
+    let mut tape = taped(&bag);
+    merged(&mut tape);
+    let used: BTreeSet<ConnectionId> = tape.stamps.iter().map(|(id, ..)| *id).collect();
+    let found = replayed(&tape, |connection| used.contains(&connection.id));
+    assert_promise(&degrees(&found, &truth), "merged");
+    let (built, _) = &found;
+    // It was ended after three minutes; half a minute later another node took its status topic over.
+    let windows: Vec<usize> = (0..33)
+        .filter(|w| names(built, *w)[0].contains(&vec!["/mission_executor".to_owned()]))
+        .collect();
+    assert_eq!(windows, (4..18).collect::<Vec<_>>());
+    let status = |w: &usize| {
+        let edge = vec!["/mission_executor".to_owned(), "/fleet/status".to_owned()];
+        names(built, *w)[1].contains(&edge)
+    };
+    assert_eq!((0..33).filter(status).collect::<Vec<_>>(), windows);
 }
 
 /// Precision and F1 of nodes, publications and subscriptions over all windows of ten seconds.
@@ -362,31 +425,47 @@ fn shuffle<T>(list: &mut [T]) {
 fn the_order_of_messages_in_the_file_does_not_matter() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/warehouse.bag");
     let (expected, _) = graphs(&path);
-    let mut tape = Tape::default();
-    let mut reader = bag::open(&Input::Path(path), &OpenOptions::default()).unwrap();
-    reader.read(None, &mut tape).unwrap();
+    let mut tape = taped(&path);
     shuffle(&mut tape.stamps);
     shuffle(&mut tape.messages);
+    let (shuffled, _) = replayed(&tape, |_| true);
+    assert_eq!(shuffled.elements, expected.elements);
+    assert!(shuffled.graphs == expected.graphs, "some graph differs");
+    assert_eq!(shuffled.lives, expected.lives);
+}
+
+fn taped(path: &Path) -> Tape {
+    let mut tape = Tape::default();
+    let input = Input::Path(path.to_owned());
+    let mut reader = bag::open(&input, &OpenOptions::default()).unwrap();
+    reader.read(None, &mut tape).unwrap();
+    tape
+}
+
+/// The graphs of what was taped, with the connections that are wanted.
+fn replayed(tape: &Tape, wanted: impl Fn(&Connection) -> bool) -> (Built, Vec<Span>) {
     let mut collector = Collector::new(CollectOptions::default());
     let mut progress = |_, _| ();
     let mut sink = collector.bag(&mut progress);
-    for connection in &tape.connections {
+    let mut ids = BTreeMap::new();
+    for connection in tape.connections.iter().filter(|c| wanted(c)) {
+        ids.insert(
+            connection.id,
+            ConnectionId(u32::try_from(ids.len()).unwrap()),
+        );
         sink.connection(connection);
     }
     for (connection, time, data) in &tape.messages {
         let size = u32::try_from(data.len()).unwrap();
         sink.message(Message {
-            connection: *connection,
+            connection: ids[connection],
             time: *time,
             data,
             size,
         });
     }
     for (id, time, size) in &tape.stamps {
-        sink.stamps(*id, &[*time], size.as_ref().map(std::slice::from_ref));
+        sink.stamps(ids[id], &[*time], size.as_ref().map(std::slice::from_ref));
     }
-    let (shuffled, _) = built(collector);
-    assert_eq!(shuffled.elements, expected.elements);
-    assert!(shuffled.graphs == expected.graphs, "some graph differs");
-    assert_eq!(shuffled.lives, expected.lives);
+    built(collector)
 }

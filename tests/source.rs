@@ -397,6 +397,62 @@ fn a_hostile_repository_does_nothing() {
     assert!(!folder.path().join("sprung").exists(), "something was run");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_git_file_leads_only_to_a_repository_that_knows_the_folder() {
+    let folder = folder(
+        &[("/out", STRING)],
+        &["/n"],
+        &[PACKAGE, ("p/p/n.py", &node("n", "out", "x"))],
+    );
+    let workspace = folder.path().join("ws");
+    let git = |at: &Path, words: &[&str]| {
+        let mut command = Command::new("git");
+        let named = ["-c", "user.name=a", "-c", "user.email=a@b"];
+        let command = command.current_dir(at).args(named).args(words);
+        let command = command.env("GIT_COMMITTER_DATE", "2023-12-24T12:00:00Z");
+        command.output().is_ok_and(|done| done.status.success())
+    };
+    if !git(&workspace, &["init", "-q"]) {
+        println!("skipped: git is not there");
+        return;
+    }
+    assert!(git(&workspace, &["add", "."]) && git(&workspace, &["commit", "-qm", "x"]));
+    let read = |at: &str| {
+        let output = bagreel(folder.path(), &["info", "run.mcap", "--source", at]);
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(git(&workspace, &["worktree", "add", "-q", "../tree"]));
+    assert!(
+        read("tree").contains("code of 2023-12-24"),
+        "{}",
+        read("tree")
+    );
+    let outer = folder.path().join("outer");
+    fs::create_dir(&outer).unwrap();
+    let module = ["-c", "protocol.file.allow=always", "submodule", "add", "-q"];
+    let module = [&module[..], &["../ws", "sub"]].concat();
+    assert!(git(&outer, &["init", "-q"]) && git(&outer, &module));
+    let sub = read("outer/sub");
+    assert!(sub.contains("code of 2023-12-24"), "{sub}");
+    // Names the repository of another folder.
+    for way in ["file", "link"] {
+        let foreign = folder.path().join(way);
+        fs::create_dir(&foreign).unwrap();
+        fs::write(foreign.join("package.xml"), PACKAGE.1).unwrap();
+        let own = workspace.join(".git");
+        if way == "file" {
+            let text = format!("gitdir: {}\n", own.display());
+            fs::write(foreign.join(".git"), text).unwrap();
+        } else {
+            std::os::unix::fs::symlink(own, foreign.join(".git")).unwrap();
+        }
+        let said = read(way);
+        assert!(said.contains("1 file of 1 package read;"), "{said}");
+        assert!(said.contains("does not know this folder"), "{said}");
+    }
+}
+
 /// What `info` says with the workspace, on both streams.
 fn said(folder: &Path, more: &[&str]) -> String {
     let output = bagreel(
@@ -513,6 +569,13 @@ fn a_simulation_is_not_what_ran_where_another_launch_file_starts_the_same_nodes(
     let alone = folder(&recorded, &["/steer"], &files[..5]);
     let found = edges(alone.path(), &["--infer", "source"]);
     assert!(found.contains("/sim ? -> /out"), "{found:?}");
+    // Where the bag names nobody, either may have run: the robot, or its simulation.
+    let neither = folder(&recorded, &[], &files);
+    let shared = set(&["/steer ? -> /in", "/out -> /steer ?"]);
+    assert_eq!(edges(neither.path(), &["--infer", "source"]), shared);
+    let text = said(neither.path(), &["--infer", "source"]);
+    let why = "a launch file that fits too does without its node";
+    assert!(text.contains(why), "{text}");
 }
 
 #[test]

@@ -205,7 +205,8 @@ impl<G: Grammar> Indexed<G> {
 
     fn by_index(&self, plan: &ChunkPlan, range: Option<Span>, sink: &mut Clip<'_>) -> Report {
         let connections = plan.connections.list().iter();
-        let wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
+        let mut wants: Vec<Want> = connections.map(|c| sink.connection(c)).collect();
+        Want::settle(&mut wants);
         plan.notices.iter().for_each(|n| sink.notice(n.clone()));
         let inside = |c: &&Chunk| range.is_none_or(|r| c.first < r.end && r.start <= c.last);
         let chunks: Vec<&Chunk> = plan.chunks.iter().filter(inside).collect();

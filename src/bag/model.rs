@@ -54,6 +54,8 @@ pub enum Want {
     Stamps,
     /// The size of each payload, even if that means reading more than the index.
     Sizes,
+    /// As [`Want::Head`], unless an index makes reading payloads needless: where no other connection's are wanted.
+    Beside(usize),
     /// The first bytes of each payload: at least this many, or all of a shorter payload; more may come.
     Head(usize),
     /// Each payload whole.
@@ -71,6 +73,20 @@ pub struct Message<'a> {
     pub data: &'a [u8],
     /// The length of the whole payload in bytes.
     pub size: u32,
+}
+
+impl Want {
+    /// Decides what is only wanted beside others, for all connections of a bag that is read by its index.
+    pub(crate) fn settle(wants: &mut [Self]) {
+        let is_read = wants
+            .iter()
+            .any(|w| matches!(w, Self::Head(_) | Self::Payload));
+        for want in wants {
+            if let Self::Beside(n) = *want {
+                *want = if is_read { Self::Head(n) } else { Self::Stamps };
+            }
+        }
+    }
 }
 
 /// The receiver of everything that a reader finds.

@@ -276,8 +276,8 @@ pub(super) struct GraphArgs {
     /// files as they lie.
     #[arg(long, value_name = "HEAD|COMMIT|worktree", requires = "source")]
     pub(super) source_at: Option<String>,
-    /// Infer subscriptions from equal header stamps, or from equal payloads in bags larger than 64 MB too; nodes that the
-    /// bag does not name from the only place in the source code that can be meant.
+    /// Infer subscriptions from equal header stamps, or from equal payloads also in bags larger than 64 MB or read by
+    /// their index alone; nodes that the bag does not name from the only place in the source code that can be meant.
     #[arg(long, value_name = "stamps,payloads,source", value_parser = ["stamps", "payloads", "source"], value_delimiter = ',')]
     pub(super) infer: Vec<String>,
 }

@@ -8,6 +8,7 @@ mod cpp;
 mod declaration;
 mod files;
 mod git;
+mod git_link;
 pub(crate) mod matching;
 mod only;
 mod packages;

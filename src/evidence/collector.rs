@@ -2,6 +2,7 @@
 
 mod services;
 
+use std::collections::BTreeSet;
 use std::io;
 
 use super::clock::{Belief, believed};
@@ -31,10 +32,17 @@ pub struct CollectOptions {
     /// Whether to infer subscriptions from header stamps that nodes pass on; reads the first bytes of every message.
     pub infer_stamps: bool,
     /// The number of payload bytes to compare with each other and with log texts, from the beginnings of payloads; 0:
-    /// none, and none is read for it.
+    /// none, and none is read for it. [`u64::MAX`]: all, even of bags of which nothing else is read.
     pub payload_bytes: u64,
     /// The topic of strings whose texts are kept ([`Recorded::texts`]).
     pub texts_of: Option<String>,
+}
+
+impl CollectOptions {
+    /// Whether payloads are compared even where nothing else is read.
+    fn compares_all(&self) -> bool {
+        self.payload_bytes == u64::MAX
+    }
 }
 
 impl Default for CollectOptions {
@@ -81,6 +89,8 @@ pub struct Collector {
     facts: Claims,
     notices: Notices,
     bags: usize,
+    /// The bags of which payloads are read for more than comparisons.
+    read: BTreeSet<usize>,
 }
 
 impl Collector {
@@ -191,18 +201,29 @@ impl Collector {
         }
     }
 
+    /// Forgets the payloads of bags of which nothing else was read. Where such a bag has an index, none was compared;
+    /// what a bag tells must not depend on the way in which it is read.
+    fn forget_payloads(&mut self) {
+        if !self.options.compares_all() {
+            let (streams, read) = (&self.streams, &self.read);
+            let payloads = &mut self.facts.payloads;
+            payloads.retain(|at, _| read.contains(&streams[*at].bag));
+        }
+    }
+
     /// Ends the collecting.
     ///
     /// # Errors
     /// If times had to be put into a temporary file and that failed.
     pub fn finish(mut self) -> Result<Recorded> {
+        self.forget_payloads();
         self.messages.finish().map_err(spool_error)?;
         self.facts.finish().map_err(spool_error)?;
         let Belief { span, jump } = believed(self.messages.days());
         self.notices
             .extend(jump.map(|text| Notice::new(NoticeKind::Note, text)));
-        self.notices
-            .extend(publishers::judge(&mut self.streams, &self.facts));
+        let judged = publishers::judge(&mut self.streams, &mut self.facts, &mut self.messages);
+        self.notices.extend(judged.map_err(spool_error)?);
         if self.facts.dropped > 0 {
             self.notices.add(Notice {
                 kind: NoticeKind::Damaged,
@@ -297,11 +318,17 @@ impl Sink for BagSink<'_> {
         let told = is_text && all.options.texts_of.as_deref() == Some(connection.topic.as_str());
         let want = match (readers.is_empty() && !told, stamped, all.options.sizes) {
             (false, ..) => Want::Payload,
-            _ if compared => Want::Head(payload::HEAD),
+            _ if compared && (all.options.sizes || stamped || all.options.compares_all()) => {
+                Want::Head(payload::HEAD)
+            }
+            _ if compared => Want::Beside(payload::HEAD),
             (true, true, _) => Want::Head(equal_stamps::HEAD),
             (true, false, true) => Want::Sizes,
             (true, false, false) => Want::Stamps,
         };
+        if want == Want::Payload || stamped {
+            all.read.insert(self.bag);
+        }
         self.streams.push(all.streams.len());
         all.streams.push(stream);
         all.readers.push(readers);

@@ -182,59 +182,70 @@ fn strangers(known: &Conclusions<'_>, entries: &[TopologyEntry]) -> Vec<Notice> 
 
 /// Explains proofs that rest on no single message, for elements that `why` asks about.
 fn explain(known: &mut Conclusions<'_>, messages: &Stamps) {
+    let is_asked = |proof: &&Proof| {
+        known.facts.is_watched(proof.what.names())
+            && !known.worded.contains(&(proof.what, proof.source))
+    };
+    let mut pieces = Vec::new();
+    for proof in known.proofs.iter().filter(is_asked) {
+        if let (Some(source), Some((time, text))) =
+            (SOURCES.get(proof.source), explained(known, messages, proof))
+        {
+            pieces.push(EvidenceLine {
+                time,
+                source: source.word,
+                degree: proof.degree,
+                text,
+            });
+        }
+    }
+    known.facts.pieces.extend(pieces);
+}
+
+/// The time and the words of a proof; `None` where claims with their own words made it.
+fn explained(
+    known: &Conclusions<'_>,
+    messages: &Stamps,
+    proof: &Proof,
+) -> Option<(Option<Stamp>, String)> {
+    let what = sentence(known, proof.what);
+    let about = SOURCES.get(proof.source).map_or("", |source| source.about);
+    let first = |at: usize| messages.bounds(known.streams[at].times).map(|(t, _)| t);
+    match &proof.when {
+        Validity::Messages(at) => {
+            let many = match messages.count(known.streams[*at].times) {
+                0 => "no message".to_owned(),
+                1 => "1 message, here".to_owned(),
+                n => format!("{n} messages from here on"),
+            };
+            Some((first(*at), format!("{what}: {many}")))
+        }
+        Validity::First(at) => {
+            let why = "the first message is from it; the header says nothing of the others";
+            Some((first(*at), format!("{what}: {why}")))
+        }
+        Validity::Like(other) => {
+            let other = sentence(known, *other);
+            Some((None, format!("{what}: as long as {other} ({about})")))
+        }
+        Validity::Always => Some((None, format!("{what} ({about})"))),
+        Validity::Signs { .. }
+        | Validity::Begins { .. }
+        | Validity::Moments(_)
+        | Validity::Unending
+        | Validity::Whole => None,
+    }
+}
+
+/// An element as a sentence: `/lidar publishes /scan`.
+fn sentence(known: &Conclusions<'_>, what: ElementKey) -> String {
     let name = |name: Name| known.facts.text(name);
-    let told = |what| match what {
+    match what {
         ElementKey::Node(node) => format!("{} lives", name(node)),
         ElementKey::Topic(topic) => format!("{} exists", name(topic)),
         ElementKey::Publish(node, topic) => format!("{} publishes {}", name(node), name(topic)),
         ElementKey::Subscribe(topic, node) => format!("{} subscribes {}", name(node), name(topic)),
-    };
-    let mut pieces = Vec::new();
-    for proof in &known.proofs {
-        let (Some(source), true) = (
-            SOURCES.get(proof.source),
-            known.facts.is_watched(proof.what.names()),
-        ) else {
-            continue;
-        };
-        if known.worded.contains(&(proof.what, proof.source)) {
-            continue;
-        }
-        let (time, text) = match &proof.when {
-            Validity::Messages(at) | Validity::First(at) => {
-                let times = known.streams[*at].times;
-                let first = messages.bounds(times).map(|(first, _)| first);
-                let many = match messages.count(times) {
-                    0 => "no message".to_owned(),
-                    1 => "1 message, here".to_owned(),
-                    n => format!("{n} messages from here on"),
-                };
-                (first, format!("{}: {many}", told(proof.what)))
-            }
-            Validity::Like(other) => {
-                let text = format!(
-                    "{}: as long as {} ({})",
-                    told(proof.what),
-                    told(*other),
-                    source.about
-                );
-                (None, text)
-            }
-            Validity::Always => (None, format!("{} ({})", told(proof.what), source.about)),
-            Validity::Signs { .. }
-            | Validity::Begins { .. }
-            | Validity::Moments(_)
-            | Validity::Unending
-            | Validity::Whole => continue,
-        };
-        pieces.push(EvidenceLine {
-            time,
-            source: source.word,
-            degree: proof.degree,
-            text,
-        });
     }
-    known.facts.pieces.extend(pieces);
 }
 
 /// Adds an entry of the user's file.

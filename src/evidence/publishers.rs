@@ -1,15 +1,27 @@
 //! Connection headers that name a wrong publisher: in bags rewritten by tools that merge connections, and in bags
 //! recorded while another one was played back.
 
+mod successors;
+
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 
 use crate::base::name::is_player;
 use crate::base::notice::{Notice, NoticeKind};
 use crate::evidence::claim::{Claim, Claims, Name};
 use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::times::Stamps;
 
-/// Lowers the reliability of streams with unreliable headers; adds a notice once per bag.
-pub(crate) fn judge(streams: &mut [Stream], facts: &Claims) -> Vec<Notice> {
+/// Lowers the reliability of streams with unreliable headers, and divides those that outlive their publisher; returns a
+/// notice once per bag.
+///
+/// # Errors
+/// If the temporary file of times cannot be read.
+pub(crate) fn judge(
+    streams: &mut Vec<Stream>,
+    facts: &mut Claims,
+    messages: &mut Stamps,
+) -> io::Result<Vec<Notice>> {
     let named = NamedTopics::new(facts);
     let mut notices = Vec::new();
     let mut bags: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -28,6 +40,7 @@ pub(crate) fn judge(streams: &mut [Stream], facts: &Claims) -> Vec<Notice> {
                     stream.trust = Reliability::First;
                 }
             }
+            successors::part(streams, of_bag, &named, facts, messages)?;
         }
         let mut played = false;
         for at in of_bag {
@@ -44,7 +57,7 @@ pub(crate) fn judge(streams: &mut [Stream], facts: &Claims) -> Vec<Notice> {
             notices.push(Notice::new(NoticeKind::Playback, PLAYBACK));
         }
     }
-    notices
+    Ok(notices)
 }
 
 const REWRITTEN: &str = "the bag was rewritten by a tool that merges connections, so a topic's publishers are known \
@@ -77,6 +90,11 @@ impl NamedTopics {
             }
         }
         all
+    }
+
+    /// The nodes that name a topic as their own.
+    fn nodes(&self, topic: Name) -> impl Iterator<Item = Name> + '_ {
+        self.topics.get(&topic).into_iter().flatten().copied()
     }
 
     fn by_others(&self, topic: Name, node: Name) -> bool {

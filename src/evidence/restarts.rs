@@ -94,17 +94,28 @@ fn said_of(node: Name, proofs: &[Proof]) -> impl Iterator<Item = Stamp> + '_ {
 /// Stretches of time in which a sequence number of these streams falls back.
 fn fallen_back(recorded: &Recorded, streams: &[usize]) -> io::Result<Vec<(Stamp, Stamp)>> {
     let mut topics: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
+    let mut ends: BTreeMap<Name, Stamp> = BTreeMap::new();
     for stream in streams {
+        let own = &recorded.streams[*stream];
+        if let Some((_, last)) = recorded.messages.bounds(own.times) {
+            let end = ends.entry(own.topic).or_insert(last);
+            *end = last.max(*end);
+        }
         if let Some(id) = recorded.facts.sequences.get(stream) {
             let topic = recorded.streams[*stream].topic;
             topics.entry(topic).or_default().push(*id);
         }
     }
     let mut found = Vec::new();
-    for ids in topics.values() {
+    for (topic, ids) in &topics {
+        let end = ends.get(topic).copied().unwrap_or(Stamp::MAX);
         let mut before: Option<(Stamp, u32)> = None;
         recorded.facts.times.merge(ids, |timed| {
             let (time, number) = (timed.time, timed.size);
+            // What comes after a stream was divided is another node's.
+            if time > end {
+                return;
+            }
             if let Some((last, highest)) = before
                 && number < highest
                 && time.since(last) > OUT_OF_ORDER_NS

@@ -160,6 +160,36 @@ impl Stamps {
         Ok(times)
     }
 
+    /// Moves the times from `at` on into a new sequence.
+    ///
+    /// # Errors
+    /// If the unnamed file cannot be read or written.
+    pub(crate) fn split(&mut self, id: SeriesId, at: Stamp) -> io::Result<SeriesId> {
+        let (mut early, mut late) = (Vec::new(), Vec::new());
+        self.merge(&[id], |timed| {
+            let part = if timed.time < at {
+                &mut early
+            } else {
+                &mut late
+            };
+            part.push((timed.time, timed.size));
+        })?;
+        let sized = self.sized(id);
+        // They were counted when they came.
+        let days = self.days.clone();
+        if let Some(series) = self.series.get_mut(id.0 as usize) {
+            *series = OpenSeries::default();
+        }
+        let rest = self.series();
+        for (id, part) in [(id, early), (rest, late)] {
+            let (times, sizes): (Vec<Stamp>, Vec<u32>) = part.into_iter().unzip();
+            self.add(id, &times, sized.then_some(&sizes[..]));
+        }
+        self.finish()?;
+        self.days = days;
+        Ok(rest)
+    }
+
     fn get(&self, id: SeriesId) -> Option<&OpenSeries> {
         self.series.get(id.0 as usize)
     }
@@ -248,6 +278,20 @@ mod tests {
         all.merge(&[id], |t| seen.push((t.time.0, t.size))).unwrap();
         assert_eq!(seen, [(i64::MIN, 3), (-1, 4), (0, u32::MAX), (i64::MAX, 1)]);
         assert!(all.sized(id));
+    }
+
+    #[test]
+    fn a_sequence_is_divided_at_a_time() {
+        let mut all = Stamps::default();
+        let id = all.series();
+        all.add(id, &stamps([5, 1, 3, DAY]), Some(&[50, 10, 30, 7]));
+        all.finish().unwrap();
+        let rest = all.split(id, Stamp(3)).unwrap();
+        assert_eq!(all.times(id).unwrap(), stamps([1]));
+        assert_eq!(all.times(rest).unwrap(), stamps([3, 5, DAY]));
+        assert!(all.sized(id) && all.sized(rest));
+        assert_eq!((all.count(id), all.count(rest)), (1, 3));
+        assert_eq!(all.days().values().sum::<u64>(), 4);
     }
 
     #[test]

@@ -321,7 +321,7 @@ pub(crate) fn hand_over_slice(
     let size = u32::try_from(whole.len()).unwrap_or(u32::MAX);
     let data = match want {
         Want::Stamps | Want::Sizes => return,
-        Want::Head(n) => &whole[..n.min(whole.len())],
+        Want::Beside(n) | Want::Head(n) => &whole[..n.min(whole.len())],
         Want::Payload => whole,
     };
     sink.message(Message {
@@ -341,7 +341,7 @@ fn wanted_part<'s>(
 ) -> io::Result<Option<&'s [u8]>> {
     let len = match want {
         Want::Stamps | Want::Sizes => return Ok(None),
-        Want::Head(n) => (size as usize).min(n),
+        Want::Beside(n) | Want::Head(n) => (size as usize).min(n),
         Want::Payload => size as usize,
     };
     if len > MOST_PAYLOAD {

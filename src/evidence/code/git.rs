@@ -11,6 +11,7 @@ use std::process::{Command, Stdio};
 
 use super::Version;
 use super::files::{FileKind, Files, LONGEST, MOST_FILES, kind};
+use super::git_link;
 use crate::base::error::{Error, Result};
 use crate::base::time::Stamp;
 
@@ -34,7 +35,7 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
         return Ok(Checkout::Lying { note: None });
     }
     let lying = |note: Option<String>| Ok(Checkout::Lying { note });
-    let prefix = match ask(folder, &["rev-parse", "--show-prefix"]) {
+    let prefix = match prefix(folder) {
         Ok(prefix) => prefix,
         Err(reason) => {
             return match version {
@@ -64,16 +65,34 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
                 .to_owned(),
         ));
     }
-    match of_commit(folder, &commit, &prefix) {
-        Some(files) if !files.list.is_empty() => Ok(Checkout::Commit {
-            files,
-            words: words(folder, &commit, version),
-        }),
-        _ => lying(Some(format!(
-            "the code was read as it lies, for git holds no source code of this folder in commit {}",
-            short(&commit)
-        ))),
+    let reason = match of_commit(folder, &commit, &prefix) {
+        Some(files) if !files.list.is_empty() => {
+            return Ok(Checkout::Commit {
+                files,
+                words: words(folder, &commit, version),
+            });
+        }
+        Some(_) => "holds no source code of this folder in",
+        // A partial clone, from which nothing is fetched.
+        None => "does not hold all files of",
+    };
+    lying(Some(format!(
+        "the code was read as it lies, for git {reason} commit {}",
+        short(&commit)
+    )))
+}
+
+/// The path from the top of the repository to the folder, which ends in a slash or is empty; else the reason why git
+/// is not asked, or its first complaint.
+fn prefix(folder: &Path) -> std::result::Result<String, String> {
+    let setting = |file: &Path, name: &str| {
+        let file = file.to_str()?;
+        ask(folder, &["config", "--file", file, "--get", name]).ok()
+    };
+    if !git_link::is_own(folder, setting) {
+        return Err("its `.git` leads to a repository that does not know this folder".to_owned());
     }
+    ask(folder, &["rev-parse", "--show-prefix"])
 }
 
 /// `code of 2025-12-03 (8e54c1a), the last commit before the recording's end`

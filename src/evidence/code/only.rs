@@ -24,6 +24,8 @@ pub(super) enum NotDrawn {
     Disputed,
     KnownPublisher,
     OtherLaunchFile,
+    /// A launch file of the same system starts what the bag shows, and not this node.
+    Alternative,
     FewTopics,
     WouldHaveLogged,
     /// Nothing contradicts it, but the bag does not name the node and `--infer source` is not given.
@@ -37,6 +39,7 @@ impl NotDrawn {
             Self::Disputed => "what its node publishes may come from elsewhere",
             Self::KnownPublisher => "its publishers are known",
             Self::OtherLaunchFile => "another launch file fits better",
+            Self::Alternative => "a launch file that fits too does without its node",
             Self::FewTopics => "most of its node's topics are not in the bag",
             Self::WouldHaveLogged => "its node would have logged",
             Self::NotNamed => "the bag does not name its node; `--infer source` draws it",
@@ -74,7 +77,7 @@ pub(super) fn conclude(
 ) -> (usize, Undrawn) {
     let candidates = candidates(code, bag);
     let places = places(code, bag.recorded, &candidates);
-    let launches = best_launches(code, bag.named, &candidates);
+    let launches = Launches::new(code, bag.named, &candidates);
     let mut by_edge: BTreeMap<(Role, Name), Vec<&Candidate<'_>>> = BTreeMap::new();
     for candidate in &candidates {
         by_edge
@@ -100,7 +103,7 @@ pub(super) fn conclude(
     for (_, reason, candidates) in &judged {
         let best = candidates
             .iter()
-            .find(|c| is_launched_by(c.found.instance, &launches))
+            .find(|c| launches.are_best_for(c.found.instance))
             .unwrap_or(&candidates[0]);
         let is_disputed = reason.is_none() && disputed.contains(best.node.as_str());
         match reason.or(is_disputed.then_some(NotDrawn::Disputed)) {
@@ -180,9 +183,11 @@ fn places<'a>(
     all
 }
 
-/// What a launch file starts.
+/// The contents of a launch file beside those of the bag.
 #[derive(Default)]
-struct LaunchFit {
+struct LaunchFit<'a> {
+    /// The programs that it starts.
+    programs: BTreeSet<&'a (String, String)>,
     /// The nodes that the bag names.
     named: BTreeSet<String>,
     /// The number of its other nodes.
@@ -191,7 +196,7 @@ struct LaunchFit {
     edges: BTreeSet<(Role, Name)>,
 }
 
-impl LaunchFit {
+impl LaunchFit<'_> {
     /// Whether this is rather not what ran, but `other`: it starts no more of the named nodes, and more that the bag
     /// does not name. A simulation starts the robot's nodes too.
     fn is_beaten_by(&self, other: &Self) -> bool {
@@ -200,43 +205,67 @@ impl LaunchFit {
     }
 }
 
-/// The launch files that explain most edges, without those that another one beats.
-fn best_launches<'a>(
-    code: &'a Code,
-    named: &BTreeSet<String>,
-    candidates: &[Candidate<'a>],
-) -> BTreeSet<&'a str> {
-    let mut fits: BTreeMap<&str, LaunchFit> = BTreeMap::new();
-    for instance in &code.instances {
-        if let Some((path, _)) = &instance.launched {
-            let fit = fits.entry(path).or_default();
-            let node = full_name(instance);
-            if named.contains(&node) {
-                fit.named.insert(node);
-            } else {
-                fit.others += 1;
-            }
-        }
-    }
-    for Candidate { found, .. } in candidates {
-        let path = found.instance.launched.as_ref().map(|(path, _)| path);
-        if let Some(fit) = path.and_then(|path| fits.get_mut(path.as_str())) {
-            fit.edges.insert((found.role, found.topic));
-        }
-    }
-    let is_beaten = |fit: &LaunchFit| fits.values().any(|other| fit.is_beaten_by(other));
-    let open = fits.iter().filter(|(_, fit)| !is_beaten(fit));
-    let most = open.clone().map(|(_, fit)| fit.edges.len()).max();
-    open.filter(|(_, fit)| Some(fit.edges.len()) == most)
-        .map(|(path, _)| *path)
-        .collect()
+/// The launch files of the workspace.
+struct Launches<'a> {
+    /// By path.
+    fits: BTreeMap<&'a str, LaunchFit<'a>>,
+    /// Those that explain most edges, without those that another one beats.
+    best: BTreeSet<&'a str>,
 }
 
-fn is_launched_by(instance: &Instance, launches: &BTreeSet<&str>) -> bool {
-    instance
-        .launched
-        .as_ref()
-        .is_some_and(|(path, _)| launches.contains(path.as_str()))
+impl<'a> Launches<'a> {
+    fn new(code: &'a Code, named: &BTreeSet<String>, candidates: &[Candidate<'a>]) -> Self {
+        let mut fits: BTreeMap<&str, LaunchFit<'_>> = BTreeMap::new();
+        for instance in &code.instances {
+            if let Some((path, _)) = &instance.launched {
+                let fit = fits.entry(path).or_default();
+                fit.programs.insert(&instance.program);
+                let node = full_name(instance);
+                if named.contains(&node) {
+                    fit.named.insert(node);
+                } else {
+                    fit.others += 1;
+                }
+            }
+        }
+        for Candidate { found, .. } in candidates {
+            let path = found.instance.launched.as_ref().map(|(path, _)| path);
+            if let Some(fit) = path.and_then(|path| fits.get_mut(path.as_str())) {
+                fit.edges.insert((found.role, found.topic));
+            }
+        }
+        let is_beaten = |fit: &LaunchFit<'_>| fits.values().any(|other| fit.is_beaten_by(other));
+        let open = fits.iter().filter(|(_, fit)| !is_beaten(fit));
+        let most = open.clone().map(|(_, fit)| fit.edges.len()).max();
+        let best = open.filter(|(_, fit)| Some(fit.edges.len()) == most);
+        Self {
+            best: best.map(|(path, _)| *path).collect(),
+            fits,
+        }
+    }
+
+    /// Whether one of the best starts this node.
+    fn are_best_for(&self, instance: &Instance) -> bool {
+        let path = instance.launched.as_ref().map(|(path, _)| path.as_str());
+        path.is_some_and(|path| self.best.contains(path))
+    }
+
+    /// Whether some launch file is an alternative without this program: it starts parts of the same system and something
+    /// that the bag shows. A robot and its simulation, or two controllers, are such alternatives.
+    fn do_without(&self, program: &(String, String)) -> bool {
+        let starts = |fit: &&LaunchFit<'_>| fit.programs.contains(program);
+        let with: BTreeSet<_> = self
+            .fits
+            .values()
+            .filter(starts)
+            .flat_map(|fit| &fit.programs)
+            .collect();
+        let shows = |fit: &&LaunchFit<'_>| !fit.named.is_empty() || !fit.edges.is_empty();
+        let without = self.fits.values().filter(shows).filter(|fit| !starts(fit));
+        without
+            .flat_map(|fit| &fit.programs)
+            .any(|p| with.contains(p))
+    }
 }
 
 /// The reason against an edge; `None` if there is none.
@@ -244,7 +273,7 @@ fn reason(
     candidates: &[&Candidate<'_>],
     known: &Conclusions<'_>,
     bag: &BagTopics<'_>,
-    (places, launches): (&BTreeSet<(&str, usize)>, &BTreeSet<&str>),
+    (places, launches): (&BTreeSet<(&str, usize)>, &Launches<'_>),
 ) -> Option<NotDrawn> {
     let found = &candidates[0].found;
     if found.role == Role::Publishes
@@ -258,7 +287,7 @@ fn reason(
         .any(|c| c.found.instance.launched.is_some());
     let fitting: Vec<_> = candidates
         .iter()
-        .filter(|c| !is_launched || is_launched_by(c.found.instance, launches))
+        .filter(|c| !is_launched || launches.are_best_for(c.found.instance))
         .collect();
     let nodes: BTreeSet<&str> = fitting.iter().map(|c| c.node.as_str()).collect();
     if places.len() > 1 || nodes.len() > 1 {
@@ -267,6 +296,9 @@ fn reason(
     let Some(only) = fitting.first() else {
         return Some(NotDrawn::OtherLaunchFile);
     };
+    if launches.do_without(&only.found.instance.program) {
+        return Some(NotDrawn::Alternative);
+    }
     if only.share.0 * 2 < only.share.1 {
         return Some(NotDrawn::FewTopics);
     }

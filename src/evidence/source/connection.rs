@@ -26,7 +26,12 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             Reliability::Whole | Reliability::Player => {
                 known.prove(proof(edge, Validity::Messages(at)));
             }
-            Reliability::First => known.prove(proof(edge, Validity::First(at))),
+            Reliability::First => known.prove(Proof {
+                // The tool that wrote this header knows it of no other message.
+                degree: Degree::Stated,
+                ..proof(edge, Validity::First(at))
+            }),
+            Reliability::Gone => {}
         }
     }
 }

@@ -21,7 +21,12 @@ pub(crate) fn read(
         Claim::Unsubscribe(node, clock)
     };
     heard.claim(claim, Degree::Inferred, || {
-        format!("{} sets use_sim_time to {simulated}", event.node)
+        let then = if simulated {
+            ""
+        } else {
+            ", so it does not subscribe /clock"
+        };
+        format!("{} sets use_sim_time to {simulated}{then}", event.node)
     });
     Ok(())
 }

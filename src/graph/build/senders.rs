@@ -47,7 +47,7 @@ pub(crate) struct Sender {
 pub(crate) fn sender(stream: &Stream) -> Option<Name> {
     stream
         .speaker
-        .filter(|_| stream.trust != Reliability::First)
+        .filter(|_| !matches!(stream.trust, Reliability::First | Reliability::Gone))
 }
 
 /// Reads the times of every topic once.

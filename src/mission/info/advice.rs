@@ -1,6 +1,7 @@
 //! Advice on getting more information: from this recording now, from the next one by another command.
 
 use super::Info;
+use crate::base::words::count;
 use crate::evidence::Evidence;
 
 /// Advice on getting more information: first from this bag, then when recording. Empty if nothing is missing, and for
@@ -29,8 +30,9 @@ fn ros1(info: &Info) -> Vec<String> {
     if deaf > 0 && !has(info, "/statistics") {
         advice.extend(from_files(info));
         advice.push(format!(
-            "{deaf} topics have no known subscriber; before the nodes start run `rosparam set /enable_statistics true`, \
-             then `rosbag record -a`"
+            "{} without a known subscriber; before the nodes start run `rosparam set /enable_statistics true`, \
+             then `rosbag record -a`",
+            count(deaf, "topic")
         ));
     }
     advice
@@ -72,10 +74,22 @@ fn ros2(info: &Info) -> Vec<String> {
 fn from_files(info: &Info) -> Vec<String> {
     let mut advice = Vec::new();
     let named = info.nodes_by_degree.total();
-    if named > 0 && Evidence::all_words().any(|word| word == "source") {
+    let is_read = !info.undrawn.is_empty()
+        || info
+            .evidence
+            .iter()
+            .any(|row| row.source.starts_with("source"));
+    if named > 0 && !is_read && Evidence::all_words().any(|word| word == "source") {
         advice.push(format!(
             "`--source FOLDER` reads from their source code what the nodes known by name ({named}) publish and subscribe"
         ));
+    }
+    if info
+        .evidence
+        .iter()
+        .any(|row| ["topology", "launch"].contains(&row.source))
+    {
+        return advice;
     }
     advice.push(
         "`--topology FILE` adds what you know: a launch file, a graph saved by rqt_graph, a table of nodes".to_owned(),

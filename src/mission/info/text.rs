@@ -94,14 +94,14 @@ fn known(out: &mut String, info: &Info) -> std::fmt::Result {
     )?;
     for row in &info.evidence {
         let parts = [
-            (row.nodes, "nodes"),
-            (row.publishes, "publications"),
-            (row.subscribes, "subscriptions"),
+            (row.nodes, "node"),
+            (row.publishes, "publication"),
+            (row.subscribes, "subscription"),
         ];
         let parts: Vec<String> = parts
             .iter()
             .filter(|(n, _)| *n > 0)
-            .map(|(n, what)| format!("{n} {what}"))
+            .map(|(n, what)| words::count(*n, what))
             .collect();
         writeln!(out, "  {:<18} {}", row.source, parts.join(", "))?;
     }

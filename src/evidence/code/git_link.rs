@@ -1,0 +1,60 @@
+//! The repository that a folder belongs to, where its `.git` is a file or a link: work trees and submodules have such a
+//! file, and their repository knows them. A file that names somebody else's repository is not followed.
+
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+/// The longest `.git` file that is read, in bytes.
+const LONGEST: u64 = 8 << 10;
+
+/// Whether the nearest `.git` at a folder or above it is a folder, or is a file that the named repository knows as its
+/// own; true where there is none. `setting` asks a configuration file for a value.
+pub(super) fn is_own(folder: &Path, setting: impl Fn(&Path, &str) -> Option<String>) -> bool {
+    let Ok(folder) = folder.canonicalize() else {
+        return false;
+    };
+    let entries = folder.ancestors().map(|above| (above, above.join(".git")));
+    let found = entries
+        .filter_map(|(above, entry)| Some((above, fs::symlink_metadata(&entry).ok()?, entry)))
+        .next();
+    match found {
+        None => true,
+        Some((_, about, _)) if about.is_dir() => true,
+        Some((tree, about, entry)) if about.is_file() => repository(&entry)
+            .is_some_and(|git| is_work_tree(&git, &entry) || is_submodule(&git, tree, setting)),
+        Some(_) => false,
+    }
+}
+
+/// The repository that a `.git` file names.
+fn repository(entry: &Path) -> Option<PathBuf> {
+    let text = text(entry)?;
+    let path = text.strip_prefix("gitdir:")?.trim();
+    Some(entry.parent()?.join(path))
+}
+
+/// Whether a repository says that this `.git` file is the one of its work tree.
+fn is_work_tree(git: &Path, entry: &Path) -> bool {
+    let named = text(&git.join("gitdir"));
+    named.is_some_and(|named| is_same(&git.join(named.trim()), entry))
+}
+
+/// Whether a repository's configuration says that this folder is its work tree, as those of submodules do.
+fn is_submodule(git: &Path, tree: &Path, setting: impl Fn(&Path, &str) -> Option<String>) -> bool {
+    let named = setting(&git.join("config"), "core.worktree");
+    named.is_some_and(|named| is_same(&git.join(named), tree))
+}
+
+fn is_same(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    real(a).is_some_and(|a| Some(a) == real(b))
+}
+
+/// The text of a small file.
+fn text(path: &Path) -> Option<String> {
+    let mut text = String::new();
+    let file = fs::File::open(path).ok()?;
+    file.take(LONGEST).read_to_string(&mut text).ok()?;
+    Some(text)
+}

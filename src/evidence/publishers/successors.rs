@@ -1,0 +1,311 @@
+//! Nodes that ended while a topic of theirs went on, in bags that were rewritten: another node took the topic over, and
+//! its messages bear the name of the first.
+//!
+//! A node that other evidence shows again and again counts as gone where all of it stops for good at the time at which
+//! its topic fell silent, for longer than ever before. Messages that come after that silence are not known to be its
+//! own.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+
+use super::NamedTopics;
+use crate::base::time::Stamp;
+use crate::evidence::SOURCES;
+use crate::evidence::claim::{Claim, Claims, Degree, Name, Statement};
+use crate::evidence::proof::{Reliability, Stream};
+use crate::evidence::times::{SeriesId, Stamps};
+
+/// The fewest signs of a node, and the fewest messages of a topic, that show a habit.
+const FEWEST: usize = 5;
+/// A silence as a multiple of the longest pause before it that is the end of a habit.
+const UNUSUAL: i64 = 3;
+/// The same for the messages of a topic, of which one or two are lost now and then.
+const BREAK: i64 = 5;
+/// The shortest silence that ends a habit, in nanoseconds: a recorder writes its topics up to a second apart.
+const BREAK_NS: i64 = 2_000_000_000;
+/// The number of intervals between messages before a silence that show the usual one.
+const RECENT: usize = 20;
+
+/// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` are the places of its streams. Each
+/// gets a claim of its end; what is left of a topic whose header names it becomes a stream of its own.
+pub(super) fn part(
+    streams: &mut Vec<Stream>,
+    of_bag: &[usize],
+    named: &NamedTopics,
+    facts: &mut Claims,
+    messages: &mut Stamps,
+) -> io::Result<()> {
+    let ends = {
+        let mut bag = RewrittenBag::new(streams, of_bag, facts, messages);
+        bag.ends(named)?
+    };
+    let mut gone: BTreeMap<Name, Stamp> = BTreeMap::new();
+    for end in ends {
+        let last = gone.entry(end.node).or_insert(end.time);
+        *last = end.time.max(*last);
+        let stream = &mut streams[end.stream];
+        let own = stream.trust == Reliability::Whole && stream.publisher == Some(end.node);
+        if let Some(next) = end.next.filter(|_| own) {
+            let times = messages.split(stream.times, next)?;
+            let rest = Stream {
+                times,
+                trust: Reliability::Gone,
+                ..stream.clone()
+            };
+            streams.push(rest);
+        }
+    }
+    let source = SOURCES.iter().position(|s| s.word == "connection");
+    for (node, time) in gone {
+        for claim in [Claim::Node(node), Claim::NodeGone(node)] {
+            let said = Statement {
+                claim,
+                degree: Degree::Stated,
+                snapshot: None,
+            };
+            let words = || "nothing shows it after a topic of its own fell silent".to_owned();
+            facts.explain(said, "connection", Some(time), words);
+            facts.add(source.unwrap_or(0), said, Some(time));
+        }
+    }
+    facts.finish()
+}
+
+/// The end of a node, before the end of a topic.
+struct NodeEnd {
+    node: Name,
+    stream: usize,
+    /// The last sign of the node.
+    time: Stamp,
+    /// The topic's first message after the silence, if there is one.
+    next: Option<Stamp>,
+}
+
+/// All that one rewritten bag tells about the ends of nodes.
+struct RewrittenBag<'a> {
+    streams: &'a [Stream],
+    of_bag: &'a [usize],
+    facts: &'a Claims,
+    messages: &'a Stamps,
+    /// The claims about each node.
+    told: BTreeMap<Name, Vec<SeriesId>>,
+    /// The streams that each node published, as far as is known.
+    own: BTreeMap<Name, Vec<usize>>,
+    /// The last message.
+    end: Stamp,
+    /// The times without any message, once they are asked for.
+    pauses: Option<Vec<(Stamp, Stamp)>>,
+}
+
+impl<'a> RewrittenBag<'a> {
+    fn new(
+        streams: &'a [Stream],
+        of_bag: &'a [usize],
+        facts: &'a Claims,
+        messages: &'a Stamps,
+    ) -> Self {
+        let mut told: BTreeMap<Name, Vec<SeriesId>> = BTreeMap::new();
+        for fact in &facts.list {
+            if let Some(node) = shown(fact.claim) {
+                told.entry(node).or_default().push(fact.times);
+            }
+        }
+        let mut own: BTreeMap<Name, Vec<usize>> = BTreeMap::new();
+        for at in of_bag {
+            if let (Some(node), true) = (streams[*at].publisher, is_own(streams, *at)) {
+                own.entry(node).or_default().push(*at);
+            }
+        }
+        let bounds = of_bag
+            .iter()
+            .filter_map(|at| messages.bounds(streams[*at].times));
+        Self {
+            streams,
+            of_bag,
+            facts,
+            messages,
+            told,
+            own,
+            end: bounds.map(|(_, last)| last).max().unwrap_or(Stamp(0)),
+            pauses: None,
+        }
+    }
+
+    fn ends(&mut self, named: &NamedTopics) -> io::Result<Vec<NodeEnd>> {
+        let mut ends = Vec::new();
+        for at in self.of_bag {
+            let stream = &self.streams[*at];
+            let nodes: BTreeSet<Name> = named.nodes(stream.topic).chain(stream.publisher).collect();
+            if stream.latched || stream.connection.topic.as_str() == "/rosout" {
+                continue;
+            }
+            let mut times = None;
+            for node in nodes {
+                if !self.may_have_ended(node, *at) {
+                    continue;
+                }
+                let times = match &times {
+                    Some(times) => times,
+                    None => times.insert(self.messages.times(stream.times)?),
+                };
+                ends.extend(self.ended(node, *at, times)?);
+            }
+        }
+        Ok(ends)
+    }
+
+    /// Whether the last sign of a node, other than the messages of this stream, comes long before the end of the bag.
+    fn may_have_ended(&self, node: Name, except: usize) -> bool {
+        let told = self.told.get(&node).into_iter().flatten();
+        let told = told.filter_map(|id| self.facts.times.bounds(*id));
+        let own = self.own.get(&node).into_iter().flatten();
+        let own = own.filter(|at| **at != except);
+        let own = own.filter_map(|at| self.messages.bounds(self.streams[*at].times));
+        let last = told.chain(own).map(|(_, last)| last).max();
+        last.is_some_and(|last| self.end.since(last) > BREAK_NS.saturating_mul(UNUSUAL))
+    }
+
+    /// The end of a node, if all its signs stop with a silence of this topic.
+    fn ended(&mut self, node: Name, at: usize, times: &[Stamp]) -> io::Result<Option<NodeEnd>> {
+        let Some(habit) = Habit::of(&self.signs(node, at)?) else {
+            return Ok(None);
+        };
+        let longest = habit.pause.max(BREAK_NS);
+        if self.end.since(habit.last) <= longest.saturating_mul(UNUSUAL) {
+            return Ok(None);
+        }
+        let Some((last, next)) = silence(times, habit, self.end) else {
+            return Ok(None);
+        };
+        let is_all_quiet = self.is_all_quiet(last, next.unwrap_or(self.end))?;
+        Ok((!is_all_quiet).then_some(NodeEnd {
+            node,
+            stream: at,
+            time: habit.last.max(last),
+            next,
+        }))
+    }
+
+    /// The times of all signs of a node, without the messages of one stream, sorted.
+    fn signs(&self, node: Name, except: usize) -> io::Result<Vec<Stamp>> {
+        let mut signs = Vec::new();
+        for id in self.told.get(&node).into_iter().flatten() {
+            signs.extend(self.facts.times.times(*id)?);
+        }
+        let own = self.own.get(&node).into_iter().flatten();
+        for at in own.filter(|at| **at != except) {
+            signs.extend(self.messages.times(self.streams[*at].times)?);
+        }
+        signs.sort_unstable();
+        Ok(signs)
+    }
+
+    /// Whether the bag has no message at all in half of this time or more: then the recorder was silent, not the node.
+    fn is_all_quiet(&mut self, from: Stamp, to: Stamp) -> io::Result<bool> {
+        let pauses = match &mut self.pauses {
+            Some(pauses) => pauses,
+            None => {
+                let of = |at: &usize| self.streams[*at].times;
+                let ids: Vec<SeriesId> = self.of_bag.iter().map(of).collect();
+                let mut last: Option<Stamp> = None;
+                let mut pauses = Vec::new();
+                self.messages.merge(&ids, |timed| {
+                    let before = last.replace(timed.time).unwrap_or(timed.time);
+                    if timed.time.since(before) >= BREAK_NS / 2 {
+                        pauses.push((before, timed.time));
+                    }
+                })?;
+                self.pauses.insert(pauses)
+            }
+        };
+        let inside = |(a, b): &(Stamp, Stamp)| (*b).min(to).since((*a).max(from)).max(0);
+        let quiet: i64 = pauses.iter().map(inside).sum();
+        Ok(quiet >= to.since(from) / 2)
+    }
+}
+
+/// The node that a claim shows to be there.
+fn shown(claim: Claim) -> Option<Name> {
+    match claim {
+        Claim::Node(node)
+        | Claim::Publish(node, _)
+        | Claim::Subscribe(node, _)
+        | Claim::Joins(node, _)
+        | Claim::Refused(node, _)
+        | Claim::Lists(node, _)
+        | Claim::Reports(node, _)
+        | Claim::Lifecycle(node, _) => Some(node),
+        _ => None,
+    }
+}
+
+/// Whether all messages of a stream are by the node that its header names, and say something about its life.
+fn is_own(streams: &[Stream], at: usize) -> bool {
+    streams[at].trust == Reliability::Whole && streams[at].connection.topic.as_str() != "/rosout"
+}
+
+/// The habit of a node of showing itself.
+#[derive(Clone, Copy, Debug)]
+struct Habit {
+    last: Stamp,
+    /// The longest time between two signs, in nanoseconds.
+    pause: i64,
+}
+
+impl Habit {
+    /// The habit in sorted signs; `None` for too few.
+    fn of(signs: &[Stamp]) -> Option<Self> {
+        let pauses = signs.windows(2).map(|pair| pair[1].since(pair[0]));
+        (signs.len() >= FEWEST).then_some(Self {
+            last: *signs.last()?,
+            pause: pauses.max()?,
+        })
+    }
+}
+
+/// The longest silence of a topic that begins when a node was last seen, give or take one of its pauses: the last message
+/// and the next one. `None` unless it is long for the topic.
+fn silence(times: &[Stamp], habit: Habit, end: Stamp) -> Option<(Stamp, Option<Stamp>)> {
+    let from = times.partition_point(|t| *t < habit.last.plus(-habit.pause));
+    let to = times.partition_point(|t| *t <= habit.last.plus(habit.pause));
+    let next = |at: usize| times.get(at + 1).copied();
+    let length = |at: &usize| next(*at).unwrap_or(end).since(times[*at]);
+    let last = (from..to).max_by_key(|at| (length(at), std::cmp::Reverse(*at)))?;
+    let recent = &times[last.saturating_sub(RECENT)..=last];
+    let usual = recent.windows(2).map(|pair| pair[1].since(pair[0])).max()?;
+    let long = usual.saturating_mul(BREAK).max(BREAK_NS);
+    (recent.len() >= FEWEST && length(&last) > long).then_some((times[last], next(last)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seconds(list: impl IntoIterator<Item = i64>) -> Vec<Stamp> {
+        list.into_iter().map(|s| Stamp(s * 1_000_000_000)).collect()
+    }
+
+    #[test]
+    fn a_topic_falls_silent_with_its_node_or_not_at_all() {
+        let times = seconds((0..20).chain(60..90));
+        let habit = |last: i64, pause: i64| Habit {
+            last: Stamp(last * 1_000_000_000),
+            pause: pause * 1_000_000_000,
+        };
+        let end = Stamp(90_000_000_000);
+        let found = silence(&times, habit(21, 4), end);
+        assert_eq!(found, Some((times[19], Some(times[20]))));
+        // Long before the silence, and in the middle of even sending.
+        assert_eq!(silence(&times, habit(8, 4), end), None);
+        assert_eq!(silence(&times, habit(70, 4), end), None);
+        let rare = seconds([0, 20, 40, 60, 80, 160, 180, 200]);
+        assert_eq!(silence(&rare, habit(80, 4), Stamp(200_000_000_000)), None);
+    }
+
+    #[test]
+    fn a_few_signs_are_no_habit() {
+        assert!(Habit::of(&seconds([1, 2, 3, 4])).is_none());
+        let habit = Habit::of(&seconds([1, 2, 3, 9, 10])).unwrap();
+        assert_eq!((habit.last.0, habit.pause), (10_000_000_000, 6_000_000_000));
+    }
+}
