@@ -10,6 +10,8 @@ const BOX_GAP: f64 = 12.0;
 const EDGE_GAP: f64 = 7.0;
 /// The room between a cluster's border and what is inside, and outside.
 pub(crate) const PADDING: f64 = 7.0;
+/// The room below a title for the heads of arrows that come from above: the title is painted over their lines.
+const HEAD: f64 = 9.0;
 const MARGIN: f64 = 4.0;
 /// The room before and after a label between two layers.
 const LABEL_GAP: f64 = 12.0;
@@ -193,7 +195,7 @@ impl<'a> Spacing<'a> {
     fn lead(&self, cluster: usize) -> f64 {
         match self.orientation {
             Orientation::LeftRight => PADDING,
-            Orientation::TopBottom => PADDING + self.title[cluster].w,
+            Orientation::TopBottom => PADDING + self.title[cluster].w + HEAD,
         }
     }
 

@@ -251,16 +251,15 @@ const MOST_AHEAD: usize = 256;
 /// The places of the beginnings of these messages, or of the whole chunk where they are packed.
 fn ahead(body: &ChunkBody, wanted: &[Wanted], step: usize) -> Vec<Range<u64>> {
     let Range { start, end } = body.range;
-    if body.how != Compression::None {
-        let last = start.saturating_add(MOST_PACKED);
-        return vec![start..end.min(last)];
-    }
-    let step = step as u64;
-    let place = |one: &Wanted| {
-        let at = start.saturating_add(one.offset).min(end);
-        at..at.saturating_add(step).min(end)
+    let place = |offset: u64, length: u64| {
+        let at = start.saturating_add(offset).min(end);
+        at..at.saturating_add(length).min(end)
     };
-    wanted.iter().take(MOST_AHEAD).map(place).collect()
+    if body.how != Compression::None {
+        return Vec::from([place(0, MOST_PACKED)]);
+    }
+    let places = wanted.iter().take(MOST_AHEAD);
+    places.map(|one| place(one.offset, step as u64)).collect()
 }
 
 /// The most packed bytes that are asked for at once.
