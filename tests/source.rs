@@ -540,6 +540,34 @@ fn what_speaks_against_a_place_is_told() {
 }
 
 #[test]
+fn messages_of_another_programs_own_type_are_not_inferred() {
+    let code = node("fake", "turtle1/pose", "in")
+        .replace("std_msgs.msg import String", "turtlesim.msg import Pose")
+        .replace("create_publisher(String", "create_publisher(Pose");
+    let topics = [("/turtle1/pose", "turtlesim/msg/Pose")];
+    let folder = folder(&topics, &[], &[PACKAGE, ("p/p/fake.py", &code)]);
+    let text = said(folder.path(), &["--infer", "source"]);
+    assert!(text.contains("its type is another program's own"), "{text}");
+    let found = edges(folder.path(), &["--infer", "source"]);
+    assert!(!found.contains("/fake ? -> /turtle1/pose"), "{found:?}");
+}
+
+#[test]
+fn code_outside_git_is_read_as_it_lies_and_said_to_be() {
+    let code = node("n", "out", "x");
+    let folder = folder(
+        &[("/out", STRING)],
+        &["/n"],
+        &[PACKAGE, ("p/p/n.py", &code)],
+    );
+    let text = said(folder.path(), &[]);
+    let note = "the code was read as it lies, for it is in no git repository; it may have changed since 2024-01-01";
+    assert!(text.contains(note), "{text}");
+    let asked = said(folder.path(), &["--source-at", "worktree"]);
+    assert!(!asked.contains("as it lies"), "{asked}");
+}
+
+#[test]
 fn a_simulation_is_not_what_ran_where_another_launch_file_starts_the_same_nodes() {
     let launch = |nodes: &[&str]| {
         let node = |n: &&str| format!("Node(package='p', executable='{n}', name='{n}')");

@@ -43,6 +43,30 @@ impl CollectOptions {
     fn compares_all(&self) -> bool {
         self.payload_bytes == u64::MAX
     }
+
+    /// Whether the messages of a connection are texts to keep.
+    fn keeps_texts_of(&self, connection: &Connection) -> bool {
+        let is_text = matches!(
+            &*connection.type_name,
+            "std_msgs/String" | "std_msgs/msg/String"
+        );
+        is_text && self.texts_of.as_deref() == Some(connection.topic.as_str())
+    }
+
+    /// The wanted part of a connection's payloads, which are read whole or for their stamps.
+    fn want(&self, is_read: bool, stamped: bool) -> Want {
+        let compared = self.payload_bytes > 0;
+        match (is_read, stamped, self.sizes) {
+            (true, ..) => Want::Payload,
+            _ if compared && (self.sizes || stamped || self.compares_all()) => {
+                Want::Head(payload::HEAD)
+            }
+            _ if compared => Want::Beside(payload::HEAD),
+            (false, true, _) => Want::Head(equal_stamps::HEAD),
+            (false, false, true) => Want::Sizes,
+            (false, false, false) => Want::Stamps,
+        }
+    }
 }
 
 impl Default for CollectOptions {
@@ -311,21 +335,8 @@ impl Sink for BagSink<'_> {
         }
         let stamped = all.options.infer_stamps && equal_stamps::is_stamped(connection);
         let compared = all.options.payload_bytes > 0;
-        let is_text = matches!(
-            &*connection.type_name,
-            "std_msgs/String" | "std_msgs/msg/String"
-        );
-        let told = is_text && all.options.texts_of.as_deref() == Some(connection.topic.as_str());
-        let want = match (readers.is_empty() && !told, stamped, all.options.sizes) {
-            (false, ..) => Want::Payload,
-            _ if compared && (all.options.sizes || stamped || all.options.compares_all()) => {
-                Want::Head(payload::HEAD)
-            }
-            _ if compared => Want::Beside(payload::HEAD),
-            (true, true, _) => Want::Head(equal_stamps::HEAD),
-            (true, false, true) => Want::Sizes,
-            (true, false, false) => Want::Stamps,
-        };
+        let told = all.options.keeps_texts_of(connection);
+        let want = all.options.want(!readers.is_empty() || told, stamped);
         if want == Want::Payload || stamped {
             all.read.insert(self.bag);
         }

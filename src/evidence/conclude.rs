@@ -16,6 +16,7 @@ use crate::base::time::Stamp;
 use crate::evidence::claim::{Claims, Name};
 use crate::evidence::code::{Code, matching};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Stream, Validity, offers};
+use crate::evidence::source::contract::Owners;
 use crate::evidence::times::Stamps;
 use crate::evidence::topology::{NamedElement, Topology, TopologyEntry};
 use crate::evidence::{Degree, EvidenceLine, SOURCES, unknown};
@@ -73,27 +74,11 @@ pub fn conclude(recorded: &Recorded, options: &ConcludeOptions) -> Result<Findin
 }
 
 fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findings> {
-    let start = recorded.span.map_or(Stamp(0), |s| s.start);
-    let end = recorded.span.map_or(Stamp(0), |s| s.end.plus(-1));
-    let mut known = Conclusions::new(&recorded.streams, recorded.facts.clone(), (start, end));
-    known.take_at_their_word();
-    for (row, source) in SOURCES.iter().enumerate() {
-        for conclude in source.conclude {
-            conclude(row, &mut known);
-        }
-    }
-    let strange = strangers(&known, &options.topology.entries);
-    for entry in &options.topology.entries {
-        told(&mut known, entry, (start, end));
-    }
-    let code = options.code.as_ref();
-    let code = code.map(|code| matching::conclude(code, &mut known));
-    let code = code.unwrap_or_default();
-    unknown::conclude(&mut known);
-    explain(&mut known, &recorded.messages);
+    let (known, notices, undrawn) = concluded(recorded, options);
     if let Some(error) = known.failed {
         return Err(error);
     }
+    let mission = known.mission;
     let Conclusions {
         mut facts,
         mut proofs,
@@ -122,14 +107,11 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         }
     };
     let streams: Vec<Stream> = recorded.streams.iter().map(renamed).collect();
-    let mut notices = Notices::new();
-    let told = options.topology.notices.iter().cloned();
-    notices.extend(told.chain(code.notices).chain(strange));
     let mut lines = std::mem::take(&mut facts.pieces);
     lines.sort_unstable();
     lines.dedup();
     Ok(Findings {
-        mission: (start, end),
+        mission,
         restarts: restarts(recorded, &streams, &proofs)?,
         values: StatedValues::new(&facts, role)?,
         offers: offers(&facts.offers, &streams),
@@ -138,8 +120,41 @@ fn findings(recorded: &Recorded, options: &ConcludeOptions) -> io::Result<Findin
         proofs,
         lines,
         notices,
-        undrawn: code.undrawn,
+        undrawn,
     })
+}
+
+/// The conclusions of all sources, of the user's files and of source code; notices about the files, and what the code
+/// offers and was not drawn.
+fn concluded<'a>(
+    recorded: &'a Recorded,
+    options: &ConcludeOptions,
+) -> (Conclusions<'a>, Notices, Vec<String>) {
+    let start = recorded.span.map_or(Stamp(0), |s| s.start);
+    let end = recorded.span.map_or(Stamp(0), |s| s.end.plus(-1));
+    let mut known = Conclusions::new(&recorded.streams, recorded.facts.clone(), (start, end));
+    known.take_at_their_word();
+    for (row, source) in SOURCES.iter().enumerate() {
+        for conclude in source.conclude {
+            conclude(row, &mut known);
+        }
+    }
+    let strange = strangers(&known, &options.topology.entries);
+    for entry in &options.topology.entries {
+        told(&mut known, entry, (start, end));
+    }
+    let read = |code: &Arc<Code>| {
+        let owners = Owners::new();
+        let owner = |kind: &str, topic: &str| owners.node(kind, topic);
+        matching::conclude(code, &mut known, &owner)
+    };
+    let code = options.code.as_ref().map(read).unwrap_or_default();
+    unknown::conclude(&mut known);
+    explain(&mut known, &recorded.messages);
+    let mut notices = Notices::new();
+    let told = options.topology.notices.iter().cloned();
+    notices.extend(told.chain(code.notices).chain(strange));
+    (known, notices, code.undrawn)
 }
 
 /// Notices about names in the user's files that are not in the bags: topics, and nodes whose name is close to a known

@@ -239,7 +239,7 @@ fn best_block(
     };
     let usual = orderings
         .iter()
-        .map(|ordering| judged(block(plan, part, ordering, orientation)));
+        .map(|ordering| judged(block(plan, options, part, ordering, orientation)));
     let Some(best) = usual.reduce(better) else {
         return PlacedPart::empty();
     };
@@ -259,12 +259,13 @@ fn best_block(
 
 fn block(
     plan: &Plan,
+    options: &LayoutOptions,
     part: &Component,
     ordering: &Ordering,
     orientation: Orientation,
 ) -> PlacedPart {
     let layers = &ordering.layers;
-    let room = Spacing::new(plan, part, layers, orientation);
+    let room = Spacing::new(plan, options, part, layers, orientation);
     let across = place::place(layers, &ordering.rows, &room.apart(&ordering.rows));
     let columns = room.columns(&ordering.rows, &across);
     let outline: Vec<_> = part

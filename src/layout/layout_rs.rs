@@ -79,7 +79,7 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
     let parts = parts::parts(&flat);
     let blocks: Option<Vec<PlacedPart>> = parts
         .iter()
-        .map(|part| block(&flat, part, orientation))
+        .map(|part| block(&flat, options, part, orientation))
         .collect();
     let blocks = blocks.ok_or_else(|| {
         Error::usage(
@@ -99,7 +99,12 @@ fn lay_out(plan: &Plan, options: &LayoutOptions, orientation: Orientation) -> Re
 }
 
 /// One part placed and routed; `None` if its boxes overlap.
-fn block(plan: &Plan, part: &Component, orientation: Orientation) -> Option<PlacedPart> {
+fn block(
+    plan: &Plan,
+    options: &LayoutOptions,
+    part: &Component,
+    orientation: Orientation,
+) -> Option<PlacedPart> {
     let n = part.vertices.len();
     let reversed = acyclic::in_order(n, &part.ends);
     let layers = cut(
@@ -108,7 +113,7 @@ fn block(plan: &Plan, part: &Component, orientation: Orientation) -> Option<Plac
         Lane::Outside,
     );
     let (rows, crossings) = order::order(&layers, EFFORT);
-    let room = Spacing::new(plan, part, &layers, orientation);
+    let room = Spacing::new(plan, options, part, &layers, orientation);
     let places = places(&layers, &rows, &room, orientation);
     let across: Vec<f64> = places.iter().map(|&(_, across)| across).collect();
     let columns: Vec<(f64, f64)> = rows

@@ -3,7 +3,7 @@
 //! Here x runs along the edges and y across; [`turned`] brings sizes there and back.
 
 use crate::base::geometry::{Rect, Size};
-use crate::layout::{Component, LayerItem, LayerRows, Layers, Orientation, Plan};
+use crate::layout::{Component, LayerItem, LayerRows, Layers, LayoutOptions, Orientation, Plan};
 
 /// The room between boxes side by side, between edges side by side, and between an edge and anything else.
 const BOX_GAP: f64 = 12.0;
@@ -30,11 +30,14 @@ pub(crate) struct Spacing<'a> {
     label: Vec<f64>,
     /// The size of each cluster's title; the first stands for the outside.
     title: Vec<Size>,
+    /// The room below a title that stands across the edges.
+    below_title: f64,
 }
 
 impl<'a> Spacing<'a> {
     pub(crate) fn new(
         plan: &Plan,
+        options: &LayoutOptions,
         part: &Component,
         layers: &'a Layers,
         orientation: Orientation,
@@ -58,6 +61,7 @@ impl<'a> Spacing<'a> {
             size: part.vertices.iter().map(size).collect(),
             loops,
             label,
+            below_title: if options.is_tight { 0.0 } else { HEAD },
             title: std::iter::once(Size::default())
                 .chain(part.clusters.iter().map(title))
                 .collect(),
@@ -195,7 +199,7 @@ impl<'a> Spacing<'a> {
     fn lead(&self, cluster: usize) -> f64 {
         match self.orientation {
             Orientation::LeftRight => PADDING,
-            Orientation::TopBottom => PADDING + self.title[cluster].w + HEAD,
+            Orientation::TopBottom => PADDING + self.title[cluster].w + self.below_title,
         }
     }
 

@@ -34,36 +34,24 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
     if *version == Version::Worktree {
         return Ok(Checkout::Lying { note: None });
     }
-    let lying = |note: Option<String>| Ok(Checkout::Lying { note });
-    let prefix = match prefix(folder) {
-        Ok(prefix) => prefix,
-        Err(reason) => {
-            return match version {
-                Version::Commit(name) => Err(unknown(folder, name, &reason)),
-                _ if reason.contains("not a git repository") => lying(None),
-                _ => lying(Some(format!(
-                    "the code was read as it lies, for git refuses: {reason}"
-                ))),
-            };
+    let lying = |why: &str| {
+        let note = Some(format!("the code was read as it lies, for {why}"));
+        Ok(Checkout::Lying { note })
+    };
+    let prefix = match (prefix(folder), version) {
+        (Ok(prefix), _) => prefix,
+        (Err(reason), Version::Commit(name)) => return Err(unknown(folder, name, &reason)),
+        (Err(reason), _) if reason.contains("not a git repository") => {
+            return lying(&format!(
+                "it is in no git repository; it may have changed since {}",
+                day(end)
+            ));
         }
+        (Err(reason), _) => return lying(&format!("git refuses: {reason}")),
     };
-    let commit = if let Version::Commit(name) = version {
-        let wanted = format!("{name}^{{commit}}");
-        let found = ask(
-            folder,
-            &["rev-parse", "--verify", "--end-of-options", &wanted],
-        );
-        found.map_err(|reason| unknown(folder, name, &reason))?
-    } else {
-        let seconds = end.0.div_euclid(1_000_000_000).saturating_add(DAY);
-        let before = format!("--before=@{seconds}");
-        ask(folder, &["rev-list", "--max-count=1", &before, "HEAD"]).unwrap_or_default()
-    };
+    let commit = commit(folder, version, end)?;
     if commit.is_empty() {
-        return lying(Some(
-            "the code was read as it lies, for git holds no commit before the recording's end"
-                .to_owned(),
-        ));
+        return lying("git holds no commit before the recording's end");
     }
     let reason = match of_commit(folder, &commit, &prefix) {
         Some(files) if !files.list.is_empty() => {
@@ -76,10 +64,28 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
         // A partial clone, from which nothing is fetched.
         None => "does not hold all files of",
     };
-    lying(Some(format!(
-        "the code was read as it lies, for git {reason} commit {}",
-        short(&commit)
-    )))
+    lying(&format!("git {reason} commit {}", short(&commit)))
+}
+
+/// The wanted commit; empty if there is none before the recording's end.
+fn commit(folder: &Path, version: &Version, end: Stamp) -> Result<String> {
+    if let Version::Commit(name) = version {
+        let wanted = format!("{name}^{{commit}}");
+        let found = ask(
+            folder,
+            &["rev-parse", "--verify", "--end-of-options", &wanted],
+        );
+        return found.map_err(|reason| unknown(folder, name, &reason));
+    }
+    let seconds = end.0.div_euclid(1_000_000_000).saturating_add(DAY);
+    let before = format!("--before=@{seconds}");
+    let found = ask(folder, &["rev-list", "--max-count=1", &before, "HEAD"]);
+    Ok(found.unwrap_or_default())
+}
+
+/// The day of a time, such as `2025-12-03`.
+fn day(time: Stamp) -> String {
+    time.to_string().chars().take(10).collect()
 }
 
 /// The path from the top of the repository to the folder, which ends in a slash or is empty; else the reason why git
@@ -107,8 +113,7 @@ fn words(folder: &Path, commit: &str, version: &Version) -> String {
         .next()
         .and_then(|t| t.parse().ok())
         .unwrap_or(0);
-    let day = Stamp(seconds.saturating_mul(1_000_000_000)).to_string();
-    let day = day.get(..10).unwrap_or_default();
+    let day = day(Stamp(seconds.saturating_mul(1_000_000_000)));
     let which = match version {
         Version::Recording => ", the last commit before the recording's end",
         _ => "",

@@ -47,7 +47,11 @@ pub(crate) struct Outcome {
 }
 
 /// Adds the edges that the code declares for nodes that the bag names, and the only possible places if asked for.
-pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>) -> Outcome {
+pub(crate) fn conclude(
+    code: &Code,
+    known: &mut Conclusions<'_>,
+    owner: only::Owner<'_>,
+) -> Outcome {
     let recorded = RecordedTopics::of(known);
     let named = named(known);
     let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
@@ -87,6 +91,7 @@ pub(crate) fn conclude(code: &Code, known: &mut Conclusions<'_>) -> Outcome {
         explained: &explained,
         named: &known_nodes,
         logged,
+        owner,
     };
     let (inferred, undrawn) = only::conclude(code, known, &bag);
     let mut notices = code.notices.clone();

@@ -11,6 +11,7 @@ use super::Code;
 use super::declaration::Role;
 use super::matching::{Match, RecordedTopics, matches, resolved, row};
 use super::workspace::{FileDeclaration, Instance};
+use crate::base::name::last_part;
 use crate::base::words::count;
 use crate::evidence::claim::{Degree, Name};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Validity};
@@ -23,6 +24,8 @@ pub(super) enum NotDrawn {
     /// The other topics of its node fit another place as well, so that it may not have run.
     Disputed,
     KnownPublisher,
+    /// Messages of this type come from one well-known program.
+    OwnedType,
     OtherLaunchFile,
     /// A launch file of the same system starts what the bag shows, and not this node.
     Alternative,
@@ -38,6 +41,7 @@ impl NotDrawn {
             Self::SeveralPlaces => "several places can be meant",
             Self::Disputed => "what its node publishes may come from elsewhere",
             Self::KnownPublisher => "its publishers are known",
+            Self::OwnedType => "its type is another program's own",
             Self::OtherLaunchFile => "another launch file fits better",
             Self::Alternative => "a launch file that fits too does without its node",
             Self::FewTopics => "most of its node's topics are not in the bag",
@@ -67,7 +71,11 @@ pub(super) struct BagTopics<'a> {
     pub(super) named: &'a BTreeSet<String>,
     /// Whether log records were recorded, so that a node that logs would be named.
     pub(super) logged: bool,
+    pub(super) owner: Owner<'a>,
 }
+
+/// The well-known program that alone publishes messages of a type, by the type and the topic.
+pub(crate) type Owner<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 
 /// Adds the only possible places if asked for; returns the places that were not drawn, with the reasons.
 pub(super) fn conclude(
@@ -268,6 +276,11 @@ impl<'a> Launches<'a> {
     }
 }
 
+/// Whether two nodes have the same name, in whatever namespaces.
+fn is_same_name(a: &str, b: &str) -> bool {
+    last_part(a) == last_part(b)
+}
+
 /// The reason against an edge; `None` if there is none.
 fn reason(
     candidates: &[&Candidate<'_>],
@@ -281,6 +294,11 @@ fn reason(
             || known.publishers(found.topic).next().is_some())
     {
         return Some(NotDrawn::KnownPublisher);
+    }
+    let owner = (bag.owner)(&known.kind(found.topic), &known.text(found.topic));
+    let is_owner = |owner: &String| candidates.iter().any(|c| is_same_name(&c.node, owner));
+    if found.role == Role::Publishes && owner.is_some_and(|owner| !is_owner(&owner)) {
+        return Some(NotDrawn::OwnedType);
     }
     let is_launched = candidates
         .iter()
