@@ -252,8 +252,8 @@ const MOST_AHEAD: usize = 256;
 fn ahead(body: &ChunkBody, wanted: &[Wanted], step: usize) -> Vec<Range<u64>> {
     let Range { start, end } = body.range;
     if body.how != Compression::None {
-        let last = start.saturating_add(MOST_PACKED);
-        return vec![start..end.min(last)];
+        let packed = start..end.min(start.saturating_add(MOST_PACKED));
+        return vec![packed];
     }
     let step = step as u64;
     let place = |one: &Wanted| {
