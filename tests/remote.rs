@@ -457,7 +457,7 @@ fn sizes_cost_no_request_of_their_own_where_a_chunk_holds_one_message() {
 fn one_message_in_each_chunk() -> Vec<u8> {
     let mut recording = Recording::default();
     let talks = recording.publisher("/talker", "/chatter", "std_msgs/String");
-    let text = [&300_000u32.to_le_bytes()[..], &[b'a'; 300_000]].concat();
+    let text = [300_000u32.to_le_bytes().to_vec(), vec![b'a'; 300_000]].concat();
     recording.send(talks, (0, 4000), 1000, &text);
     rosbag1::write(&recording, rosbag1::Pack::None, 1000)
 }

