@@ -182,8 +182,8 @@ impl Stamps {
         }
         let rest = self.series();
         for (id, part) in [(id, early), (rest, late)] {
-            let (times, sizes): (Vec<Stamp>, Vec<u32>) = part.into_iter().unzip();
-            self.add(id, &times, sized.then_some(&sizes[..]));
+            let (stamps, bytes): (Vec<Stamp>, Vec<u32>) = part.into_iter().unzip();
+            self.add(id, &stamps, sized.then_some(&bytes[..]));
         }
         self.finish()?;
         self.days = days;
