@@ -435,6 +435,17 @@ fn a_git_file_leads_only_to_a_repository_that_knows_the_folder() {
     assert!(git(&outer, &["init", "-q"]) && git(&outer, &module));
     let sub = read("outer/sub");
     assert!(sub.contains("code of 2023-12-24"), "{sub}");
+    // A clone without the bytes of its files, which are not fetched.
+    assert!(git(
+        &workspace,
+        &["config", "uploadpack.allowFilter", "true"]
+    ));
+    let url = format!("file://{}", workspace.display());
+    let partial = ["clone", "-q", "--filter=blob:none", "--no-checkout"];
+    let partial = [&partial[..], &[&url, "partial"]].concat();
+    assert!(git(folder.path(), &partial));
+    let said = read("partial");
+    assert!(said.contains("does not hold all files of commit"), "{said}");
     // Names the repository of another folder.
     for way in ["file", "link"] {
         let foreign = folder.path().join(way);

@@ -174,7 +174,7 @@ impl Stamps {
             };
             part.push((timed.time, timed.size));
         })?;
-        let is_sized = self.sized(id);
+        let sized = self.sized(id);
         // They were counted when they came.
         let days = self.days.clone();
         if let Some(series) = self.series.get_mut(id.0 as usize) {
@@ -182,8 +182,8 @@ impl Stamps {
         }
         let rest = self.series();
         for (id, part) in [(id, early), (rest, late)] {
-            let (times, sizes): (Vec<Stamp>, Vec<u32>) = part.into_iter().unzip();
-            self.add(id, &times, is_sized.then_some(&sizes[..]));
+            let (stamps, bytes): (Vec<Stamp>, Vec<u32>) = part.into_iter().unzip();
+            self.add(id, &stamps, sized.then_some(&bytes[..]));
         }
         self.finish()?;
         self.days = days;

@@ -61,7 +61,6 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
             });
         }
         Some(_) => "holds no source code of this folder in",
-        // A partial clone, from which nothing is fetched.
         None => "does not hold all files of",
     };
     lying(&format!("git {reason} commit {}", short(&commit)))
@@ -212,8 +211,12 @@ fn of_commit(folder: &Path, commit: &str, prefix: &str) -> Option<Files> {
     if read.is_err() || !done.success() && !is_cut {
         return None;
     }
-    let entries = list.split(|b| *b == 0).filter_map(entry);
-    let mut wanted: Vec<(String, String)> = entries.collect();
+    let entries: Vec<GitEntry> = list.split(|b| *b == 0).filter_map(entry).collect();
+    if entries.iter().any(|entry| entry.size.is_none()) {
+        return None;
+    }
+    let small = entries.into_iter().filter(|e| e.size <= Some(LONGEST));
+    let mut wanted: Vec<(String, String)> = small.map(|e| (e.path, e.id)).collect();
     let is_cut = is_cut || wanted.len() > MOST_FILES;
     wanted.truncate(MOST_FILES);
     let mut files = bytes(folder, wanted)?;
@@ -221,18 +224,30 @@ fn of_commit(folder: &Path, commit: &str, prefix: &str) -> Option<Files> {
     Some(files)
 }
 
-/// The path and the object of a relevant file: `100644 blob <id> <size>\t<path>`.
-fn entry(line: &[u8]) -> Option<(String, String)> {
+/// A relevant file in a commit.
+struct GitEntry {
+    path: String,
+    /// The object with its bytes.
+    id: String,
+    /// In bytes; `None` where the object is missing, as in a partial clone, for which nothing is fetched.
+    size: Option<u64>,
+}
+
+/// A relevant file in a line of a listing: `100644 blob <id> <size>\t<path>`.
+fn entry(line: &[u8]) -> Option<GitEntry> {
     let line = std::str::from_utf8(line).ok()?;
     let (about, path) = line.split_once('\t')?;
     let about: Vec<&str> = about.split_whitespace().collect();
     let [mode, "blob", id, size] = about[..] else {
         return None;
     };
-    let is_file = mode.starts_with("100") && size.parse::<u64>().is_ok_and(|size| size <= LONGEST);
     // A script without an ending is a program, by its mode.
     let kind = kind(path).filter(|kind| *kind != FileKind::Script || mode == "100755");
-    (is_file && kind.is_some()).then(|| (path.to_owned(), id.to_owned()))
+    (mode.starts_with("100") && kind.is_some()).then(|| GitEntry {
+        path: path.to_owned(),
+        id: id.to_owned(),
+        size: size.parse().ok(),
+    })
 }
 
 /// The bytes of objects, under their paths.

@@ -14,10 +14,9 @@ pub(super) fn is_own(folder: &Path, setting: impl Fn(&Path, &str) -> Option<Stri
     let Ok(folder) = folder.canonicalize() else {
         return false;
     };
-    let found = folder.ancestors().find_map(|above| {
-        let entry = above.join(".git");
-        Some((above, fs::symlink_metadata(&entry).ok()?, entry))
-    });
+    let mut entries = folder.ancestors().map(|above| (above, above.join(".git")));
+    let found =
+        entries.find_map(|(above, entry)| Some((above, fs::symlink_metadata(&entry).ok()?, entry)));
     match found {
         None => true,
         Some((_, about, _)) if about.is_dir() => true,

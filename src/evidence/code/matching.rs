@@ -46,6 +46,18 @@ pub(crate) struct Outcome {
     pub(crate) undrawn: Vec<String>,
 }
 
+/// The code of the nodes that the bag names.
+#[derive(Default)]
+struct NamedCode {
+    /// The number of edges drawn, and of nodes that they belong to.
+    drawn: (usize, usize),
+    /// Programs whose nodes the bag names.
+    explained: BTreeSet<(String, String)>,
+    remarks: BTreeSet<String>,
+    /// Nodes without code.
+    without: Vec<String>,
+}
+
 /// Adds the edges that the code declares for nodes that the bag names, and the only possible places if asked for.
 pub(crate) fn conclude(
     code: &Code,
@@ -54,6 +66,41 @@ pub(crate) fn conclude(
 ) -> Outcome {
     let recorded = RecordedTopics::of(known);
     let named = named(known);
+    let found = draw_named(code, known, &recorded, &named);
+    let known_nodes = named.keys().cloned().collect();
+    let logged = named.values().any(|(_, words)| words.contains("rosout"));
+    let bag = only::BagTopics {
+        recorded: &recorded,
+        explained: &found.explained,
+        named: &known_nodes,
+        logged,
+        owner,
+    };
+    let (inferred, undrawn) = only::conclude(code, known, &bag);
+    let mut notices = code.notices.clone();
+    notices.push(summary(code, found.drawn, inferred, &undrawn));
+    let mut lines: Vec<String> = undrawn
+        .iter()
+        .map(|(reason, text)| format!("{text}: {}", reason.words()))
+        .collect();
+    lines.extend(found.remarks);
+    if !found.without.is_empty() && !code.instances.is_empty() {
+        let without = some_of(&found.without, MOST_NAMES);
+        lines.push(format!("no code was found for {without}"));
+    }
+    Outcome {
+        notices,
+        undrawn: lines,
+    }
+}
+
+/// Adds the edges that the code declares for nodes that the bag names.
+fn draw_named(
+    code: &Code,
+    known: &mut Conclusions<'_>,
+    recorded: &RecordedTopics,
+    named: &NamedNodes,
+) -> NamedCode {
     let mut by_name: BTreeMap<&str, Vec<&Instance>> = BTreeMap::new();
     for instance in &code.instances {
         by_name
@@ -61,56 +108,29 @@ pub(crate) fn conclude(
             .or_default()
             .push(instance);
     }
-    let (mut edges, mut nodes) = (0, 0);
-    let mut explained = BTreeSet::new();
-    let (mut remarks, mut without) = (BTreeSet::new(), Vec::new());
-    for (text, (node, words)) in &named {
+    let mut all = NamedCode::default();
+    for (text, (node, words)) in named {
         let candidates = by_name
             .get(last_part(text))
             .or_else(|| by_name.get(without_numbers(last_part(text))));
         let Some(candidates) = candidates else {
-            without.push(text.clone());
+            all.without.push(text.clone());
             continue;
         };
-        let matches = best(candidates, text, &recorded);
+        let matches = best(candidates, text, recorded);
         let mut drawn = 0;
         for found in &matches {
-            drawn += usize::from(draw(code, known, &recorded, (*node, words), found));
-            explained.insert(found.instance.program.clone());
+            drawn += usize::from(draw(code, known, recorded, (*node, words), found));
+            all.explained.insert(found.instance.program.clone());
         }
         if let Some(found) = matches.first() {
-            remarks.extend(remarks_on(found.instance, text, &recorded));
+            let remarks = remarks_on(found.instance, text, recorded);
+            all.remarks.extend(remarks);
         }
-        edges += drawn;
-        nodes += usize::from(drawn > 0);
+        all.drawn.0 += drawn;
+        all.drawn.1 += usize::from(drawn > 0);
     }
-    let known_nodes = named.keys().cloned().collect();
-    let logged = named.values().any(|(_, words)| words.contains("rosout"));
-    let bag = only::BagTopics {
-        recorded: &recorded,
-        explained: &explained,
-        named: &known_nodes,
-        logged,
-        owner,
-    };
-    let (inferred, undrawn) = only::conclude(code, known, &bag);
-    let mut notices = code.notices.clone();
-    notices.push(summary(code, (edges, nodes), inferred, &undrawn));
-    let mut lines: Vec<String> = undrawn
-        .iter()
-        .map(|(reason, text)| format!("{text}: {}", reason.words()))
-        .collect();
-    lines.extend(remarks);
-    if !without.is_empty() && !code.instances.is_empty() {
-        lines.push(format!(
-            "no code was found for {}",
-            some_of(&without, MOST_NAMES)
-        ));
-    }
-    Outcome {
-        notices,
-        undrawn: lines,
-    }
+    all
 }
 
 /// The most nodes without code that are named.
@@ -228,10 +248,12 @@ impl RecordedTopics {
     }
 }
 
-/// The nodes that the bag names by more than a declaration, by their names, with the words of the sources that name
-/// them.
-fn named(known: &Conclusions<'_>) -> BTreeMap<String, (Name, BTreeSet<&'static str>)> {
-    let mut named: BTreeMap<String, (Name, BTreeSet<&str>)> = BTreeMap::new();
+/// Nodes by their names, with the words of the sources that name them.
+type NamedNodes = BTreeMap<String, (Name, BTreeSet<&'static str>)>;
+
+/// The nodes that the bag names by more than a declaration.
+fn named(known: &Conclusions<'_>) -> NamedNodes {
+    let mut named = NamedNodes::new();
     for proof in known.proofs.iter().filter(|p| p.degree != Degree::Declared) {
         let node = match proof.what {
             ElementKey::Node(node)

@@ -139,36 +139,48 @@ impl Workspace {
     pub(super) fn instances(&self) -> Vec<Instance> {
         let mut all = Vec::new();
         let mut declared = 0;
-        for (file, code) in self.files.iter().enumerate() {
+        for file in 0..self.files.len() {
             if declared > MOST_OF_ALL || all.len() > MOST_INSTANCES {
                 break;
             }
-            let mut nodes: Vec<CodeNode> = self.free_node(&[file]).into_iter().collect();
-            let given = code.code.classes.iter().flat_map(|c| &c.mentions);
-            let given: BTreeMap<&str, &String> = given
-                .filter_map(|(class, name)| Some((class.as_str(), name.as_ref()?)))
-                .collect();
-            for (place, class) in code.code.classes.iter().enumerate() {
-                if class.is_defined && self.is_node((file, place), 0) {
-                    nodes.push(self.class_node((file, place)));
-                }
-            }
-            for (class, name) in given {
-                let parts = self.meant(class, file);
-                if let Some(part) = parts.first().filter(|p| self.is_node(**p, 0)) {
-                    let mut node = self.class_node(*part);
-                    // A text at the call may be anything; the name counts where the class has none of its own.
-                    if node.names.is_empty() {
-                        node.names.push(name.clone());
-                        nodes.push(node);
-                    }
-                }
-            }
-            for node in nodes {
+            for node in self.nodes_in(file) {
                 declared += node.declared.len();
                 all.extend(node.names.iter().map(|name| as_written(&node, name)));
             }
         }
+        self.launched(&mut all);
+        all
+    }
+
+    /// The nodes in the code of a file.
+    fn nodes_in(&self, file: usize) -> Vec<CodeNode> {
+        let classes = &self.files[file].code.classes;
+        let mut nodes: Vec<CodeNode> = self.free_node(&[file]).into_iter().collect();
+        for (place, class) in classes.iter().enumerate() {
+            if class.is_defined && self.is_node((file, place), 0) {
+                nodes.push(self.class_node((file, place)));
+            }
+        }
+        let given = classes.iter().flat_map(|c| &c.mentions);
+        let given: BTreeMap<&str, &String> = given
+            .filter_map(|(class, name)| Some((class.as_str(), name.as_ref()?)))
+            .collect();
+        for (class, name) in given {
+            let parts = self.meant(class, file);
+            if let Some(part) = parts.first().filter(|p| self.is_node(**p, 0)) {
+                let mut node = self.class_node(*part);
+                // A text at the call may be anything; the name counts where the class has none of its own.
+                if node.names.is_empty() {
+                    node.names.push(name.clone());
+                    nodes.push(node);
+                }
+            }
+        }
+        nodes
+    }
+
+    /// Adds the nodes that launch files start.
+    fn launched(&self, all: &mut Vec<Instance>) {
         let mut programs = BTreeMap::new();
         for (path, launched) in &self.launches {
             for node in launched.iter().take(MOST_INSTANCES) {
@@ -178,11 +190,10 @@ impl Workspace {
                     .or_insert_with(|| self.program(&node.package, &node.program));
                 all.extend(as_launched(path, node, nodes));
                 if all.len() > MOST_INSTANCES || programs.len() > MOST_PROGRAMS {
-                    return all;
+                    return;
                 }
             }
         }
-        all
     }
 
     /// The nodes of an executable, a component or a nodelet of a package.

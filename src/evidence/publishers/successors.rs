@@ -203,16 +203,15 @@ impl<'a> RewrittenBag<'a> {
     /// Whether the bag has no message at all in half of this time or more: then the recorder was silent, not the node.
     fn is_all_quiet(&mut self, from: Stamp, to: Stamp) -> io::Result<bool> {
         if self.pauses.is_none() {
-            self.pauses = Some(self.pauses()?);
+            self.pauses = Some(self.long_pauses()?);
         }
-        let pauses = self.pauses.iter().flatten();
         let inside = |(a, b): &(Stamp, Stamp)| (*b).min(to).since((*a).max(from)).max(0);
-        let quiet: i64 = pauses.map(inside).sum();
+        let quiet: i64 = self.pauses.iter().flatten().map(inside).sum();
         Ok(quiet >= to.since(from) / 2)
     }
 
-    /// The times without any message.
-    fn pauses(&self) -> io::Result<Vec<(Stamp, Stamp)>> {
+    /// The times of a second or more without any message.
+    fn long_pauses(&self) -> io::Result<Vec<(Stamp, Stamp)>> {
         let of = |at: &usize| self.streams[*at].times;
         let ids: Vec<SeriesId> = self.of_bag.iter().map(of).collect();
         let mut last: Option<Stamp> = None;

@@ -45,17 +45,27 @@ pub(crate) fn read(
             heard.claim(Claim::Carries(publisher, node), Degree::Stated, String::new);
         }
     }
-    // The list is whole: what is in an earlier one and not in this one is no longer the node's.
+    let claim = match file.rsplit('.').next() {
+        Some("py") => Claim::Lists,
+        _ => Claim::Publish,
+    };
+    list(heard, (name, message), &topics, claim);
+    Ok(())
+}
+
+/// Takes the list of topics in a log record of a node, with its text. It is whole: what is in an earlier one and not in
+/// this one is no longer the node's.
+fn list(
+    heard: &mut SourceContext<'_>,
+    (name, message): (&str, &str),
+    topics: &[&str],
+    claim: fn(Name, Name) -> Claim,
+) {
+    let node = heard.name(name);
     let list = heard.name(&format!("topics of {name}"));
-    let rospy = file.rsplit('.').next() == Some("py");
     for topic in topics {
         let words = || format!("{name} logs with {topic} in its list of topics: {message}");
-        let topic = heard.name(topic);
-        let claim = if rospy {
-            Claim::Lists(node, topic)
-        } else {
-            Claim::Publish(node, topic)
-        };
+        let claim = claim(node, heard.name(topic));
         heard.say(
             Statement {
                 claim,
@@ -66,7 +76,6 @@ pub(crate) fn read(
         );
     }
     heard.claim(Claim::Snapshot(list), Degree::Stated, String::new);
-    Ok(())
 }
 
 /// A topic in a rospy node's list that it is known to publish is a publication; one that others publish is a
