@@ -13,6 +13,9 @@ use crate::graph::{Edge, Element, Elements};
 /// The least number of equal namespaces that are drawn as one; fewer are drawn side by side.
 const FEWEST: usize = 3;
 
+/// The most equal namespaces that are drawn as one: the presence of each is kept for each window.
+const MOST: usize = 1024;
+
 /// The most digits of an index: longer numbers are times, process numbers or serial numbers.
 const MOST_DIGITS: usize = 6;
 
@@ -43,6 +46,8 @@ pub(crate) struct Fleets {
     pub(crate) all: Vec<Fleet>,
     /// The place of each namespace's fleet, by the name of the namespace.
     place: BTreeMap<Arc<str>, usize>,
+    /// The place of each fleet by the name it is drawn under.
+    drawn: BTreeMap<Arc<str>, usize>,
 }
 
 /// A hash for each thing that a namespace holds or is linked to, without the name of the namespace.
@@ -52,9 +57,10 @@ impl Fleets {
     /// The fleets among these elements, but for namespaces that are kept open.
     pub(crate) fn new(elements: &Elements, options: &ViewOptions) -> Self {
         let mut by_stem: BTreeMap<&str, BTreeMap<&str, Inside>> = BTreeMap::new();
+        let kept = options.expand.iter().chain(&options.collapse);
+        let kept: BTreeSet<&str> = kept.map(|k| k.trim_end_matches('/')).collect();
         for (space, what) in described(elements) {
-            let kept = options.expand.iter().chain(&options.collapse);
-            if !kept.into_iter().any(|k| k.trim_end_matches('/') == space) {
+            if !kept.contains(space) {
                 let inside = by_stem.entry(stem(space)).or_default();
                 inside.entry(space).or_default().insert(what);
             }
@@ -72,40 +78,37 @@ impl Fleets {
             // Of single names a few are soon equal by chance.
             let is_rule =
                 |m: &Vec<&str>| 2 * m.len() > many || !m.iter().all(|s| single.contains(s));
-            if let Some(members) = largest.filter(|m| m.len() >= FEWEST && is_rule(m)) {
+            if let Some(members) =
+                largest.filter(|m| (FEWEST..=MOST).contains(&m.len()) && is_rule(m))
+            {
                 found.push((stem, members));
             }
         }
         keep_linked(&mut found, &partners(elements));
+        let known = Known::new(elements);
         let mut fleets = Self::default();
         for (stem, mut members) in found {
             members.sort_by_key(|m| (m.len(), *m));
-            fleets.add(stem, &members, elements);
+            fleets.add(stem, &members, &known);
         }
         fleets
     }
 
-    fn add(&mut self, stem: &str, members: &[&str], elements: &Elements) {
+    fn add(&mut self, stem: &str, members: &[&str], known: &Known<'_>) {
         let digits = members.iter().map(|m| m.len() - stem.len()).max();
         let name = format!("{stem}{}", "N".repeat(digits.unwrap_or(1)));
-        if names(elements).any(|(known, _)| within(known, &name)) {
+        if known.holds(&name) {
             return;
         }
-        let members: Vec<Arc<str>> = members.iter().map(|m| Arc::from(*m)).collect();
-        let own = |member: &Arc<str>| {
-            let all = names(elements).filter(|(name, _)| space_of(name) == Some(member));
-            let (nodes, topics): (Vec<Element>, Vec<Element>) = all
-                .map(|(_, element)| element)
-                .partition(|element| matches!(element, Element::Node(_)));
-            if nodes.is_empty() { topics } else { nodes }
-        };
-        for member in &members {
-            self.place.insert(Arc::clone(member), self.all.len());
+        let name: Arc<str> = name.into();
+        self.drawn.insert(Arc::clone(&name), self.all.len());
+        for member in members {
+            self.place.insert(Arc::from(*member), self.all.len());
         }
         self.all.push(Fleet {
-            name: name.into(),
-            elements: members.iter().map(own).collect(),
-            members,
+            name,
+            elements: members.iter().map(|m| known.nodes_or_topics(m)).collect(),
+            members: members.iter().map(|m| Arc::from(*m)).collect(),
         });
     }
 
@@ -119,7 +122,45 @@ impl Fleets {
 
     /// The fleet that something drawn under this name is part of.
     pub(crate) fn of(&self, drawn: &str) -> Option<&Fleet> {
-        self.all.iter().find(|fleet| within(drawn, &fleet.name))
+        let around = std::iter::successors(Some(drawn), |name| Some(namespace(name)));
+        let mut around = around.take_while(|name| name.len() > 1);
+        let place = around.find_map(|name| self.drawn.get(name))?;
+        self.all.get(*place)
+    }
+}
+
+/// The names of a mission, and the contents of each namespace with an index.
+struct Known<'a> {
+    names: BTreeSet<&'a str>,
+    inside: BTreeMap<&'a str, Vec<Element>>,
+}
+
+impl<'a> Known<'a> {
+    fn new(elements: &'a Elements) -> Self {
+        let mut inside: BTreeMap<&str, Vec<Element>> = BTreeMap::new();
+        for (name, element) in names(elements) {
+            if let Some(space) = space_of(name) {
+                inside.entry(space).or_default().push(element);
+            }
+        }
+        Self {
+            names: names(elements).map(|(name, _)| name).collect(),
+            inside,
+        }
+    }
+
+    /// Whether something is called like this namespace or lies in it.
+    fn holds(&self, space: &str) -> bool {
+        let below = format!("{space}/");
+        let next = self.names.range(below.as_str()..).next();
+        self.names.contains(space) || next.is_some_and(|name| name.starts_with(&below))
+    }
+
+    fn nodes_or_topics(&self, space: &str) -> Vec<Element> {
+        let all = self.inside.get(space).into_iter().flatten().copied();
+        let (nodes, topics): (Vec<Element>, Vec<Element>) =
+            all.partition(|element| matches!(element, Element::Node(_)));
+        if nodes.is_empty() { topics } else { nodes }
     }
 }
 
@@ -366,6 +407,19 @@ mod tests {
         let more = " /a</out_1 /b</out_2 /work_5>/out_5 /work_5>/x /work_6>/out_6 /work_6>/y";
         let items = seen(&(chain.to_owned() + more)).items;
         assert!(items.iter().all(|item| !item.is_replica), "{items:?}");
+    }
+
+    #[test]
+    fn thousands_of_names_are_no_fleet() {
+        let folded = |many: usize| {
+            let text: Vec<String> = (0..many).map(|n| format!("/n{n}")).collect();
+            outline(&mission(&[&text.join(" ")]), &ViewOptions::default())
+                .items
+                .len()
+                == 1
+        };
+        assert!(folded(MOST));
+        assert!(!folded(MOST + 1));
     }
 
     #[test]
