@@ -5,8 +5,7 @@ use tiny_skia::{Pixmap, PixmapMut, Transform};
 
 use super::Pixels;
 
-/// The largest number of pixels that are kept of one group: a box with its words has about ten thousand. Of a long
-/// line nearly all would be clear, and drawing it is as quick as laying them.
+/// The largest number of pixels around a group of which pixels are kept: a box with its words has about ten thousand.
 const MOST_PIXELS: f64 = 65_536.0;
 /// Pixels around a group's box, for soft edges.
 const MARGIN: f64 = 2.0;
@@ -17,13 +16,18 @@ pub(super) enum Drawn {
     Tree(Box<Tree>),
 }
 
-/// The pixels of a group and their place on the page.
+/// The pixels of a group that are not clear: lines leave most of the area around them clear.
 pub(super) struct GroupPixels {
-    left: usize,
-    top: usize,
-    width: usize,
-    /// Premultiplied red, green, blue and alpha, row by row.
+    runs: Vec<Run>,
+    /// Premultiplied red, green, blue and alpha, run by run.
     rgba: Vec<u8>,
+}
+
+/// Pixels side by side.
+struct Run {
+    /// The number of pixels of the page before it.
+    at: usize,
+    length: usize,
 }
 
 impl Drawn {
@@ -38,7 +42,7 @@ impl Drawn {
     /// The bytes that are kept of its pixels.
     pub(super) fn bytes(&self) -> usize {
         match self {
-            Self::Pixels(pixels) => pixels.rgba.len(),
+            Self::Pixels(pixels) => pixels.rgba.len() + size_of_val(&*pixels.runs),
             Self::Tree(_) => 0,
         }
     }
@@ -84,26 +88,49 @@ impl GroupPixels {
         #[expect(clippy::cast_precision_loss, reason = "at most 65,535")]
         let moved = scaled(scale).post_translate(-(left as f32), -(top as f32));
         resvg::render(tree, moved, &mut map.as_mut());
-        Some(Self {
-            left: left as usize,
-            top: top as usize,
-            width: width as usize,
-            rgba: map.take(),
-        })
+        Some(Self::inked(
+            &map,
+            (left as usize, top as usize),
+            page.0 as usize,
+        ))
+    }
+
+    /// The pixels of `map` that are not clear; its corner stands at this column and row of a page `across` pixels wide.
+    fn inked(map: &Pixmap, (left, top): (usize, usize), across: usize) -> Self {
+        let (mut runs, mut rgba) = (Vec::new(), Vec::new());
+        let rows = map.data().chunks_exact(map.width() as usize * 4);
+        for (row, y) in rows.zip(top..) {
+            let mut x = left + y * across;
+            for run in row
+                .as_chunks::<4>()
+                .0
+                .chunk_by(|a, b| (a[3] == 0) == (b[3] == 0))
+            {
+                if run[0][3] != 0 {
+                    runs.push(Run {
+                        at: x,
+                        length: run.len(),
+                    });
+                    rgba.extend_from_slice(run.as_flattened());
+                }
+                x += run.len();
+            }
+        }
+        Self { runs, rgba }
     }
 
     fn lay(&self, page: &mut Pixels) {
-        let across = page.width as usize * 4;
-        let rows = page.rgba.chunks_exact_mut(across).skip(self.top);
-        for (row, from) in rows.zip(self.rgba.chunks_exact(self.width * 4)) {
-            let to = &mut row[self.left * 4..(self.left + self.width) * 4];
-            for (to, from) in to.chunks_exact_mut(4).zip(from.chunks_exact(4)) {
+        let mut from = &self.rgba[..];
+        for run in &self.runs {
+            let (now, later) = from.split_at(run.length * 4);
+            let to = &mut page.rgba[run.at * 4..(run.at + run.length) * 4];
+            for (to, from) in to.chunks_exact_mut(4).zip(now.chunks_exact(4)) {
                 match from[3] {
-                    0 => {}
                     255 => to.copy_from_slice(from),
                     alpha => over(to, from, 255 - alpha),
                 }
             }
+            from = later;
         }
     }
 }
