@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn what_lies_close_is_asked_for_together() {
-        let far = GAP + 1000;
+        let far = 999 + GAP;
         let ranges = vec![far..far + 10, 0..100, 50..999, 200..300, 9 << 30..10 << 30];
         let one = 0..far + 10;
         assert_eq!(together(ranges, 1 << 30), [one]);
