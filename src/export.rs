@@ -2,6 +2,8 @@
 
 mod animated_svg;
 mod apng;
+#[cfg(feature = "arrow")]
+pub(crate) mod arrow;
 pub(crate) mod check;
 pub(crate) mod dot;
 pub(crate) mod encoder;

@@ -115,7 +115,7 @@ const EXCEPTIONS: &[(&str, &[&str])] = &[
     // Names are filtered as in `rqt_graph`; missions are named by a part of a path.
     ("regex", &["pipeline/fleet/plan", "view/filter"]),
     // Times are read and spelled.
-    ("jiff", &["base"]),
+    ("chrono", &["base"]),
     // Plain functions on numbers, as the standard library's would be.
     ("libm", &[]),
 ];

@@ -2,14 +2,11 @@
 //! that merge to it, and counts that are those of a mission read on one machine.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
-use arrow_array::RecordBatch;
-use arrow_array::cast::AsArray as _;
-use arrow_array::types::Int64Type;
 use bagreel::bag::Tier;
 use bagreel::fleet::{
     Count, CountDetail, CountedBag, PlannedBag, Planning, Tally, count, finish, merge, plan,
@@ -18,10 +15,10 @@ use bagreel::internals::graph::window::Align;
 use bagreel::internals::mission::write_json;
 use bagreel::values::{Length, Period, Span, Stamp};
 use bagreel::{Mission, Reading, read};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+use parquet::record::{Field, Row};
 use proptest::prelude::*;
 
-use crate::support::{self, rosbag1};
+use crate::support::{self, parquet_rows, rosbag1};
 
 const WAREHOUSE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/warehouse.bag");
 const COURIER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/courier.mcap");
@@ -54,11 +51,6 @@ fn ends(folder: &Path, args: &[&str], code: i32) -> String {
     said
 }
 
-fn batches(path: &Path) -> Vec<RecordBatch> {
-    let reader = ParquetRecordBatchReader::try_new(File::open(path).unwrap(), 1 << 20).unwrap();
-    reader.map(|batch| batch.unwrap()).collect()
-}
-
 /// Every file of a table, in order of names.
 fn files(folder: &Path, table: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder.join(table)).unwrap();
@@ -67,47 +59,44 @@ fn files(folder: &Path, table: &str) -> Vec<PathBuf> {
     files
 }
 
+/// All rows of a table, whatever its files.
+fn table(folder: &Path, table: &str) -> impl Iterator<Item = Row> {
+    let files = files(folder, table).into_iter();
+    files.flat_map(|file| parquet_rows(&file))
+}
+
 /// The rows of a table as text, sorted: whatever the files, the same rows are the same.
-fn rows(folder: &Path, table: &str) -> Vec<String> {
-    let mut all = Vec::new();
-    for batch in files(folder, table).iter().flat_map(|file| batches(file)) {
-        for row in 0..batch.num_rows() {
-            let cell = |column: &arrow_array::ArrayRef| format!("{:?}", column.slice(row, 1));
-            all.push(
-                batch
-                    .columns()
-                    .iter()
-                    .map(cell)
-                    .collect::<Vec<_>>()
-                    .join("|"),
-            );
-        }
-    }
+fn rows(folder: &Path, name: &str) -> Vec<String> {
+    let mut all: Vec<String> = table(folder, name).map(|row| row.to_string()).collect();
     all.sort();
     all
 }
 
-fn texts(folder: &Path, table: &str, column: &str) -> Vec<String> {
-    let batches = files(folder, table)
-        .into_iter()
-        .flat_map(|file| batches(&file));
-    let mut all: Vec<String> = Vec::new();
-    for batch in batches {
-        let column = batch.column_by_name(column).unwrap().as_string::<i32>();
-        all.extend(column.iter().map(|text| text.unwrap_or("").to_owned()));
-    }
-    all
+/// The fields of a column.
+fn column(folder: &Path, name: &str, column: &str) -> impl Iterator<Item = Field> {
+    let rows = table(folder, name);
+    rows.map(move |row| {
+        let mut fields = row.into_columns().into_iter();
+        fields.find(|(name, _)| name == column).unwrap().1
+    })
 }
 
-fn sum(folder: &Path, table: &str, column: &str) -> i64 {
-    let batches = files(folder, table)
-        .into_iter()
-        .flat_map(|file| batches(&file));
-    let of = |batch: RecordBatch| -> i64 {
-        let column = batch.column_by_name(column).unwrap();
-        column.as_primitive::<Int64Type>().iter().flatten().sum()
+fn texts(folder: &Path, name: &str, of: &str) -> Vec<String> {
+    let text = |field| match field {
+        Field::Str(text) => text,
+        Field::Null => String::new(),
+        other => panic!("{of}: {other}"),
     };
-    batches.map(of).sum()
+    column(folder, name, of).map(text).collect()
+}
+
+fn sum(folder: &Path, name: &str, of: &str) -> i64 {
+    let number = |field| match field {
+        Field::Long(number) => number,
+        Field::Null => 0,
+        other => panic!("{of}: {other}"),
+    };
+    column(folder, name, of).map(number).sum()
 }
 
 /// A folder of bags: good ones, an empty one, a cut one, a foreign file that calls itself a bag.
@@ -210,11 +199,10 @@ fn odd_names_are_counted_too() {
 fn columns_are_those_that_are_promised() {
     let dir = tempfile::tempdir().unwrap();
     ends(dir.path(), &["tables", WAREHOUSE, "-o", "t"], 0);
-    let names = |table: &str| {
-        let batch = batches(&files(&dir.path().join("t"), table)[0]).remove(0);
-        let schema = batch.schema();
-        let names: Vec<&str> = schema.fields().iter().map(|f| f.name().as_str()).collect();
-        names.join(", ")
+    let names = |name: &str| {
+        let row = table(&dir.path().join("t"), name).next().unwrap();
+        let names = row.get_column_iter().map(|(name, _)| name.as_str());
+        names.collect::<Vec<_>>().join(", ")
     };
     let help = bagreel(dir.path(), &["tables", "--help"]);
     let help = String::from_utf8(help.stdout).unwrap();
@@ -319,7 +307,7 @@ fn a_killed_run_leaves_whole_files_and_the_next_one_finishes_it() {
             .filter(|f| !f.file_name().unwrap().to_string_lossy().starts_with('.'))
     };
     for file in visible("counts").chain(visible("bags")) {
-        assert_eq!(batches(&file).len(), 1, "{file:?}");
+        assert_eq!(parquet_rows(&file).count(), 1, "{file:?}");
     }
     ends(dir.path(), &args, 0);
     assert_eq!(texts(&table, "bags", "uri").len(), 300);

@@ -208,3 +208,13 @@ pub fn shared(below: &str) -> Option<PathBuf> {
     }
     Some(path)
 }
+
+/// The rows of a Parquet file.
+#[cfg(feature = "parquet")]
+pub fn parquet_rows(path: &Path) -> Vec<parquet::record::Row> {
+    use parquet::file::reader::{FileReader as _, SerializedFileReader};
+    let file = std::fs::File::open(path).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let rows = reader.get_row_iter(None).unwrap();
+    rows.map(|row| row.unwrap()).collect()
+}

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::num::NonZeroI64;
 
+use chrono::DateTime;
+
 use super::words;
 
 /// A point in time: nanoseconds since 1970-01-01T00:00:00Z, by the clock of the recorder.
@@ -42,20 +44,19 @@ impl Stamp {
         self.0.saturating_sub(earlier.0)
     }
 
-    /// As RFC 3339 in UTC, to the nanosecond if needed; `None` outside the years that RFC 3339 can write.
-    pub fn rfc3339(self) -> Option<String> {
-        jiff::Timestamp::from_nanosecond(i128::from(self.0))
-            .ok()
-            .map(|t| t.to_string())
+    /// As RFC 3339 in UTC, to the nanosecond if needed.
+    pub fn rfc3339(self) -> String {
+        let second = DateTime::from_timestamp_nanos(self.0).format("%Y-%m-%dT%H:%M:%S");
+        match self.0.rem_euclid(SECOND) {
+            0 => format!("{second}Z"),
+            nanos => format!("{second}.{}Z", format!("{nanos:09}").trim_end_matches('0')),
+        }
     }
 }
 
 impl fmt::Display for Stamp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.rfc3339() {
-            Some(text) => f.write_str(&text),
-            None => write!(f, "{} ns", self.0),
-        }
+        f.write_str(&self.rfc3339())
     }
 }
 
@@ -165,10 +166,8 @@ impl Moment {
     /// Reads `90`, `1:30`, `2m` (after the start), `-30s` (before the end) or RFC 3339. `None` if it is none of these.
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
-        if let Ok(t) = text.parse::<jiff::Timestamp>() {
-            return i64::try_from(t.as_nanosecond())
-                .ok()
-                .map(|n| Self::Absolute(Stamp(n)));
+        if let Ok(t) = DateTime::parse_from_rfc3339(text) {
+            return t.timestamp_nanos_opt().map(|n| Self::Absolute(Stamp(n)));
         }
         match text.strip_prefix('-') {
             Some(rest) => parse_nanos(rest).map(Self::BeforeEnd),

@@ -4,6 +4,8 @@
 
 use std::borrow::Cow;
 
+use chrono::DateTime;
+
 const SECOND: i64 = 1_000_000_000;
 
 /// A rate in messages per second: `50 Hz`, `12.5 Hz`, `0.25 Hz`, `1.2 kHz`; `0 Hz` for an infinite one, NaN and below
@@ -197,21 +199,16 @@ pub fn clock(nanos: i64) -> String {
     )
 }
 
-/// Date and zone of a time since 1970, in nanoseconds: `2024-05-03 UTC`; just `UTC` where the year is outside 0..=9999.
+/// Date and zone of a time since 1970, in nanoseconds: `2024-05-03 UTC`.
 pub fn date(nanos: i64) -> String {
-    match jiff::Timestamp::from_second(nanos.div_euclid(SECOND)) {
-        Ok(time) => time.strftime("%Y-%m-%d UTC").to_string(),
-        Err(_) => "UTC".to_owned(),
-    }
+    let time = DateTime::from_timestamp_nanos(nanos);
+    time.format("%Y-%m-%d UTC").to_string()
 }
 
-/// Date, clock and zone of a time since 1970, in nanoseconds: `2024-05-03 14:03:22 UTC`; the bare number of seconds
-/// where the year is outside 0..=9999.
+/// Date, clock and zone of a time since 1970, in nanoseconds: `2024-05-03 14:03:22 UTC`.
 pub fn date_and_clock(nanos: i64) -> String {
-    match jiff::Timestamp::from_second(nanos.div_euclid(SECOND)) {
-        Ok(time) => time.strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
-        Err(_) => format!("{} s", nanos.div_euclid(SECOND)),
-    }
+    let time = DateTime::from_timestamp_nanos(nanos);
+    time.format("%Y-%m-%d %H:%M:%S UTC").to_string()
 }
 
 /// `text` in at most `most` characters, its end cut with `…`.

@@ -99,9 +99,7 @@ impl Fonts {
     /// # Errors
     /// [`Error::BadFile`] where `data`, read from `path`, is not a TrueType or OpenType font.
     pub fn with(mut self, data: Vec<u8>, path: &Path) -> Result<Self> {
-        // Whoever shapes text for a PDF takes it for granted that this reader takes the font too.
-        let sound = ttf_parser::Face::parse(&data, 0).is_ok();
-        let face = Face::read(Cow::Owned(data)).filter(|_| sound);
+        let face = Face::read(Cow::Owned(data));
         let face = face.ok_or_else(|| Error::BadFile {
             path: path.to_owned(),
             line: 0,

@@ -1,35 +1,32 @@
-//! Tables as Apache Parquet: one column of Arrow per column, compressed by zstd unless they are small.
+//! Tables as Apache Parquet, compressed by zstd unless they are small.
 //!
-//! Stamps are timestamps of nanoseconds in UTC, numbers keep their width, lists are lists.
-
-pub(crate) mod arrow;
+//! Stamps are timestamps of nanoseconds in UTC, numbers keep their width, lists are lists of required elements
+//! (<https://github.com/apache/parquet-format/blob/master/LogicalTypes.md>).
 
 use std::io::{self, Write};
+use std::ops::Range;
 use std::sync::Arc;
 
-use ::parquet::arrow::ArrowWriter;
-use ::parquet::arrow::arrow_writer::ArrowWriterOptions;
-use ::parquet::basic::{Compression, Encoding, ZstdLevel};
+use ::parquet::basic::{
+    Compression, Encoding, LogicalType, Repetition, TimeUnit, Type as Physical, ZstdLevel,
+};
+use ::parquet::data_type::{
+    BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type,
+};
+use ::parquet::errors::Result as ParquetResult;
 use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
-use ::parquet::schema::types::ColumnPath;
-use arrow_array::types::{
-    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
-    UInt32Type, UInt64Type,
-};
-use arrow_array::{
-    ArrayRef, ArrowPrimitiveType, BinaryArray, BooleanArray, DictionaryArray, ListArray,
-    PrimitiveArray, RecordBatch, StringArray, TimestampNanosecondArray,
-};
-use arrow_buffer::{Buffer, NullBuffer, OffsetBuffer, ScalarBuffer};
-use arrow_schema::{DataType, Field, Schema, TimeUnit};
+use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use ::parquet::schema::types::{ColumnPath, Type, TypePtr};
 
-use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn};
+use crate::base::table::{Batch, ColumnKind, ColumnValues, TableColumn, TextColumn, span};
 
-/// The largest number of rows in a group: its columns are held in memory, packed, until it is written.
+/// The largest number of rows in a group, as other writers have it.
 const MOST_ROWS: usize = 1 << 20;
-/// The number of bytes of packed columns held in memory before their group is written.
-const MOST_HELD: usize = 16 << 20;
+/// The number of bytes of values held in memory before their group is written: a million rows of the message table.
+const MOST_HELD: usize = 32 << 20;
+/// The number of values that are handed to the writer at once, so that what is made for it stays in the cache.
+const AT_ONCE: usize = 1 << 14;
 
 /// A table of fewer rows than this is not compressed, and is written in one page per column, of which nothing is said
 /// beyond what is said of the column: to set up zstd for every column takes longer than to count a bag, and saves an
@@ -38,21 +35,19 @@ const FEW_ROWS: usize = 1024;
 
 /// A table being written.
 pub(crate) struct Rows<W: Write + Send> {
-    writer: ArrowWriter<W>,
+    writer: SerializedFileWriter<W>,
+    /// The rows of the group that has not been written yet.
+    waiting: Vec<Batch>,
 }
 
 impl<W: Write + Send> Rows<W> {
     /// Begins a table with the columns of `batch`, which holds all rows or none yet; `facts` are kept in the file's
     /// metadata.
     pub(crate) fn new(to: W, batch: &Batch, facts: &[(&str, &str)]) -> io::Result<Self> {
-        let schema = Arc::new(Schema::new(
-            batch.columns.iter().map(field).collect::<Vec<_>>(),
-        ));
         let facts = facts
             .iter()
             .map(|(key, value)| KeyValue::new((*key).to_owned(), (*value).to_owned()));
         let properties = WriterProperties::builder()
-            .set_max_row_group_row_count(Some(MOST_ROWS))
             .set_created_by("bagreel".to_owned())
             .set_key_value_metadata(Some(facts.collect()));
         let properties = if (1..FEW_ROWS).contains(&batch.rows) {
@@ -65,13 +60,11 @@ impl<W: Write + Send> Rows<W> {
         // A dictionary of one value is longer than the value.
         let properties = properties.set_dictionary_enabled(batch.rows != 1);
         let properties = batch.columns.iter().fold(properties, encoded).build();
-        // Parquet's own types tell all that our columns are.
-        let options = ArrowWriterOptions::new()
-            .with_properties(properties)
-            .with_skip_arrow_metadata(true);
-        let writer = ArrowWriter::try_new_with_options(to, schema, options);
+        let writer = schema(batch)
+            .and_then(|schema| SerializedFileWriter::new(to, schema, Arc::new(properties)));
         Ok(Self {
             writer: writer.map_err(io::Error::other)?,
+            waiting: Vec::new(),
         })
     }
 
@@ -80,26 +73,46 @@ impl<W: Write + Send> Rows<W> {
         if batch.rows == 0 {
             return Ok(());
         }
-        let rows = record_batch(batch).map_err(io::Error::other)?;
-        self.writer.write(&rows).map_err(io::Error::other)?;
+        let rows: usize = self.waiting.iter().map(|b| b.rows).sum();
+        if rows + batch.rows > MOST_ROWS {
+            self.unload()?;
+        }
+        self.waiting.push(batch.clone());
         if self.held() > MOST_HELD {
             self.unload()?;
         }
         Ok(())
     }
 
-    /// The number of bytes of packed columns that it holds in memory.
+    /// The number of bytes of rows that it holds in memory.
     pub(crate) fn held(&self) -> usize {
-        self.writer.in_progress_size()
+        self.waiting.iter().map(Batch::bytes).sum()
     }
 
-    /// Ends the group of rows that is held in memory.
+    /// Writes the rows that it holds in memory as one group.
     pub(crate) fn unload(&mut self) -> io::Result<()> {
-        self.writer.flush().map_err(io::Error::other)
+        let batches = std::mem::take(&mut self.waiting);
+        if batches.is_empty() {
+            return Ok(());
+        }
+        let mut write = || {
+            let mut group = self.writer.next_row_group()?;
+            let mut at = 0;
+            while let Some(mut writer) = group.next_column()? {
+                for batch in &batches {
+                    column(&mut writer, &batch.columns[at], batch.rows)?;
+                }
+                writer.close()?;
+                at += 1;
+            }
+            group.close().map(drop)
+        };
+        write().map_err(io::Error::other)
     }
 
     /// Ends the table.
-    pub(crate) fn finish(self) -> io::Result<W> {
+    pub(crate) fn finish(mut self) -> io::Result<W> {
+        self.unload()?;
         self.writer.into_inner().map_err(io::Error::other)
     }
 }
@@ -121,103 +134,183 @@ fn encoded(properties: WriterPropertiesBuilder, column: &TableColumn) -> WriterP
     }
 }
 
-/// All rows of `batch`; words stay in their dictionary.
-fn record_batch(batch: &Batch) -> ArrowResult<RecordBatch> {
-    let columns: Vec<ArrayRef> = batch.columns.iter().map(array).collect::<Result<_, _>>()?;
-    let fields = batch.columns.iter().zip(&columns);
-    let fields = fields.map(|(column, array)| {
-        let kind = array.data_type().clone();
-        Field::new(column.name.as_ref(), kind, column.valid.is_some())
-    });
-    RecordBatch::try_new(Arc::new(Schema::new(fields.collect::<Vec<_>>())), columns)
+fn schema(batch: &Batch) -> ParquetResult<TypePtr> {
+    let fields = batch.columns.iter().map(field).collect::<Result<_, _>>()?;
+    let root = Type::group_type_builder("schema").with_fields(fields);
+    root.build().map(Arc::new)
 }
 
 /// A column as the file has it.
-fn field(column: &TableColumn) -> Field {
-    let mut kind = data_type(column.kind);
-    for _ in &column.lists {
-        kind = DataType::List(element(kind));
+fn field(column: &TableColumn) -> ParquetResult<TypePtr> {
+    let mut levels = column.lists.len();
+    let name = |levels: usize| match levels {
+        0 => column.name.as_ref(),
+        _ => "element",
+    };
+    let optional = column.valid.is_some() && levels == 0;
+    let (physical, logical) = kind(column.kind);
+    let value = Type::primitive_type_builder(name(levels), physical)
+        .with_logical_type(logical)
+        .with_repetition(if optional {
+            Repetition::OPTIONAL
+        } else {
+            Repetition::REQUIRED
+        });
+    let mut field = Arc::new(value.build()?);
+    while levels > 0 {
+        levels -= 1;
+        let list = Type::group_type_builder("list")
+            .with_repetition(Repetition::REPEATED)
+            .with_fields(vec![field]);
+        let outer = Type::group_type_builder(name(levels))
+            .with_repetition(Repetition::REQUIRED)
+            .with_logical_type(Some(LogicalType::List))
+            .with_fields(vec![Arc::new(list.build()?)]);
+        field = Arc::new(outer.build()?);
     }
-    Field::new(column.name.as_ref(), kind, column.valid.is_some())
+    Ok(field)
 }
 
-fn element(kind: DataType) -> Arc<Field> {
-    Arc::new(Field::new("element", kind, false))
-}
-
-fn data_type(kind: ColumnKind) -> DataType {
+fn kind(kind: ColumnKind) -> (Physical, Option<LogicalType>) {
+    let integer = |bits, signed| Some(LogicalType::integer(bits, signed));
     match kind {
-        ColumnKind::Flag => DataType::Boolean,
-        ColumnKind::I8 => DataType::Int8,
-        ColumnKind::U8 => DataType::UInt8,
-        ColumnKind::I16 => DataType::Int16,
-        ColumnKind::U16 => DataType::UInt16,
-        ColumnKind::I32 => DataType::Int32,
-        ColumnKind::U32 => DataType::UInt32,
-        ColumnKind::I64 => DataType::Int64,
-        ColumnKind::U64 => DataType::UInt64,
-        ColumnKind::F32 => DataType::Float32,
-        ColumnKind::F64 => DataType::Float64,
-        ColumnKind::Text => DataType::Utf8,
-        ColumnKind::Bytes => DataType::Binary,
-        ColumnKind::Time => DataType::Timestamp(TimeUnit::Nanosecond, Some("UTC".into())),
+        ColumnKind::Flag => (Physical::BOOLEAN, None),
+        ColumnKind::I8 => (Physical::INT32, integer(8, true)),
+        ColumnKind::U8 => (Physical::INT32, integer(8, false)),
+        ColumnKind::I16 => (Physical::INT32, integer(16, true)),
+        ColumnKind::U16 => (Physical::INT32, integer(16, false)),
+        ColumnKind::I32 => (Physical::INT32, None),
+        ColumnKind::U32 => (Physical::INT32, integer(32, false)),
+        ColumnKind::I64 => (Physical::INT64, None),
+        ColumnKind::U64 => (Physical::INT64, integer(64, false)),
+        ColumnKind::F32 => (Physical::FLOAT, None),
+        ColumnKind::F64 => (Physical::DOUBLE, None),
+        ColumnKind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        ColumnKind::Bytes => (Physical::BYTE_ARRAY, None),
+        ColumnKind::Time => {
+            let nanos = LogicalType::timestamp(true, TimeUnit::NANOS);
+            (Physical::INT64, Some(nanos))
+        }
     }
 }
 
-type ArrowResult<T> = Result<T, arrow_schema::ArrowError>;
-
-fn array(column: &TableColumn) -> ArrowResult<ArrayRef> {
-    let mut array = values(column)?;
-    for ends in column.lists.iter().rev() {
-        let kind = element(array.data_type().clone());
-        array = Arc::new(ListArray::try_new(kind, offsets(ends), array, None)?);
+/// Writes the first `rows` rows of a column.
+fn column(
+    to: &mut SerializedColumnWriter<'_>,
+    column: &TableColumn,
+    rows: usize,
+) -> ParquetResult<()> {
+    match &column.values {
+        ColumnValues::Flag(v) => values::<BoolType>(to, column, rows, |at| v[at]),
+        ColumnValues::I8(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
+        ColumnValues::U8(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
+        ColumnValues::I16(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
+        ColumnValues::U16(v) => values::<Int32Type>(to, column, rows, |at| v[at].into()),
+        ColumnValues::I32(v) => values::<Int32Type>(to, column, rows, |at| v[at]),
+        ColumnValues::U32(v) => values::<Int32Type>(to, column, rows, |at| v[at].cast_signed()),
+        ColumnValues::I64(v) => values::<Int64Type>(to, column, rows, |at| v[at]),
+        ColumnValues::U64(v) => values::<Int64Type>(to, column, rows, |at| v[at].cast_signed()),
+        ColumnValues::F32(v) => values::<FloatType>(to, column, rows, |at| v[at]),
+        ColumnValues::F64(v) => values::<DoubleType>(to, column, rows, |at| v[at]),
+        ColumnValues::Texts(v) => {
+            values::<ByteArrayType>(to, column, rows, texts(v))
+        }
+        ColumnValues::Words(v) => {
+            let words: Vec<ByteArray> = (0..v.words.ends.len()).map(texts(&v.words)).collect();
+            let word = |at: usize| words[v.numbers[at] as usize].clone();
+            values::<ByteArrayType>(to, column, rows, word)
+        }
     }
-    Ok(array)
 }
 
-fn values(column: &TableColumn) -> ArrowResult<ArrayRef> {
-    let known = column.valid.clone().map(NullBuffer::from);
-    Ok(match (&column.values, column.kind) {
-        (ColumnValues::Flag(v), _) => Arc::new(BooleanArray::new(v.clone().into(), known)),
-        (ColumnValues::I64(v), ColumnKind::Time) => {
-            Arc::new(TimestampNanosecondArray::new(v.clone().into(), known).with_timezone("UTC"))
+/// The texts by their places, which share one copy of the bytes.
+fn texts(texts: &TextColumn) -> impl Fn(usize) -> ByteArray {
+    let bytes = ByteArray::from(texts.bytes.clone());
+    move |at| {
+        let part = span(&texts.ends, at);
+        bytes.slice(part.start, part.len())
+    }
+}
+
+/// Writes the first `rows` rows of a column, the value at each place being `value`.
+fn values<T: DataType>(
+    to: &mut SerializedColumnWriter<'_>,
+    column: &TableColumn,
+    rows: usize,
+    value: impl Fn(usize) -> T::T,
+) -> ParquetResult<()> {
+    let writer = to.typed::<T>();
+    for start in (0..rows).step_by(AT_ONCE) {
+        let part = start..rows.min(start + AT_ONCE);
+        if !column.lists.is_empty() {
+            let mut levels = ListLevels::default();
+            part.clone().for_each(|row| levels.add(&column.lists, 0, row, 0));
+            let places = places(&column.lists, part);
+            let values: Vec<T::T> = places.map(&value).collect();
+            writer.write_batch(&values, Some(&levels.defined), Some(&levels.repeated))?;
+        } else if let Some(valid) = &column.valid {
+            let values: Vec<T::T> = part.clone().filter(|at| valid[*at]).map(&value).collect();
+            let defined: Vec<i16> = valid[part].iter().map(|v| i16::from(*v)).collect();
+            writer.write_batch(&values, Some(&defined), None)?;
+        } else {
+            let values: Vec<T::T> = part.map(&value).collect();
+            writer.write_batch(&values, None, None)?;
         }
-        (ColumnValues::I8(v), _) => numbers::<Int8Type>(v, known),
-        (ColumnValues::U8(v), _) => numbers::<UInt8Type>(v, known),
-        (ColumnValues::I16(v), _) => numbers::<Int16Type>(v, known),
-        (ColumnValues::U16(v), _) => numbers::<UInt16Type>(v, known),
-        (ColumnValues::I32(v), _) => numbers::<Int32Type>(v, known),
-        (ColumnValues::U32(v), _) => numbers::<UInt32Type>(v, known),
-        (ColumnValues::I64(v), _) => numbers::<Int64Type>(v, known),
-        (ColumnValues::U64(v), _) => numbers::<UInt64Type>(v, known),
-        (ColumnValues::F32(v), _) => numbers::<Float32Type>(v, known),
-        (ColumnValues::F64(v), _) => numbers::<Float64Type>(v, known),
-        (ColumnValues::Texts(v), ColumnKind::Bytes) => {
-            Arc::new(BinaryArray::try_new(offsets(&v.ends), held(v), known)?)
-        }
-        (ColumnValues::Texts(v), _) => Arc::new(strings(v, known)?),
-        (ColumnValues::Words(v), _) => {
-            let numbers = PrimitiveArray::<UInt32Type>::new(v.numbers.clone().into(), known);
-            let words = Arc::new(strings(&v.words, None)?);
-            Arc::new(DictionaryArray::try_new(numbers, words)?)
-        }
+    }
+    Ok(())
+}
+
+/// The places of the values inside these rows of lists.
+fn places(lists: &[Vec<i32>], rows: Range<usize>) -> Range<usize> {
+    lists.iter().fold(rows, |inside, ends| match inside.is_empty() {
+        true => 0..0,
+        false => span(ends, inside.start).start..span(ends, inside.end - 1).end,
     })
 }
 
-fn numbers<T: ArrowPrimitiveType>(values: &[T::Native], known: Option<NullBuffer>) -> ArrayRef {
-    Arc::new(PrimitiveArray::<T>::new(values.to_vec().into(), known))
+/// The levels of lists as Parquet (and Dremel, Melnik et al. 2010) has them: one entry per value and per empty list.
+#[derive(Default)]
+struct ListLevels {
+    /// The number of lists around the entry that are not empty.
+    defined: Vec<i16>,
+    /// The list that the entry continues, 1 for the row's own; 0 where a row begins.
+    repeated: Vec<i16>,
 }
 
-fn strings(texts: &TextColumn, known: Option<NullBuffer>) -> ArrowResult<StringArray> {
-    StringArray::try_new(offsets(&texts.ends), held(texts), known)
+impl ListLevels {
+    /// Adds list `at` of this level, whose first entry continues list `first`.
+    fn add(&mut self, lists: &[Vec<i32>], level: i16, at: usize, first: i16) {
+        let Some((ends, deeper)) = lists.split_first() else {
+            self.defined.push(level);
+            self.repeated.push(first);
+            return;
+        };
+        let inside = span(ends, at);
+        if inside.is_empty() {
+            self.defined.push(level);
+            self.repeated.push(first);
+        }
+        for (number, item) in inside.enumerate() {
+            let continues = if number == 0 { first } else { level + 1 };
+            self.add(deeper, level + 1, item, continues);
+        }
+    }
 }
 
-fn held(texts: &TextColumn) -> Buffer {
-    Buffer::from_slice_ref(&texts.bytes)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// The ends as Arrow has them: with the 0 at which the first begins.
-fn offsets(ends: &[i32]) -> OffsetBuffer<i32> {
-    let all: Vec<i32> = std::iter::once(0).chain(ends.iter().copied()).collect();
-    OffsetBuffer::new(ScalarBuffer::from(all))
+    #[test]
+    fn lists_of_lists_have_the_levels_of_dremel() {
+        // [[1, 2], []], [], [[3]]
+        let lists = vec![vec![2, 2, 3], vec![2, 2, 3]];
+        let mut levels = ListLevels::default();
+        (0..3).for_each(|row| levels.add(&lists, 0, row, 0));
+        assert_eq!(levels.defined, [2, 2, 1, 0, 2]);
+        assert_eq!(levels.repeated, [0, 2, 1, 0, 0]);
+        assert_eq!(places(&lists, 0..2), 0..2);
+        assert_eq!(places(&lists, 1..2), 2..2);
+        assert_eq!(places(&lists, 2..3), 2..3);
+    }
 }

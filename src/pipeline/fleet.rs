@@ -9,7 +9,7 @@
 //! [`finish()`] makes the [`Mission`](crate::Mission) of one mission's counts: states, changes and all that needs the
 //! whole.
 
-#[cfg(feature = "parquet")]
+#[cfg(feature = "arrow")]
 pub mod arrow;
 mod count;
 mod counts;

@@ -1,5 +1,6 @@
 //! Scenes as the pages of one PDF: vectors, text as text, each font embedded once.
 
+use harfrust::{Direction, FontRef, ShapeOptions, ShaperData, UnicodeBuffer};
 use krilla::color::rgb;
 use krilla::configure::{ConfigurationBuilder, PdfVersion};
 use krilla::destination::XyzDestination;
@@ -10,7 +11,7 @@ use krilla::outline::{Outline, OutlineNode};
 use krilla::page::PageSettings;
 use krilla::paint::{Fill, LineCap, LineJoin, Stroke, StrokeDash};
 use krilla::surface::Surface;
-use krilla::text::{Font, TextDirection};
+use krilla::text::{Font, GlyphId, KrillaGlyph};
 use krilla::{Document, SerializeSettings};
 
 use crate::base::geometry::{Point, Rect};
@@ -46,10 +47,7 @@ pub(crate) fn write(
         configuration: version.finish().map_err(|e| format!("{e:?}"))?,
         ..SerializeSettings::default()
     });
-    let faces: Vec<Option<Font>> = fonts
-        .files()
-        .map(|f| Font::new(f.to_vec().into(), 0))
-        .collect();
+    let faces = fonts.files().map(PdfFace::read).collect();
     let pen = PdfPen { fonts, faces };
     let mut outline = Outline::new();
     let mut title = None;
@@ -94,7 +92,54 @@ fn point(p: Point) -> geom::Point {
 struct PdfPen<'a> {
     fonts: &'a Fonts,
     /// The fonts in the order of [`Fonts::files`]; `None` for one that cannot be read.
-    faces: Vec<Option<Font>>,
+    faces: Vec<Option<PdfFace<'a>>>,
+}
+
+/// A font as the document embeds it and as its text is shaped.
+struct PdfFace<'a> {
+    embedded: Font,
+    font: FontRef<'a>,
+    shaper: ShaperData,
+}
+
+impl<'a> PdfFace<'a> {
+    fn read(file: &'a [u8]) -> Option<Self> {
+        let embedded = Font::new(file.to_vec().into(), 0)?;
+        let font = FontRef::from_index(file, 0).ok()?;
+        let shaper = ShaperData::new(&font);
+        Some(Self {
+            embedded,
+            font,
+            shaper,
+        })
+    }
+
+    /// The glyphs of a text from left to right, in em.
+    #[expect(clippy::cast_precision_loss, reason = "lengths in units of a font")]
+    fn shape(&self, text: &str) -> Vec<KrillaGlyph> {
+        let mut buffer = UnicodeBuffer::new();
+        buffer.push_str(text);
+        buffer.guess_segment_properties();
+        buffer.set_direction(Direction::LeftToRight);
+        let shaper = self.shaper.shaper(&self.font).build();
+        let shaped = shaper.shape(buffer, ShapeOptions::new());
+        let em = self.embedded.units_per_em();
+        let (infos, positions) = (shaped.glyph_infos(), shaped.glyph_positions());
+        let glyphs = infos.iter().zip(positions).enumerate().map(|(at, (info, to))| {
+            let later = infos[at..].iter().find(|next| next.cluster > info.cluster);
+            let end = later.map_or(text.len(), |next| next.cluster as usize);
+            KrillaGlyph::new(
+                GlyphId::new(info.glyph_id),
+                to.x_advance as f32 / em,
+                to.x_offset as f32 / em,
+                to.y_offset as f32 / em,
+                to.y_advance as f32 / em,
+                info.cluster as usize..end,
+                None,
+            )
+        });
+        glyphs.collect()
+    }
 }
 
 impl PdfPen<'_> {
@@ -154,14 +199,13 @@ impl PdfPen<'_> {
             let other = |c: char| self.fonts.file_of(c, text.weight) != file;
             let (run, after) = rest.split_at(rest.find(other).unwrap_or(rest.len()));
             if let Some(Some(face)) = self.faces.get(file) {
-                let direction = TextDirection::LeftToRight;
-                surface.draw_text(
+                surface.draw_glyphs(
                     point(at),
-                    face.clone(),
-                    f(text.size),
+                    &face.shape(run),
+                    face.embedded.clone(),
                     run,
+                    f(text.size),
                     outlined,
-                    direction,
                 );
             }
             at.x += self.fonts.width(run, text.size, text.weight);

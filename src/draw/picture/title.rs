@@ -186,7 +186,7 @@ impl<'a> Title<'a> {
         let style = &self.style.title;
         let (bar, size) = (self.page.title, style.clock_size * self.page.unit);
         let small = style.quiet_size * self.page.unit;
-        group.title = frame.span.start.rfc3339().unwrap_or_default();
+        group.title = frame.span.start.rfc3339();
         group.text(Text {
             at: Point::new(bar.right() - self.left(), bar.y + bar.h * 0.43),
             anchor: Anchor::End,

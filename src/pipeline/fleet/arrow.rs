@@ -9,11 +9,11 @@ use super::rows::{COUNTS, bags_table, counts_table};
 use crate::base::error::{Error, Result};
 use crate::base::table::{Batch, ColumnValues, TableColumn};
 use crate::base::time::{Period, Stamp};
-use crate::export::parquet::arrow::{from_arrow, to_arrow};
+use crate::export::arrow::{from_arrow, to_arrow};
 use crate::export::tables::whole;
 use crate::mission::Mission;
 
-pub use crate::export::parquet::arrow::RecordBatch;
+pub use crate::export::arrow::RecordBatch;
 
 /// The table `counts`.
 ///
