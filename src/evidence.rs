@@ -5,6 +5,7 @@
 
 pub(crate) mod claim;
 pub(crate) mod clock;
+#[cfg(feature = "source")]
 pub mod code;
 pub mod collector;
 pub mod conclude;
@@ -15,6 +16,7 @@ pub(crate) mod publishers;
 pub(crate) mod restarts;
 pub(crate) mod source;
 pub(crate) mod spread;
+#[cfg(feature = "source")]
 pub(crate) mod syntax;
 pub(crate) mod texts;
 pub(crate) mod times;

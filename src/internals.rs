@@ -8,8 +8,10 @@ pub mod base {
 
 /// See `src/evidence.rs`.
 pub mod evidence {
+    #[cfg(feature = "source")]
+    pub use crate::evidence::code;
     pub use crate::evidence::{Degree, Evidence, EvidenceLine, SOURCES};
-    pub use crate::evidence::{code, collector, conclude, topology};
+    pub use crate::evidence::{collector, conclude, topology};
 }
 
 /// See `src/graph.rs`.
@@ -28,6 +30,7 @@ pub mod mission {
 }
 
 /// See `src/view.rs`.
+#[cfg(feature = "render")]
 pub mod view {
     pub use crate::view::{
         Counts, Frame, Headline, Mark, SeenWindow, Showing, Shown, View, ViewOptions, view,
@@ -35,6 +38,7 @@ pub mod view {
 }
 
 /// See `src/layout.rs`.
+#[cfg(feature = "render")]
 pub mod layout {
     pub use crate::layout::{
         Cluster, ENGINES, Layout, LayoutOptions, Link, Orientation, Outline, Plan, Route, Vertex,
@@ -43,6 +47,7 @@ pub mod layout {
 }
 
 /// See `src/draw.rs`.
+#[cfg(feature = "render")]
 pub mod draw {
     pub use crate::draw::{picture, scene, strip, style, text};
 
@@ -53,6 +58,7 @@ pub mod draw {
 }
 
 /// See `src/export.rs`.
+#[cfg(feature = "render")]
 pub mod export {
     pub use crate::export::{FORMATS, Output, Written, options, run, sequence};
 }

@@ -57,6 +57,16 @@
 //! The library is silent and repeatable: it never prints (but for `cli`), reads no clock, and writes the same bytes
 //! for the same bag.
 
+#![cfg_attr(
+    not(all(feature = "render", feature = "source")),
+    allow(
+        dead_code,
+        unreachable_pub,
+        unused_imports,
+        reason = "what only these features use"
+    )
+)]
+
 // In the order of the line, which is why they stand apart: sorted they would tell nothing.
 mod base;
 
@@ -68,12 +78,16 @@ mod graph;
 
 mod mission;
 
+#[cfg(feature = "render")]
 mod view;
 
+#[cfg(feature = "render")]
 mod layout;
 
+#[cfg(feature = "render")]
 mod draw;
 
+#[cfg(feature = "render")]
 mod export;
 
 #[cfg(feature = "cli")]
@@ -85,12 +99,16 @@ mod pipeline;
 mod cli;
 
 pub use base::error::{Error, Result};
+#[cfg(feature = "render")]
 pub use draw::style::Style;
+#[cfg(feature = "render")]
 pub use export::Output;
 pub use graph::Graph;
 pub use graph::diff::Change;
 pub use mission::{Ledger, Mission, Window, write_json};
-pub use pipeline::{Reading, Render, Rendered};
+pub use pipeline::Reading;
+#[cfg(feature = "render")]
+pub use pipeline::{Render, Rendered};
 
 pub mod values {
     //! The values that those of the front page are made of: times and names, the elements of a graph, the entries of a
@@ -107,10 +125,14 @@ pub mod values {
         State, Topic, TopicId, TopicState,
     };
     pub use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Phase};
-    pub use crate::pipeline::{Body, Drawing, Phases, Purpose, Stage, Unwatched, Watch};
+    #[cfg(feature = "render")]
+    pub use crate::pipeline::{Body, Drawing, Purpose};
+    pub use crate::pipeline::{Phases, Stage, Unwatched, Watch};
+    #[cfg(feature = "render")]
     pub use crate::view::{Grouping, Hide, Mode, ViewOptions};
 }
 
+#[cfg(feature = "render")]
 pub use pipeline::fleet;
 
 pub mod commands {
@@ -118,6 +140,7 @@ pub mod commands {
 
     pub use crate::mission::events::{LogFormat, LogOptions, log};
     pub use crate::mission::info::{Info, info};
+    #[cfg(feature = "render")]
     pub use crate::pipeline::{
         Extract, Extracted, Survey, extract, is_survey, survey, survey_file,
     };
@@ -143,6 +166,7 @@ pub fn read(reading: &Reading) -> Result<Mission> {
 ///
 /// # Errors
 /// As [`read`], and where an output cannot be written or an option makes no sense.
+#[cfg(feature = "render")]
 pub fn render(job: &Render) -> Result<Rendered> {
     pipeline::render(job, &mut pipeline::Unwatched)
 }

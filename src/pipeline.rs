@@ -1,28 +1,43 @@
 //! The whole program in the order it happens: it reads, divides, builds, compares, draws and writes.
 
 mod collect;
+#[cfg(feature = "render")]
 mod draw;
+#[cfg(feature = "render")]
 mod export;
+#[cfg(feature = "render")]
 mod extract;
+#[cfg(feature = "render")]
 mod figure;
+#[cfg(feature = "render")]
 mod fit;
+#[cfg(feature = "render")]
 pub mod fleet;
 #[cfg(feature = "cli")]
 pub(crate) mod gate;
 mod phases;
+#[cfg(feature = "render")]
 mod purpose;
 mod read;
+#[cfg(feature = "render")]
 mod survey;
+#[cfg(feature = "render")]
 mod unfolded;
 mod verify;
 
+#[cfg(feature = "render")]
 pub use draw::{Body, Drawing};
+#[cfg(feature = "render")]
 pub(crate) use export::render;
+#[cfg(feature = "render")]
 pub use export::{Render, Rendered};
+#[cfg(feature = "render")]
 pub use extract::{Extract, Extracted, extract};
 pub use phases::Phases;
+#[cfg(feature = "render")]
 pub use purpose::Purpose;
 pub use read::{Reading, explain, read};
+#[cfg(feature = "render")]
 pub use survey::{Survey, is_survey, survey, survey_file};
 #[cfg(feature = "cli")]
 pub(crate) use {

@@ -14,6 +14,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::role::role;
 use crate::base::time::Stamp;
 use crate::evidence::claim::{Claims, Name};
+#[cfg(feature = "source")]
 use crate::evidence::code::{Code, matching};
 use crate::evidence::proof::{Conclusions, ElementKey, Proof, Stream, Validity, offers};
 use crate::evidence::source::contract::Owners;
@@ -29,6 +30,7 @@ pub struct ConcludeOptions {
     /// Nodes and edges given by the user.
     pub topology: Topology,
     /// Declarations in source code.
+    #[cfg(feature = "source")]
     pub code: Option<Arc<Code>>,
 }
 
@@ -143,18 +145,31 @@ fn concluded<'a>(
     for entry in &options.topology.entries {
         told(&mut known, entry, (start, end));
     }
-    let read = |code: &Arc<Code>| {
-        let owners = Owners::new();
-        let owner = |kind: &str, topic: &str| owners.node(kind, topic);
-        matching::conclude(code, &mut known, &owner)
-    };
-    let code = options.code.as_ref().map(read).unwrap_or_default();
+    let mut notices = Notices::new();
+    notices.extend(options.topology.notices.iter().cloned());
+    #[cfg(feature = "source")]
+    let undrawn = declared(&mut known, options.code.as_deref(), &mut notices);
+    #[cfg(not(feature = "source"))]
+    let undrawn = Vec::new();
     unknown::conclude(&mut known);
     explain(&mut known, &recorded.messages);
-    let mut notices = Notices::new();
-    let told = options.topology.notices.iter().cloned();
-    notices.extend(told.chain(code.notices).chain(strange));
-    (known, notices, code.undrawn)
+    notices.extend(strange);
+    (known, notices, undrawn)
+}
+
+/// The conclusions from source code; returns what it offers and was not drawn.
+#[cfg(feature = "source")]
+fn declared(
+    known: &mut Conclusions<'_>,
+    code: Option<&Code>,
+    notices: &mut Notices,
+) -> Vec<String> {
+    let Some(code) = code else { return Vec::new() };
+    let owners = Owners::new();
+    let owner = |kind: &str, topic: &str| owners.node(kind, topic);
+    let found = matching::conclude(code, known, &owner);
+    notices.extend(found.notices);
+    found.undrawn
 }
 
 /// Notices about names in the user's files that are not in the bags: topics, and nodes whose name is close to a known

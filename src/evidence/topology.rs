@@ -6,6 +6,7 @@
 mod csv;
 mod dot;
 pub(crate) mod launch;
+#[cfg(feature = "source")]
 mod python;
 mod substitution;
 mod tree;
@@ -133,6 +134,32 @@ fn resolved(name: &str) -> String {
 /// A notice about something in a file that is not used.
 fn unused(path: &Path, line: usize, what: &str) -> Notice {
     Notice::new(NoticeKind::Note, format!("{}: {what}", place(path, line)))
+}
+
+/// What stands for the parsers of the feature `source` where it is left out.
+#[cfg(not(feature = "source"))]
+mod python {
+    use std::collections::BTreeMap;
+    use std::path::Path;
+
+    use super::tree::Tree;
+    use crate::base::error::Result;
+
+    pub(super) const UNREAD: &str = "unread";
+
+    pub(super) fn of_python(path: &Path, _text: &str) -> Result<Tree> {
+        let reason = "launch files in Python need the feature `source`".to_owned();
+        Err(super::bad(
+            path,
+            0,
+            reason,
+            "build with `--features source`",
+        ))
+    }
+
+    pub(super) fn evaluate(_expression: &str, _names: &BTreeMap<String, String>) -> Option<String> {
+        None
+    }
 }
 
 #[cfg(test)]

@@ -103,7 +103,7 @@ impl Encoder for TablesEncoder<'_> {
 }
 
 /// Every table of a mission by its word, whole.
-#[cfg(feature = "parquet")]
+#[cfg(feature = "arrow")]
 pub(crate) fn whole(mission: &Mission) -> Vec<(&'static str, Batch)> {
     let fill = |table: &Table| {
         let mut batch = Batch::new(table.columns);

@@ -2,6 +2,7 @@
 //! once.
 
 use std::path::{Path, PathBuf};
+#[cfg(feature = "source")]
 use std::sync::Arc;
 
 use super::collect::{Collected, collect};
@@ -14,6 +15,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::time::Span;
 use crate::base::{budget, file};
 use crate::evidence::EvidenceLine;
+#[cfg(feature = "source")]
 use crate::evidence::code::{self, SourceCode};
 use crate::evidence::collector;
 use crate::evidence::conclude::{self, Findings, conclude};
@@ -43,6 +45,7 @@ pub struct Reading {
     /// The number of windows of silence after which an element that never speaks again counts as gone.
     pub grace: usize,
     /// The source code to read once the recording's day is known; takes the place of `conclude.code`.
+    #[cfg(feature = "source")]
     pub code: Option<SourceCode>,
     /// The share by which a rate must change to count, ≥ 0.
     pub rate_change: f64,
@@ -61,6 +64,7 @@ impl Default for Reading {
             collect: collector::CollectOptions::default(),
             conclude: conclude::ConcludeOptions::default(),
             grace: 0,
+            #[cfg(feature = "source")]
             code: None,
             rate_change: RATE_CHANGE,
             phases: Phases::Found,
@@ -139,7 +143,10 @@ pub(crate) fn mission_file(inputs: &[Input]) -> Result<Option<&Path>> {
 
 /// Refuses options that only apply to bags.
 fn refuse(reading: &Reading, path: &Path) -> Result<()> {
+    #[cfg(feature = "source")]
     let source = reading.code.is_some().then_some("`--source` adds to bags");
+    #[cfg(not(feature = "source"))]
+    let source = None;
     let division = &reading.division;
     let cut = division.cut.map(|_| "`--cut` divides the time of bags");
     let topic = reading.phases.topic();
@@ -191,12 +198,14 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
 
 /// The findings from everything read, with the source code as it was on the recording's day.
 fn concluded(collected: &Collected, reading: &Reading) -> Result<Findings> {
-    let mut options = reading.conclude.clone();
+    #[cfg(feature = "source")]
     if let Some(wanted) = &reading.code {
         let span = collected.recorded.span.unwrap_or(collected.range);
+        let mut options = reading.conclude.clone();
         options.code = Some(Arc::new(code::read(wanted, span.end)?));
+        return conclude(&collected.recorded, &options);
     }
-    conclude(&collected.recorded, &options)
+    conclude(&collected.recorded, &reading.conclude)
 }
 
 /// The mission of everything read and concluded.
