@@ -63,7 +63,7 @@ fn same(name: &str, text: &str) {
     let kept = fs::read_to_string(&path).unwrap_or_default();
     assert_eq!(
         kept, text,
-        "{name}: `ACCEPT=1 cargo test --test tests ci::` takes the new one"
+        "{name}: `ACCEPT=1 cargo test --release --test tests ci::` takes the new one"
     );
 }
 

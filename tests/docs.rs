@@ -37,7 +37,7 @@ fn the_readme_begins_with_the_two_commands() {
         commands,
         [
             "cargo run --release -- render examples/warehouse.bag",
-            "cargo test"
+            "cargo test --release"
         ]
     );
 }

@@ -1,6 +1,6 @@
 //! Pins what pictures are: SVG text of every style, and the pixels of a few frames.
 //!
-//! `INSTA_UPDATE=always cargo test --test tests pictures` accepts what is drawn now, after a look at it. Where pixels
+//! `INSTA_UPDATE=always cargo test --release --test tests pictures` accepts what is drawn now, after a look at it. Where pixels
 //! differ, `target/pictures/` shows expected, difference and actual side by side.
 
 use std::path::{Path, PathBuf};
