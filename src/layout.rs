@@ -15,7 +15,6 @@ mod spacing;
 
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Point, Rect, Size};
-use isotonic::monotone;
 
 /// The outline that a route must end at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

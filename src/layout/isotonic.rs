@@ -1,36 +1,78 @@
 //! Growing sequences: the one nearest to goals that are out of order.
 
-/// The growing sequence nearest to the goals in weighted squares, by pooling adjacent violators.
-pub(crate) fn monotone(goal: &[f64], weight: &[f64]) -> Vec<f64> {
-    let mut pools: Vec<(f64, f64, usize)> = Vec::with_capacity(goal.len());
-    for (&g, &w) in goal.iter().zip(weight) {
-        let mut pool = (g * w, w, 1);
-        while let Some(&(sum, weight, count)) = pools.last() {
-            if sum / weight <= pool.0 / pool.1 {
-                break;
-            }
-            pools.pop();
-            pool = (pool.0 + sum, pool.1 + weight, pool.2 + count);
+/// Finds growing sequences by pooling adjacent violators; it keeps its room from one to the next.
+#[derive(Default)]
+pub(crate) struct Monotone {
+    pools: Vec<Pool>,
+}
+
+/// Neighbours that share a place.
+struct Pool {
+    sum: f64,
+    weight: f64,
+    mean: f64,
+    count: usize,
+}
+
+impl Pool {
+    fn new(sum: f64, weight: f64, count: usize) -> Self {
+        let mean = sum / weight;
+        Self {
+            sum,
+            weight,
+            mean,
+            count,
         }
-        pools.push(pool);
     }
-    pools
-        .into_iter()
-        .flat_map(|(sum, weight, count)| std::iter::repeat_n(sum / weight, count))
-        .collect()
+}
+
+impl Monotone {
+    /// Takes new goals, each with its weight.
+    pub(crate) fn pool(&mut self, goals: impl Iterator<Item = (f64, f64)>) -> &Self {
+        self.pools.clear();
+        for (goal, weight) in goals {
+            let mut pool = Pool::new(goal * weight, weight, 1);
+            while let Some(last) = self.pools.pop_if(|last| last.mean > pool.mean) {
+                pool = Pool::new(
+                    pool.sum + last.sum,
+                    pool.weight + last.weight,
+                    pool.count + last.count,
+                );
+            }
+            self.pools.push(pool);
+        }
+        self
+    }
+
+    /// The growing sequence nearest to the goals in weighted squares.
+    pub(crate) fn nearest(&self) -> impl Iterator<Item = f64> {
+        self.pools
+            .iter()
+            .flat_map(|pool| std::iter::repeat_n(pool.mean, pool.count))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn nearest(goals: &[(f64, f64)]) -> Vec<f64> {
+        Monotone::default()
+            .pool(goals.iter().copied())
+            .nearest()
+            .collect()
+    }
+
     #[test]
     fn a_sequence_that_grows_stays() {
-        assert_eq!(monotone(&[1.0, 2.0, 4.0], &[1.0; 3]), [1.0, 2.0, 4.0]);
+        assert_eq!(
+            nearest(&[(1.0, 1.0), (2.0, 1.0), (4.0, 1.0)]),
+            [1.0, 2.0, 4.0]
+        );
     }
 
     #[test]
     fn violators_meet_at_their_weighted_mean() {
-        assert_eq!(monotone(&[4.0, 1.0], &[1.0, 2.0]), [2.0, 2.0]);
+        assert_eq!(nearest(&[(4.0, 1.0), (1.0, 2.0)]), [2.0, 2.0]);
     }
 }

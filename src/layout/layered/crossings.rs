@@ -1,65 +1,169 @@
 //! Rows while they are being sorted: sweeps, swaps of neighbours, and the number of crossings.
 //!
 //! Members of a cluster stay side by side between its borders, like words in brackets, and two clusters keep their
-//! order in all layers that they share, so that their boxes can be drawn apart.
+//! order in all layers that they share, so that their boxes can be drawn apart. A sweep changes few rows once the order
+//! settles, so that whatever follows from a row is kept until that row or one beside it changes.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use crate::layout::{LayerItem, LayerRows, Layers, monotone};
+use crate::layout::isotonic::Monotone;
+use crate::layout::{LayerItem, LayerRows, Layers};
 
 /// A unit that moves as one inside its cluster: an item, or a whole cluster from its top to its bottom border.
 #[derive(Clone, Copy)]
 struct Unit {
     start: usize,
-    end: usize,
+    extent: usize,
     cluster: Option<usize>,
+    key: f64,
+    /// The order among units of one key: items first, then known clusters in their order, each new cluster behind those
+    /// that it does not precede.
+    tie: usize,
+}
+
+/// The neighbours of all items on one side, item by item, and their sorted places.
+struct Side {
+    /// Where the neighbours of each item begin; one more than there are items.
+    first: Vec<usize>,
+    places: Vec<usize>,
+    /// Whether the places of a row's neighbours are those of now.
+    is_fresh: Vec<bool>,
+}
+
+impl Side {
+    fn new(neighbours: &[Vec<usize>], ranks: usize) -> Self {
+        let mut first = vec![0];
+        for all in neighbours {
+            first.push(first[first.len() - 1] + all.len());
+        }
+        Self {
+            places: vec![0; first[neighbours.len()]],
+            first,
+            is_fresh: vec![false; ranks],
+        }
+    }
+
+    fn of(&self, item: usize) -> &[usize] {
+        &self.places[self.first[item]..self.first[item + 1]]
+    }
 }
 
 /// The rows while they are being sorted.
 pub(crate) struct CrossingReducer<'a> {
     layers: &'a Layers,
-    pub(crate) rows: LayerRows,
+    /// The items of all rows, row by row; and those that every search begins with.
+    items: Vec<usize>,
+    begin: Vec<usize>,
+    /// Where each row begins in them; one more than there are rows.
+    start: Vec<usize>,
+    /// The number of items from a top border to its bottom border; 1 for any other item.
+    extent: Vec<usize>,
     /// The place of each item in its row.
     place: Vec<usize>,
     /// The wanted place of each item; NaN for one without a wish.
     key: Vec<f64>,
-    /// The sorted places of the neighbours of each item, before and after; filled where needed.
-    near: Vec<[Vec<usize>; 2]>,
+    /// The neighbours before and after.
+    sides: [Side; 2],
+    /// The crossings before each row, as far as they are known.
+    before: Vec<Option<u64>>,
+    /// Whether no swap in a row saves crossings.
+    is_settled: Vec<bool>,
     /// The clusters met in this sweep, in their order; and the place of each in it.
     clusters: Vec<usize>,
     turn: Vec<Option<usize>>,
+    /// Room for the units and the items that are being sorted, and for counting.
+    units: Vec<Unit>,
+    old: Vec<usize>,
+    tree: Vec<u64>,
+    monotone: Monotone,
 }
 
 impl<'a> CrossingReducer<'a> {
-    pub(crate) fn new(layers: &'a Layers, key: &[f64]) -> Self {
+    pub(crate) fn new(layers: &'a Layers) -> Self {
         let n = layers.rank.len();
         let mut flat = vec![Vec::new(); layers.ranks];
         for v in 0..n {
             flat[layers.rank[v]].push(v);
         }
-        let mut sorter = Self {
+        let (mut begin, mut start) = (Vec::with_capacity(n), vec![0]);
+        for row in flat {
+            begin.extend(bracketed(layers, 0, row));
+            start.push(begin.len());
+        }
+        Self {
             layers,
-            rows: flat
-                .into_iter()
-                .map(|row| bracketed(layers, 0, row))
-                .collect(),
+            items: begin.clone(),
+            extent: extents(layers, &begin),
+            begin,
+            start,
             place: vec![0; n],
-            key: key.to_vec(),
-            near: vec![Default::default(); n],
+            key: Vec::new(),
+            sides: [&layers.up, &layers.down].map(|ends| Side::new(ends, layers.ranks)),
+            before: vec![None; layers.ranks],
+            is_settled: vec![false; layers.ranks],
             clusters: Vec::new(),
             turn: vec![None; layers.parent.len()],
-        };
-        for rank in 0..layers.ranks {
-            sorter.sort_row(rank);
+            units: Vec::new(),
+            old: Vec::new(),
+            tree: Vec::new(),
+            monotone: Monotone::default(),
         }
-        sorter
+    }
+
+    /// Begins anew, sorted by these keys.
+    pub(crate) fn restart(&mut self, key: &[f64]) {
+        self.items.clone_from(&self.begin);
+        self.key = key.to_vec();
+        self.forget_clusters();
+        for rank in 0..self.layers.ranks {
+            self.sort(self.row(rank));
+            self.changed(rank);
+        }
+    }
+
+    /// The items of all rows, row by row.
+    pub(crate) fn items(&self) -> &[usize] {
+        &self.items
+    }
+
+    /// These items as rows.
+    pub(crate) fn rows(&self, items: &[usize]) -> LayerRows {
+        let rows = 0..self.layers.ranks;
+        rows.map(|rank| items[self.row(rank)].to_vec()).collect()
+    }
+
+    fn row(&self, rank: usize) -> Range<usize> {
+        self.start[rank]..self.start[rank + 1]
+    }
+
+    fn forget_clusters(&mut self) {
+        self.clusters.clear();
+        self.turn.fill(None);
+    }
+
+    /// Notes that a row changed.
+    fn changed(&mut self, rank: usize) {
+        let row = self.row(rank);
+        for (i, &v) in self.items[row].iter().enumerate() {
+            self.place[v] = i;
+        }
+        self.before[rank] = None;
+        self.is_settled[rank] = false;
+        if rank > 0 {
+            self.sides[1].is_fresh[rank - 1] = false;
+            self.is_settled[rank - 1] = false;
+        }
+        if rank + 1 < self.layers.ranks {
+            self.sides[0].is_fresh[rank + 1] = false;
+            self.before[rank + 1] = None;
+            self.is_settled[rank + 1] = false;
+        }
     }
 
     /// Sorts every row by its neighbours in the row before it, in the direction of the sweep.
     pub(crate) fn sweep(&mut self, downwards: bool, median: bool) {
-        self.clusters.clear();
-        self.turn.fill(None);
+        self.forget_clusters();
         let side = usize::from(!downwards);
         for step in 0..self.layers.ranks {
             let rank = if downwards {
@@ -68,99 +172,128 @@ impl<'a> CrossingReducer<'a> {
                 self.layers.ranks - 1 - step
             };
             self.look(rank, side);
-            for &v in &self.rows[rank] {
-                self.key[v] = centre(&self.near[v][side], median);
+            for at in self.row(rank) {
+                let v = self.items[at];
+                self.key[v] = centre(self.sides[side].of(v), median);
             }
-            self.sort_row(rank);
+            if self.sort(self.row(rank)) {
+                self.changed(rank);
+            }
         }
     }
 
-    /// Fills in the places of the neighbours of a row on one side.
+    /// Fills in the places of the neighbours of a row on one side, in the order of that side's row.
     fn look(&mut self, rank: usize, side: usize) {
+        if std::mem::replace(&mut self.sides[side].is_fresh[rank], true) {
+            return;
+        }
+        let (beside, back) = if side == 0 {
+            (rank.checked_sub(1), &self.layers.down)
+        } else {
+            (
+                Some(rank + 1).filter(|r| *r < self.layers.ranks),
+                &self.layers.up,
+            )
+        };
+        let Some(beside) = beside else {
+            return;
+        };
+        let Side { first, places, .. } = &mut self.sides[side];
+        // The start of each item's places runs to their end and back again.
+        for (place, &u) in self.items[self.start[beside]..self.start[beside + 1]]
+            .iter()
+            .enumerate()
+        {
+            for &v in &back[u] {
+                places[first[v]] = place;
+                first[v] += 1;
+            }
+        }
         let neighbours = if side == 0 {
             &self.layers.up
         } else {
             &self.layers.down
         };
-        for &v in &self.rows[rank] {
-            let near = &mut self.near[v][side];
-            near.clear();
-            near.extend(neighbours[v].iter().map(|&u| self.place[u]));
-            near.sort_unstable();
+        for &v in &self.items[self.start[rank]..self.start[rank + 1]] {
+            first[v] -= neighbours[v].len();
         }
-    }
-
-    fn sort_row(&mut self, rank: usize) {
-        let mut row = std::mem::take(&mut self.rows[rank]);
-        self.sort(&mut row);
-        for (i, &v) in row.iter().enumerate() {
-            self.place[v] = i;
-        }
-        self.rows[rank] = row;
     }
 
     /// Sorts the units that stand directly in one cluster by key, and the inside of those that are clusters themselves.
-    fn sort(&mut self, items: &mut [usize]) {
-        let units = units(self.layers, items);
-        let mut keys = Vec::with_capacity(units.len());
+    /// Returns whether anything moved.
+    fn sort(&mut self, range: Range<usize>) -> bool {
+        let mut has_moved = false;
+        let base = self.units.len();
         let mut last = -1.0;
-        for unit in &units {
-            if unit.cluster.is_some() {
-                self.sort(&mut items[unit.start + 1..unit.end - 1]);
+        let mut start = range.start;
+        while start < range.end {
+            let top = self.items[start];
+            let extent = self.extent[top];
+            let end = start + extent;
+            if extent > 1 {
+                has_moved |= self.sort(start + 1..end - 1);
             }
             // Without a wish, a unit stays behind the one before it.
-            let wishes = items[unit.start..unit.end].iter().map(|&v| self.key[v]);
+            let wishes = self.items[start..end].iter().map(|&v| self.key[v]);
             last = mean(wishes.filter(|key| !key.is_nan())).unwrap_or(last);
-            keys.push(last);
+            self.units.push(Unit {
+                start,
+                extent,
+                cluster: (extent > 1).then(|| self.layers.home[top]),
+                key: last,
+                tie: 0,
+            });
+            start = end;
         }
-        let old = items.to_vec();
-        let mut at = 0;
-        for i in self.sorted(&units, &mut keys) {
-            let unit = &old[units[i].start..units[i].end];
-            items[at..at + unit.len()].copy_from_slice(unit);
-            at += unit.len();
+        let mut units = std::mem::take(&mut self.units);
+        self.arrange(&mut units[base..]);
+        if !units[base..].is_sorted_by_key(|unit| unit.start) {
+            has_moved = true;
+            self.old.clear();
+            self.old.extend(&self.items[range.clone()]);
+            let mut at = range.start;
+            for unit in &units[base..] {
+                let from = unit.start - range.start;
+                self.items[at..at + unit.extent]
+                    .copy_from_slice(&self.old[from..from + unit.extent]);
+                at += unit.extent;
+            }
         }
+        units.truncate(base);
+        self.units = units;
+        has_moved
     }
 
-    /// The units by key, after the keys of clusters met before have been made to grow in their order.
-    fn sorted(&mut self, units: &[Unit], keys: &mut [f64]) -> Vec<usize> {
-        let turn = |i: usize| units[i].cluster.and_then(|c| self.turn[c]);
-        let mut known: Vec<usize> = (0..units.len()).filter(|&i| turn(i).is_some()).collect();
-        known.sort_unstable_by_key(|&i| turn(i));
-        let wishes: Vec<f64> = known.iter().map(|&i| keys[i]).collect();
-        for (&i, key) in known
-            .iter()
-            .zip(monotone(&wishes, &vec![1.0; wishes.len()]))
-        {
-            keys[i] = key;
+    /// Sorts units by key, after the keys of clusters met before have been made to grow in their order.
+    fn arrange(&mut self, units: &mut [Unit]) {
+        if units.iter().any(|unit| unit.cluster.is_some()) {
+            let turn = |i: usize| units[i].cluster.and_then(|c| self.turn[c]);
+            let mut known: Vec<usize> = (0..units.len()).filter(|&i| turn(i).is_some()).collect();
+            known.sort_unstable_by_key(|&i| turn(i));
+            let wishes = known.iter().map(|&i| (units[i].key, 1.0));
+            let keys: Vec<f64> = self.monotone.pool(wishes).nearest().collect();
+            for (order, (&i, key)) in known.iter().zip(&keys).enumerate() {
+                (units[i].key, units[i].tie) = (*key, 2 * order + 2);
+            }
+            for unit in units.iter_mut() {
+                if unit.cluster.is_some_and(|c| self.turn[c].is_none()) {
+                    unit.tie = 1 + 2 * keys.partition_point(|key| *key <= unit.key);
+                }
+            }
         }
-        // Ties: items first, then known clusters in their order, each new cluster behind those that it does not precede.
-        let mut tie: Vec<usize> = (0..units.len()).map(|_| 0).collect();
-        for (order, &i) in known.iter().enumerate() {
-            tie[i] = 2 * order + 2;
-        }
-        for i in (0..units.len()).filter(|&i| units[i].cluster.is_some() && turn(i).is_none()) {
-            tie[i] = 1 + 2 * known.partition_point(|&k| keys[k] <= keys[i]);
-        }
-        let mut order: Vec<usize> = (0..units.len()).collect();
-        order.sort_by(|&a, &b| {
-            keys[a]
-                .total_cmp(&keys[b])
-                .then(tie[a].cmp(&tie[b]))
-                .then(a.cmp(&b))
-        });
-        self.learn(order.iter().filter_map(|&i| units[i].cluster).collect());
-        order
+        units.sort_by(|a, b| a.key.total_cmp(&b.key).then(a.tie.cmp(&b.tie)));
+        self.learn(units);
     }
 
     /// Enters clusters that are new into the order, each behind the one before it.
-    fn learn(&mut self, row: Vec<usize>) {
-        if row.iter().all(|&c| self.turn[c].is_some()) {
+    fn learn(&mut self, row: &[Unit]) {
+        let row = || row.iter().filter_map(|unit| unit.cluster);
+        if row().all(|c| self.turn[c].is_some()) {
             return;
         }
-        let first = row.iter().find_map(|&c| self.turn[c]);
+        let first = row().find_map(|c| self.turn[c]);
         let mut at = first.unwrap_or(self.clusters.len());
-        for cluster in row {
+        for cluster in row() {
             if let Some(turn) = self.turn[cluster] {
                 at = turn + 1;
                 continue;
@@ -178,16 +311,17 @@ impl<'a> CrossingReducer<'a> {
         for _ in 0..3 {
             let mut better = false;
             for rank in 0..self.layers.ranks {
+                if self.is_settled[rank] {
+                    continue;
+                }
                 self.look(rank, 0);
                 self.look(rank, 1);
-                let mut row = std::mem::take(&mut self.rows[rank]);
-                if self.transpose_in(&mut row) {
+                if self.transpose_in(self.row(rank)) {
                     better = true;
-                    for (i, &v) in row.iter().enumerate() {
-                        self.place[v] = i;
-                    }
+                    self.changed(rank);
+                } else {
+                    self.is_settled[rank] = true;
                 }
-                self.rows[rank] = row;
             }
             if !better {
                 break;
@@ -196,29 +330,27 @@ impl<'a> CrossingReducer<'a> {
     }
 
     /// Swaps neighbours that stand directly in one cluster, and inside clusters; two clusters are never swapped.
-    fn transpose_in(&self, items: &mut [usize]) -> bool {
+    fn transpose_in(&mut self, range: Range<usize>) -> bool {
         let mut better = false;
-        let mut before: Option<Unit> = None;
-        for unit in units(self.layers, items) {
-            if unit.cluster.is_some() {
-                better |= self.transpose_in(&mut items[unit.start + 1..unit.end - 1]);
+        let mut before: Option<Range<usize>> = None;
+        let mut start = range.start;
+        while start < range.end {
+            let extent = self.extent[self.items[start]];
+            let end = start + extent;
+            if extent > 1 {
+                better |= self.transpose_in(start + 1..end - 1);
             }
-            let left = before.filter(|left| left.cluster.is_none() || unit.cluster.is_none());
-            if let Some(left) = left.filter(|left| {
-                self.saves(&items[left.start..left.end], &items[unit.start..unit.end])
-            }) {
-                items[left.start..unit.end].rotate_left(left.end - left.start);
+            let left = before.filter(|left| left.len() == 1 || extent == 1);
+            let left =
+                left.filter(|left| self.saves(&self.items[left.clone()], &self.items[start..end]));
+            before = Some(start..end);
+            if let Some(left) = left {
+                self.items[left.start..end].rotate_left(left.len());
                 // The left unit now stands behind this one and may move on.
-                let start = left.start + unit.end - unit.start;
-                before = Some(Unit {
-                    start,
-                    end: unit.end,
-                    ..left
-                });
+                before = Some(left.start + extent..end);
                 better = true;
-            } else {
-                before = Some(unit);
             }
+            start = end;
         }
         better
     }
@@ -226,43 +358,40 @@ impl<'a> CrossingReducer<'a> {
     /// Whether swapping two neighbours saves crossings.
     fn saves(&self, first: &[usize], second: &[usize]) -> bool {
         let (mut now, mut then) = (0, 0);
-        for side in 0..2 {
-            let (first, second) = (self.places(first, side), self.places(second, side));
-            now += inversions(&first, &second);
-            then += inversions(&second, &first);
+        for side in &self.sides {
+            for &a in first {
+                for &b in second {
+                    now += inversions(side.of(a), side.of(b));
+                    then += inversions(side.of(b), side.of(a));
+                }
+            }
         }
         then < now
-    }
-
-    /// The sorted places of all neighbours of these items on one side.
-    fn places(&self, items: &[usize], side: usize) -> Cow<'_, [usize]> {
-        if let [item] = items {
-            return Cow::Borrowed(&self.near[*item][side]);
-        }
-        let mut places: Vec<usize> = items
-            .iter()
-            .flat_map(|&v| self.near[v][side].iter().copied())
-            .collect();
-        places.sort_unstable();
-        Cow::Owned(places)
     }
 
     pub(crate) fn crossings(&mut self) -> u64 {
         let mut sum = 0;
         for rank in 1..self.layers.ranks {
-            self.look(rank - 1, 1);
-            sum += self.crossings_before(rank);
+            if self.before[rank].is_none() {
+                self.look(rank - 1, 1);
+                self.before[rank] = Some(self.crossings_before(rank));
+            }
+            sum += self.before[rank].unwrap_or(0);
         }
         sum
     }
 
     /// The crossings between a layer and the one before it, counted with a Fenwick tree (Barth, Jünger, Mutzel 2002).
-    fn crossings_before(&self, rank: usize) -> u64 {
-        let width = self.rows[rank].len();
-        let mut tree = vec![0_u64; width + 1];
+    fn crossings_before(&mut self, rank: usize) -> u64 {
+        let width = self.row(rank).len();
+        let row = self.row(rank - 1);
+        let tree = &mut self.tree;
+        tree.clear();
+        tree.resize(width + 1, 0);
         let (mut total, mut sum) = (0, 0);
-        for &v in &self.rows[rank - 1] {
-            for &place in &self.near[v][1] {
+        for &v in &self.items[row] {
+            let places = self.sides[1].of(v);
+            for &place in places {
                 let (mut at, mut before) = (place + 1, 0);
                 while at > 0 {
                     before += tree[at];
@@ -270,7 +399,7 @@ impl<'a> CrossingReducer<'a> {
                 }
                 sum += total - before;
             }
-            for &place in &self.near[v][1] {
+            for &place in places {
                 let mut at = place + 1;
                 while at <= width {
                     tree[at] += 1;
@@ -310,27 +439,22 @@ fn bracketed(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<usize> {
     row
 }
 
-/// The units that move as one in a stretch of a row.
-fn units(layers: &Layers, items: &[usize]) -> Vec<Unit> {
-    let mut units = Vec::new();
-    let mut start = 0;
-    while start < items.len() {
-        let cluster =
-            (layers.kind[items[start]] == LayerItem::Top).then(|| layers.home[items[start]]);
-        let closes =
-            |v: &usize| layers.kind[*v] == LayerItem::Bottom && Some(layers.home[*v]) == cluster;
-        let length = cluster
-            .and_then(|_| items[start..].iter().position(closes))
-            .unwrap_or(0)
-            + 1;
-        units.push(Unit {
-            start,
-            end: start + length,
-            cluster,
-        });
-        start += length;
+/// The number of items from each top border to its bottom border; 1 for any other item.
+fn extents(layers: &Layers, items: &[usize]) -> Vec<usize> {
+    let mut extent = vec![1; items.len()];
+    let mut open = Vec::new();
+    for (at, &v) in items.iter().enumerate() {
+        match layers.kind[v] {
+            LayerItem::Top => open.push(at),
+            LayerItem::Bottom => {
+                if let Some(top) = open.pop() {
+                    extent[items[top]] = at + 1 - top;
+                }
+            }
+            LayerItem::Vertex | LayerItem::Bend => {}
+        }
     }
-    units
+    extent
 }
 
 /// The number of pairs of which the first is greater than the second; both lists are sorted.

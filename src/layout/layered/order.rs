@@ -14,11 +14,7 @@ const SHAKES: usize = 8;
 /// The best order found and its number of crossings, borders of clusters included. `effort` counts edges swept: the
 /// search begins anew, then shakes the best order, until it is spent.
 pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
-    let mut search = Search {
-        layers,
-        effort,
-        best: (LayerRows::new(), u64::MAX),
-    };
+    let mut search = Search::new(layers, effort);
     search.improve(&depth_first(layers, true), true);
     if search.effort > 0 {
         search.improve_flat();
@@ -34,22 +30,34 @@ pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
         let shaken = search.shaken(&mut dice);
         search.improve(&shaken, dice.throw() > 0.0);
     }
-    search.best
+    (search.sorter.rows(&search.best.0), search.best.1)
 }
 
 /// A search for an order with few crossings.
 struct Search<'a> {
     layers: &'a Layers,
+    sorter: CrossingReducer<'a>,
     effort: usize,
-    best: (LayerRows, u64),
+    /// The items of the best rows, row by row, and their crossings.
+    best: (Vec<usize>, u64),
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(layers: &'a Layers, effort: usize) -> Self {
+        Self {
+            layers,
+            sorter: CrossingReducer::new(layers),
+            effort,
+            best: (Vec::new(), u64::MAX),
+        }
+    }
+
     /// Sorts by these keys and sweeps while that gains something.
     fn improve(&mut self, key: &[f64], downwards: bool) {
         let edges = self.layers.rank.len();
-        let mut sorter = CrossingReducer::new(self.layers, key);
-        let mut found = (sorter.rows.clone(), sorter.crossings());
+        let sorter = &mut self.sorter;
+        sorter.restart(key);
+        let mut found = (sorter.items().to_vec(), sorter.crossings());
         let mut stalled = 0;
         for sweep in 0..SWEEPS {
             sorter.sweep((sweep % 2 == 0) == downwards, sweep % 4 >= 2);
@@ -58,7 +66,8 @@ impl Search<'_> {
             let crossings = sorter.crossings();
             stalled += 1;
             if crossings < found.1 {
-                found = (sorter.rows.clone(), crossings);
+                found.0.clone_from_slice(sorter.items());
+                found.1 = crossings;
                 stalled = 0;
             }
             if stalled > PATIENCE || found.1 == 0 {
@@ -76,15 +85,11 @@ impl Search<'_> {
             return;
         }
         let flat = self.layers.without_clusters();
-        let mut search = Search {
-            layers: &flat,
-            effort: self.effort,
-            best: (LayerRows::new(), u64::MAX),
-        };
+        let mut search = Search::new(&flat, self.effort);
         search.improve(&depth_first(&flat, false), true);
         self.effort = search.effort;
         let mut key = vec![f64::NAN; self.layers.rank.len()];
-        for row in &search.best.0 {
+        for row in search.sorter.rows(&search.best.0) {
             for (i, &v) in row.iter().enumerate() {
                 key[v] = i as f64 - row.len() as f64 / 2.0;
             }
@@ -94,7 +99,7 @@ impl Search<'_> {
 
     /// Keys near the places of the best rows, with some clusters and a few items thrown elsewhere.
     fn shaken(&self, dice: &mut Dice) -> Vec<f64> {
-        let rows = &self.best.0;
+        let rows = self.sorter.rows(&self.best.0);
         let widest = rows.iter().map(Vec::len).max().unwrap_or(0) as f64;
         let mut throw = |odds: f64| {
             if dice.throw() + 0.5 < odds {
@@ -105,7 +110,7 @@ impl Search<'_> {
         };
         let shift: Vec<f64> = self.layers.parent.iter().map(|_| throw(0.3)).collect();
         let mut key = vec![0.0; self.layers.rank.len()];
-        for row in rows {
+        for row in &rows {
             for (i, &v) in row.iter().enumerate() {
                 key[v] = i as f64 - row.len() as f64 / 2.0 + throw(0.05);
                 let mut cluster = self.layers.home[v];

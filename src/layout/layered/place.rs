@@ -1,65 +1,207 @@
 //! The places of the items of each layer across: as near to their neighbours as order and gaps allow.
 
-use crate::layout::{LayerItem, LayerRows, Layers, monotone};
+use std::ops::Range;
+
+use crate::layout::isotonic::Monotone;
+use crate::layout::{LayerItem, LayerRows, Layers};
 
 /// The number of times that all layers are placed.
 const SWEEPS: usize = 40;
+/// The sweep from which items are pulled to both sides, and the one from which bends follow one side only.
+const BOTH: usize = 6;
+const LAST: usize = 100;
 
-/// The middle of each item across. `half` is half the extent of each item, `gaps` the room between neighbours per row.
+/// The middle of each item across, for rows whose neighbours must be at least so far apart.
 pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
-    let mut y = packed(layers, rows, apart);
+    let mut table = Table::new(layers, rows);
+    for (rank, apart) in apart.iter().enumerate() {
+        table.pack(rank, apart);
+    }
     for sweep in 0..SWEEPS {
-        for step in 0..rows.len() {
-            let rank = if sweep % 2 == 0 {
+        for rank in table.ranks(sweep) {
+            table.settle(
+                table.start[rank]..table.start[rank + 1],
+                sweep,
+                |_, place| place,
+            );
+        }
+    }
+    let across = straighten_borders(layers, rows, apart, &table.by_item());
+    table.inside_borders(&across, apart);
+    table.by_item()
+}
+
+/// The items of all rows, row by row, while they are being placed.
+struct Table<'a> {
+    layers: &'a Layers,
+    items: Vec<usize>,
+    /// Where each row begins; one more than there are rows.
+    start: Vec<usize>,
+    /// Where the neighbours of each item begin in `pulls`, and those of them that are in the row after it.
+    first: Vec<(usize, usize)>,
+    /// The neighbours of all items by their places in `items`, with the weight with which they pull.
+    pulls: Vec<(usize, f64)>,
+    /// The distance of each item from the first of those that it is placed with, if they stand as near as they may.
+    offset: Vec<f64>,
+    /// The middle of each item across.
+    across: Vec<f64>,
+    monotone: Monotone,
+}
+
+impl<'a> Table<'a> {
+    fn new(layers: &'a Layers, rows: &LayerRows) -> Self {
+        let items = rows.concat();
+        let mut start = vec![0];
+        start.extend(rows.iter().scan(0, |sum, row| {
+            *sum += row.len();
+            Some(*sum)
+        }));
+        let mut place = vec![0; items.len()];
+        for (at, &v) in items.iter().enumerate() {
+            place[v] = at;
+        }
+        let (mut first, mut pulls) = (Vec::with_capacity(items.len() + 1), Vec::new());
+        for &v in &items {
+            let pull = |&u: &usize| (place[u], stiffness(layers.kind[v], layers.kind[u]));
+            let begin = pulls.len();
+            pulls.extend(layers.up[v].iter().map(pull));
+            first.push((begin, pulls.len()));
+            pulls.extend(layers.down[v].iter().map(pull));
+        }
+        first.push((pulls.len(), pulls.len()));
+        Self {
+            layers,
+            start,
+            first,
+            pulls,
+            offset: vec![0.0; items.len()],
+            across: vec![0.0; items.len()],
+            items,
+            monotone: Monotone::default(),
+        }
+    }
+
+    /// Packs a row around 0.
+    fn pack(&mut self, rank: usize, apart: &[f64]) {
+        let row = self.start[rank]..self.start[rank + 1];
+        self.measure(row.clone(), apart);
+        let mut at = -apart.iter().sum::<f64>() / 2.0;
+        for (i, item) in row.enumerate() {
+            at += if i > 0 { apart[i - 1] } else { 0.0 };
+            self.across[item] = at;
+        }
+    }
+
+    /// Takes the offsets of items that are placed together from the gaps between them.
+    fn measure(&mut self, together: Range<usize>, apart: &[f64]) {
+        let mut offset = 0.0;
+        for (i, at) in together.enumerate() {
+            offset += if i > 0 { apart[i - 1] } else { 0.0 };
+            self.offset[at] = offset;
+        }
+    }
+
+    /// The rows in the direction of a sweep.
+    fn ranks(&self, sweep: usize) -> impl Iterator<Item = usize> + use<> {
+        let ranks = self.start.len() - 1;
+        (0..ranks).map(move |step| {
+            if sweep.is_multiple_of(2) {
                 step
             } else {
-                rows.len() - 1 - step
-            };
-            let (goal, weight) = goals(layers, &rows[rank], &y, sweep);
-            let placed = separated(&goal, &weight, &apart[rank]);
-            for (&v, place) in rows[rank].iter().zip(placed) {
-                y[v] = place;
+                ranks - 1 - step
             }
-        }
+        })
     }
-    let y = straighten_borders(layers, rows, apart, &y);
-    inside_borders(layers, rows, apart, y)
-}
 
-/// Every row packed around 0.
-fn packed(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
-    let mut y = vec![0.0; layers.rank.len()];
-    for (row, apart) in rows.iter().zip(apart) {
-        let mut at = -apart.iter().sum::<f64>() / 2.0;
-        for (i, &v) in row.iter().enumerate() {
-            if i > 0 {
-                at += apart[i - 1];
-            }
-            y[v] = at;
+    /// Places items of a row together, as near to their goals (weighted squares) as the gaps between them allow, and each
+    /// of them within `limits`.
+    fn settle(&mut self, together: Range<usize>, sweep: usize, limits: impl Fn(f64, f64) -> f64) {
+        let mut monotone = std::mem::take(&mut self.monotone);
+        let wishes = together.clone().map(|at| {
+            let (goal, weight) = self.goal(at, sweep);
+            (goal - self.offset[at], weight)
+        });
+        monotone.pool(wishes);
+        for (at, place) in together.zip(monotone.nearest()) {
+            let offset = self.offset[at];
+            self.across[at] = limits(offset, place + offset);
         }
+        self.monotone = monotone;
     }
-    y
-}
 
-/// The goal of each item of a row, and the weight of that goal.
-fn goals(layers: &Layers, row: &[usize], y: &[f64], sweep: usize) -> (Vec<f64>, Vec<f64>) {
-    let (mut goal, mut weight) = (Vec::new(), Vec::new());
-    for &v in row {
-        let both = sweep >= 6 && (sweep < 100 || layers.kind[v] != LayerItem::Bend);
-        let before = layers.up[v]
-            .iter()
-            .filter(|_| both || sweep.is_multiple_of(2));
-        let after = layers.down[v].iter().filter(|_| both || sweep % 2 == 1);
+    /// The goal of an item, and the weight of that goal.
+    fn goal(&self, at: usize, sweep: usize) -> (f64, f64) {
+        let is_bend = || self.layers.kind[self.items[at]] == LayerItem::Bend;
+        let ((before, after), end) = (self.first[at], self.first[at + 1].0);
+        let near = if sweep >= BOTH && (sweep < LAST || !is_bend()) {
+            before..end
+        } else if sweep.is_multiple_of(2) {
+            before..after
+        } else {
+            after..end
+        };
         let (mut sum, mut pull) = (0.0, 0.0);
-        for &u in before.chain(after) {
-            let w = stiffness(layers.kind[v], layers.kind[u]);
-            sum += w * y[u];
-            pull += w;
+        for &(other, weight) in &self.pulls[near] {
+            sum += weight * self.across[other];
+            pull += weight;
         }
-        goal.push(if pull > 0.0 { sum / pull } else { y[v] });
-        weight.push(if pull > 0.0 { pull } else { 0.05 });
+        if pull > 0.0 {
+            (sum / pull, pull)
+        } else {
+            (self.across[at], 0.05)
+        }
     }
-    (goal, weight)
+
+    /// Places the items anew between the borders, which stay where they are in `across`.
+    fn inside_borders(&mut self, across: &[f64], apart: &[Vec<f64>]) {
+        let mut stretches = vec![Vec::new(); apart.len()];
+        for (at, &v) in self.items.iter().enumerate() {
+            self.across[at] = across[v];
+        }
+        for (rank, apart) in apart.iter().enumerate() {
+            let start = self.start[rank];
+            let row = &self.items[start..self.start[rank + 1]];
+            let is_border =
+                |v: &usize| matches!(self.layers.kind[*v], LayerItem::Top | LayerItem::Bottom);
+            let mut from = 0;
+            for inside in row.split(is_border) {
+                let (begin, end) = (from, from + inside.len());
+                from = end + 1;
+                if !inside.is_empty() {
+                    stretches[rank].push((
+                        start + begin..start + end,
+                        begin.checked_sub(1).map(|i| apart[i]),
+                        apart.get(end - 1).copied(),
+                    ));
+                }
+            }
+            for (stretch, ..) in &stretches[rank] {
+                let begin = stretch.start - start;
+                self.measure(stretch.clone(), &apart[begin..]);
+            }
+        }
+        for sweep in (BOTH..14).chain([LAST, LAST + 2, LAST + 4]) {
+            for rank in self.ranks(sweep) {
+                for (stretch, before, after) in &stretches[rank] {
+                    let total = self.offset[stretch.end - 1];
+                    let low = before.map(|gap| self.across[stretch.start - 1] + gap);
+                    let high = after.map(|gap| self.across[stretch.end] - gap);
+                    self.settle(stretch.clone(), sweep, |offset, place| {
+                        let place = high.map_or(place, |high| place.min(high - (total - offset)));
+                        low.map_or(place, |low| place.max(low + offset))
+                    });
+                }
+            }
+        }
+    }
+
+    fn by_item(&self) -> Vec<f64> {
+        let mut across = vec![0.0; self.items.len()];
+        for (&v, place) in self.items.iter().zip(&self.across) {
+            across[v] = *place;
+        }
+        across
+    }
 }
 
 /// The weight with which two linked items are pulled into line: bends most, so that long edges come out straight.
@@ -134,72 +276,28 @@ fn pushed(n: usize, edges: impl Iterator<Item = (usize, usize, f64)>, goal: &[f6
     y
 }
 
-/// Places the items anew between the borders, which stay.
-fn inside_borders(
-    layers: &Layers,
-    rows: &LayerRows,
-    apart: &[Vec<f64>],
-    mut y: Vec<f64>,
-) -> Vec<f64> {
-    let border = |v: usize| matches!(layers.kind[v], LayerItem::Top | LayerItem::Bottom);
-    for sweep in (6..14).chain([100, 102, 104]) {
-        for step in 0..rows.len() {
-            let rank = if sweep % 2 == 0 {
-                step
-            } else {
-                rows.len() - 1 - step
-            };
-            let row = &rows[rank];
-            let (goal, weight) = goals(layers, row, &y, sweep);
-            let mut start = 0;
-            while start < row.len() {
-                if border(row[start]) {
-                    start += 1;
-                    continue;
-                }
-                let end = (start..row.len())
-                    .find(|&i| border(row[i]))
-                    .unwrap_or(row.len());
-                let gaps = &apart[rank][start..end - 1];
-                let placed = separated(&goal[start..end], &weight[start..end], gaps);
-                let low = start.checked_sub(1).map(|i| y[row[i]] + apart[rank][i]);
-                let high = row.get(end).map(|&v| y[v] - apart[rank][end - 1]);
-                let total: f64 = gaps.iter().sum();
-                let mut offset = 0.0;
-                for (i, place) in placed.into_iter().enumerate() {
-                    offset += if i > 0 { gaps[i - 1] } else { 0.0 };
-                    let place = high.map_or(place, |high| place.min(high - (total - offset)));
-                    y[row[start + i]] = low.map_or(place, |low| place.max(low + offset));
-                }
-                start = end;
-            }
-        }
-    }
-    y
-}
-
-/// The places that come nearest to the goals (weighted squares) with at least these gaps between neighbours.
-fn separated(goal: &[f64], weight: &[f64], apart: &[f64]) -> Vec<f64> {
-    let mut offset = 0.0;
-    let mut offsets = Vec::with_capacity(goal.len());
-    for i in 0..goal.len() {
-        offset += if i > 0 { apart[i - 1] } else { 0.0 };
-        offsets.push(offset);
-    }
-    let shifted: Vec<f64> = goal.iter().zip(&offsets).map(|(g, o)| g - o).collect();
-    let mut placed = monotone(&shifted, weight);
-    for (place, offset) in placed.iter_mut().zip(&offsets) {
-        *place += offset;
-    }
-    placed
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn gaps_are_kept() {
-        assert_eq!(separated(&[0.0, 0.0], &[1.0, 1.0], &[10.0]), [-5.0, 5.0]);
+        let layers = Layers {
+            vertices: 2,
+            kind: vec![LayerItem::Vertex; 2],
+            rank: vec![0; 2],
+            home: vec![0; 2],
+            up: vec![Vec::new(); 2],
+            down: vec![Vec::new(); 2],
+            parent: vec![0],
+            span: vec![(0, 0)],
+            borders: vec![(0, 0)],
+            ranks: 1,
+            ..Layers::default()
+        };
+        assert_eq!(
+            place(&layers, &vec![vec![1, 0]], &[vec![10.0]]),
+            [5.0, -5.0]
+        );
     }
 }
