@@ -220,6 +220,9 @@ fn quality(
     readable * shortness / (1.0 + CROSSING * crossings as f64 / links)
 }
 
+/// What rounding may add to the quality of a drawing.
+const ROUNDING: f64 = 1.0 + 1e-9;
+
 /// The best of all ways to place a part.
 fn best_block(
     plan: &Plan,
@@ -229,18 +232,39 @@ fn best_block(
     orientation: Orientation,
 ) -> PlacedPart {
     let links = part.links.len();
+    let quality = |size: Size, crossings: u64, length: f64| {
+        quality(size, (crossings, length), links, options)
+    };
     let judged = |block: PlacedPart| {
         let length = block.routes.iter().map(Route::length).sum();
-        let quality = quality(block.size, (block.crossings, length), links, options);
-        (quality, block)
+        (quality(block.size, block.crossings, length), block)
     };
     let better = |best: (f64, PlacedPart), next: (f64, PlacedPart)| {
         if next.0 > best.0 { next } else { best }
     };
-    let usual = orderings
-        .iter()
-        .map(|ordering| judged(block(plan, options, part, ordering, orientation)));
-    let Some(best) = usual.reduce(better) else {
+    // The most promising first: most of the others can then be told to be worse before they have places.
+    let hoped = |ordering: &Ordering| {
+        let room = Spacing::new(plan, options, part, &ordering.layers, orientation);
+        let apart = room.apart(&ordering.rows);
+        let (size, length) = room.least(&ordering.rows, &apart);
+        quality(turned(size, orientation), ordering.crossings, length) * ROUNDING
+    };
+    let mut ways: Vec<(f64, usize)> = orderings.iter().map(hoped).zip(0..).collect();
+    ways.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut best: Option<(f64, usize, PlacedPart)> = None;
+    for (hope, at) in ways {
+        if best.as_ref().is_some_and(|best| hope < best.0) {
+            break;
+        }
+        let (quality, block) = judged(block(plan, options, part, &orderings[at], orientation));
+        let is_better = |best: &(f64, usize, PlacedPart)| {
+            quality.total_cmp(&best.0).then(best.1.cmp(&at)).is_gt()
+        };
+        if best.as_ref().is_none_or(is_better) {
+            best = Some((quality, at, block));
+        }
+    }
+    let Some(best) = best.map(|(quality, _, block)| (quality, block)) else {
         return PlacedPart::empty();
     };
     if links > MANY {

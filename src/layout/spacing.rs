@@ -130,20 +130,52 @@ impl<'a> Spacing<'a> {
 
     /// The extent of every layer along.
     pub(crate) fn columns(&self, rows: &LayerRows, across: &[f64]) -> Vec<(f64, f64)> {
-        let depth = self.depths();
+        let gaps = self.gaps(rows, |v, u| (across[v] - across[u]).abs());
         let mut width = self.widths();
-        let bending = rows.iter().map(|row| self.bending_room(row, across));
-        let gaps: Vec<f64> = bending
-            .zip(&self.label)
-            .map(|(room, label)| room.max(label + LABEL_GAP))
-            .collect();
         self.widen_for_titles(&mut width, &gaps);
+        self.lined_up(&width, &gaps)
+    }
+
+    /// The least size of a drawing of these rows, along and across, and the least length of its edges: those of one in
+    /// which every edge is level and no title needs room.
+    pub(crate) fn least(&self, rows: &LayerRows, apart: &[Vec<f64>]) -> (Size, f64) {
+        let columns = self.lined_up(&self.widths(), &self.gaps(rows, |_, _| 0.0));
+        let reach = |v: usize| self.size.get(v).map_or(0.0, |size| size.h / 2.0);
+        let is_inside =
+            |v: &usize| matches!(self.layers.kind[*v], LayerItem::Vertex | LayerItem::Bend);
+        let across = rows.iter().zip(apart).filter_map(|(row, apart)| {
+            let (first, last) = (
+                row.iter().position(is_inside)?,
+                row.iter().rposition(is_inside)?,
+            );
+            let between: f64 = apart[first..last].iter().sum();
+            Some(reach(row[first]) + between + reach(row[last]))
+        });
+        let across = across.fold(0.0, f64::max);
+        let along = columns.last().map_or(0.0, |last| last.1 - columns[0].0);
+        let level = self.layers.chains.iter().filter_map(|chain| {
+            let (first, last) = (chain.first()?, chain.last()?);
+            Some(columns[self.layers.rank[*last]].0 - columns[self.layers.rank[*first]].1)
+        });
+        (Size::new(along, across), level.sum())
+    }
+
+    /// The room after every row: for its labels, and for edges to bend, which rise by so much.
+    fn gaps(&self, rows: &LayerRows, rise: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let bending = rows.iter().map(|row| self.bending_room(row, &rise));
+        let gaps = bending.zip(&self.label);
+        gaps.map(|(room, label)| room.max(label + LABEL_GAP))
+            .collect()
+    }
+
+    /// Layers of these widths, one after the other with these gaps.
+    fn lined_up(&self, width: &[f64], gaps: &[f64]) -> Vec<(f64, f64)> {
         let mut at = 0.0;
-        let mut columns = Vec::new();
-        for (rank, width) in width.into_iter().enumerate() {
-            at += depth[rank].0;
+        let mut columns = Vec::with_capacity(width.len());
+        for ((width, gap), depth) in width.iter().zip(gaps).zip(self.depths()) {
+            at += depth.0;
             columns.push((at, at + width));
-            at += width + depth[rank].1 + gaps[rank];
+            at += width + depth.1 + gap;
         }
         columns
     }
@@ -212,7 +244,7 @@ impl<'a> Spacing<'a> {
     }
 
     /// The room that edges need to bend after a row: more for many and for steep ones.
-    fn bending_room(&self, row: &[usize], across: &[f64]) -> f64 {
+    fn bending_room(&self, row: &[usize], rise: impl Fn(usize, usize) -> f64) -> f64 {
         let (mut edges, mut steepest) = (0.0, 0.0_f64);
         for &v in row
             .iter()
@@ -220,7 +252,7 @@ impl<'a> Spacing<'a> {
         {
             for &u in &self.layers.down[v] {
                 edges += 1.0;
-                steepest = steepest.max((across[v] - across[u]).abs());
+                steepest = steepest.max(rise(v, u));
             }
         }
         20.0 + (edges * 0.4_f64).min(11.0) + (steepest * 0.04).min(16.0)
