@@ -74,6 +74,7 @@ pub(crate) struct CrossingReducer<'a> {
     turn: Vec<Option<usize>>,
     /// Room for the units and the items that are being sorted, and for counting.
     units: Vec<Unit>,
+    known: Vec<usize>,
     old: Vec<usize>,
     tree: Vec<u64>,
     monotone: Monotone,
@@ -105,6 +106,7 @@ impl<'a> CrossingReducer<'a> {
             clusters: Vec::new(),
             turn: vec![None; layers.parent.len()],
             units: Vec::new(),
+            known: Vec::new(),
             old: Vec::new(),
             tree: Vec::new(),
             monotone: Monotone::default(),
@@ -267,17 +269,19 @@ impl<'a> CrossingReducer<'a> {
     /// Sorts units by key, after the keys of clusters met before have been made to grow in their order.
     fn arrange(&mut self, units: &mut [Unit]) {
         if units.iter().any(|unit| unit.cluster.is_some()) {
-            let turn = |i: usize| units[i].cluster.and_then(|c| self.turn[c]);
-            let mut known: Vec<usize> = (0..units.len()).filter(|&i| turn(i).is_some()).collect();
-            known.sort_unstable_by_key(|&i| turn(i));
-            let wishes = known.iter().map(|&i| (units[i].key, 1.0));
-            let keys: Vec<f64> = self.monotone.pool(wishes).nearest().collect();
-            for (order, (&i, key)) in known.iter().zip(&keys).enumerate() {
-                (units[i].key, units[i].tie) = (*key, 2 * order + 2);
+            let turn = |unit: &Unit| unit.cluster.and_then(|c| self.turn[c]);
+            let known = &mut self.known;
+            known.clear();
+            known.extend((0..units.len()).filter(|&i| turn(&units[i]).is_some()));
+            known.sort_unstable_by_key(|&i| turn(&units[i]));
+            self.monotone.pool(known.iter().map(|&i| (units[i].key, 1.0)));
+            for (order, (&i, key)) in known.iter().zip(self.monotone.nearest()).enumerate() {
+                (units[i].key, units[i].tie) = (key, 2 * order + 2);
             }
-            for unit in units.iter_mut() {
-                if unit.cluster.is_some_and(|c| self.turn[c].is_none()) {
-                    unit.tie = 1 + 2 * keys.partition_point(|key| *key <= unit.key);
+            for i in 0..units.len() {
+                if units[i].cluster.is_some_and(|c| self.turn[c].is_none()) {
+                    let key = units[i].key;
+                    units[i].tie = 1 + 2 * known.partition_point(|&k| units[k].key <= key);
                 }
             }
         }
@@ -357,16 +361,21 @@ impl<'a> CrossingReducer<'a> {
 
     /// Whether swapping two neighbours saves crossings.
     fn saves(&self, first: &[usize], second: &[usize]) -> bool {
-        let (mut now, mut then) = (0, 0);
+        let now = self.crossings_of(first, second);
+        now > 0 && self.crossings_of(second, first) < now
+    }
+
+    /// The crossings between the edges of two neighbours.
+    fn crossings_of(&self, left: &[usize], right: &[usize]) -> u64 {
+        let mut sum = 0;
         for side in &self.sides {
-            for &a in first {
-                for &b in second {
-                    now += inversions(side.of(a), side.of(b));
-                    then += inversions(side.of(b), side.of(a));
+            for &a in left {
+                for &b in right {
+                    sum += inversions(side.of(a), side.of(b));
                 }
             }
         }
-        then < now
+        sum
     }
 
     pub(crate) fn crossings(&mut self) -> u64 {
@@ -459,6 +468,10 @@ fn extents(layers: &Layers, items: &[usize]) -> Vec<usize> {
 
 /// The number of pairs of which the first is greater than the second; both lists are sorted.
 fn inversions(first: &[usize], second: &[usize]) -> u64 {
+    // Most are in order.
+    if first.last() <= second.first() {
+        return 0;
+    }
     let (mut below, mut sum) = (0, 0);
     for &a in first {
         while below < second.len() && second[below] < a {
