@@ -274,7 +274,8 @@ impl<'a> CrossingReducer<'a> {
             known.clear();
             known.extend((0..units.len()).filter(|&i| turn(&units[i]).is_some()));
             known.sort_unstable_by_key(|&i| turn(&units[i]));
-            self.monotone.pool(known.iter().map(|&i| (units[i].key, 1.0)));
+            self.monotone
+                .pool(known.iter().map(|&i| (units[i].key, 1.0)));
             for (order, (&i, key)) in known.iter().zip(self.monotone.nearest()).enumerate() {
                 (units[i].key, units[i].tie) = (key, 2 * order + 2);
             }

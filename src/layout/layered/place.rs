@@ -13,21 +13,15 @@ const LAST: usize = 100;
 
 /// The middle of each item across, for rows whose neighbours must be at least so far apart.
 pub(crate) fn place(layers: &Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Vec<f64> {
-    let mut table = Table::new(layers, rows);
-    for (rank, apart) in apart.iter().enumerate() {
-        table.pack(rank, apart);
-    }
+    let mut table = Table::new(layers, rows, apart);
+    table.pack();
     for sweep in 0..SWEEPS {
         for rank in table.ranks(sweep) {
-            table.settle(
-                table.start[rank]..table.start[rank + 1],
-                sweep,
-                |_, place| place,
-            );
+            table.settle(table.row(rank), sweep, |_, place| place);
         }
     }
-    let across = straighten_borders(layers, rows, apart, &table.by_item());
-    table.inside_borders(&across, apart);
+    table.straighten_borders();
+    table.inside_borders();
     table.by_item()
 }
 
@@ -37,6 +31,10 @@ struct Table<'a> {
     items: Vec<usize>,
     /// Where each row begins; one more than there are rows.
     start: Vec<usize>,
+    /// The distance of each item from the next in its row; 0 for the last.
+    gap: Vec<f64>,
+    /// The place of each item in `items`.
+    place: Vec<usize>,
     /// Where the neighbours of each item begin in `pulls`, and those of them that are in the row after it.
     first: Vec<(usize, usize)>,
     /// The neighbours of all items by their places in `items`, with the weight with which they pull.
@@ -49,7 +47,7 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn new(layers: &'a Layers, rows: &LayerRows) -> Self {
+    fn new(layers: &'a Layers, rows: &LayerRows, apart: &[Vec<f64>]) -> Self {
         let items = rows.concat();
         let mut start = vec![0];
         start.extend(rows.iter().scan(0, |sum, row| {
@@ -69,9 +67,15 @@ impl<'a> Table<'a> {
             pulls.extend(layers.down[v].iter().map(pull));
         }
         first.push((pulls.len(), pulls.len()));
+        let gaps = |(row, apart): (&Vec<usize>, &Vec<f64>)| {
+            let last = (!row.is_empty()).then_some(0.0);
+            apart.iter().copied().chain(last).collect::<Vec<f64>>()
+        };
         Self {
             layers,
             start,
+            gap: rows.iter().zip(apart).flat_map(gaps).collect(),
+            place,
             first,
             pulls,
             offset: vec![0.0; items.len()],
@@ -81,23 +85,40 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Packs a row around 0.
-    fn pack(&mut self, rank: usize, apart: &[f64]) {
-        let row = self.start[rank]..self.start[rank + 1];
-        self.measure(row.clone(), apart);
-        let mut at = -apart.iter().sum::<f64>() / 2.0;
-        for (i, item) in row.enumerate() {
-            at += if i > 0 { apart[i - 1] } else { 0.0 };
-            self.across[item] = at;
+    fn row(&self, rank: usize) -> Range<usize> {
+        self.start[rank]..self.start[rank + 1]
+    }
+
+    /// The place before this one in its row.
+    fn before(&self, at: usize) -> Option<usize> {
+        let start = self.start[self.layers.rank[self.items[at]]];
+        at.checked_sub(1).filter(|at| *at >= start)
+    }
+
+    /// The place after this one in its row.
+    fn after(&self, at: usize) -> Option<usize> {
+        let end = self.start[self.layers.rank[self.items[at]] + 1];
+        Some(at + 1).filter(|at| *at < end)
+    }
+
+    /// Packs each row around 0.
+    fn pack(&mut self) {
+        for rank in 0..self.start.len() - 1 {
+            self.measure(self.row(rank));
+            let mut across = -self.gap[self.row(rank)].iter().sum::<f64>() / 2.0;
+            for at in self.row(rank) {
+                self.across[at] = across;
+                across += self.gap[at];
+            }
         }
     }
 
     /// Takes the offsets of items that are placed together from the gaps between them.
-    fn measure(&mut self, together: Range<usize>, apart: &[f64]) {
+    fn measure(&mut self, together: Range<usize>) {
         let mut offset = 0.0;
-        for (i, at) in together.enumerate() {
-            offset += if i > 0 { apart[i - 1] } else { 0.0 };
+        for at in together {
             self.offset[at] = offset;
+            offset += self.gap[at];
         }
     }
 
@@ -152,40 +173,93 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Places the items anew between the borders, which stay where they are in `across`.
-    fn inside_borders(&mut self, across: &[f64], apart: &[Vec<f64>]) {
-        let mut stretches = vec![Vec::new(); apart.len()];
-        for (at, &v) in self.items.iter().enumerate() {
-            self.across[at] = across[v];
+    fn is_border(&self, v: usize) -> bool {
+        matches!(self.layers.kind[v], LayerItem::Top | LayerItem::Bottom)
+    }
+
+    /// The places of a border in all its layers; of another item its own.
+    fn column(&self, at: usize) -> impl Iterator<Item = usize> {
+        let v = self.items[at];
+        let (first, steps) = if self.is_border(v) {
+            let cluster = self.layers.home[v];
+            let ((top, bottom), (low, high)) =
+                (self.layers.borders[cluster], self.layers.span[cluster]);
+            let is_top = self.layers.kind[v] == LayerItem::Top;
+            (if is_top { top } else { bottom }, high - low)
+        } else {
+            (v, 0)
+        };
+        (0..=steps).map(move |step| self.place[first + 2 * step])
+    }
+
+    /// Gives each border one place in all its layers: the middle of the highest and the lowest places that keep every gap.
+    fn straighten_borders(&mut self) {
+        let all = 0..self.items.len();
+        let head: Vec<usize> = all
+            .clone()
+            .filter_map(|at| self.column(at).next())
+            .collect();
+        let goal = |at: usize| {
+            let sum = self.column(at).fold(0.0, |sum, at| sum + self.across[at]);
+            sum / self.column(at).count() as f64
+        };
+        let mut low: Vec<f64> = all.clone().map(goal).collect();
+        let mut high: Vec<f64> = low.iter().map(|goal| -goal).collect();
+        // Each column comes after those before it in any row.
+        let mut waiting = vec![0; head.len()];
+        for at in all.clone().filter(|at| self.before(*at).is_some()) {
+            waiting[head[at]] += 1;
         }
-        for (rank, apart) in apart.iter().enumerate() {
-            let start = self.start[rank];
-            let row = &self.items[start..self.start[rank + 1]];
-            let is_border =
-                |v: &usize| matches!(self.layers.kind[*v], LayerItem::Top | LayerItem::Bottom);
-            let mut from = 0;
-            for inside in row.split(is_border) {
-                let (begin, end) = (from, from + inside.len());
-                from = end + 1;
-                if !inside.is_empty() {
-                    stretches[rank].push((
-                        start + begin..start + end,
-                        begin.checked_sub(1).map(|i| apart[i]),
-                        apart.get(end - 1).copied(),
-                    ));
+        let is_first = |at: &usize| head[*at] == *at && waiting[*at] == 0;
+        let mut order: Vec<usize> = all.clone().filter(is_first).collect();
+        let mut next = 0;
+        while let Some(&column) = order.get(next) {
+            next += 1;
+            for at in self.column(column) {
+                let Some(after) = self.after(at).map(|after| head[after]) else {
+                    continue;
+                };
+                low[after] = low[after].max(low[column] + self.gap[at]);
+                waiting[after] -= 1;
+                if waiting[after] == 0 {
+                    order.push(after);
                 }
             }
-            for (stretch, ..) in &stretches[rank] {
-                let begin = stretch.start - start;
-                self.measure(stretch.clone(), &apart[begin..]);
+        }
+        for &column in order.iter().rev() {
+            for at in self.column(column).filter_map(|at| self.before(at)) {
+                high[head[at]] = high[head[at]].max(high[column] + self.gap[at]);
             }
+        }
+        for at in all {
+            self.across[at] = (low[head[at]] - high[head[at]]) / 2.0;
+        }
+    }
+
+    /// Places the items anew between the borders, which stay.
+    fn inside_borders(&mut self) {
+        let mut stretches = Vec::new();
+        for rank in 0..self.start.len() - 1 {
+            let mut inside = Vec::new();
+            let mut begin = self.start[rank];
+            for items in self.items[self.row(rank)].split(|v| self.is_border(*v)) {
+                inside.push(begin..begin + items.len());
+                begin += items.len() + 1;
+            }
+            inside.retain(|stretch| !stretch.is_empty());
+            for stretch in &inside {
+                self.measure(stretch.clone());
+            }
+            stretches.push(inside);
         }
         for sweep in (BOTH..14).chain([LAST, LAST + 2, LAST + 4]) {
             for rank in self.ranks(sweep) {
-                for (stretch, before, after) in &stretches[rank] {
+                for stretch in &stretches[rank] {
                     let total = self.offset[stretch.end - 1];
-                    let low = before.map(|gap| self.across[stretch.start - 1] + gap);
-                    let high = after.map(|gap| self.across[stretch.end] - gap);
+                    let low = self.before(stretch.start);
+                    let low = low.map(|at| self.across[at] + self.gap[at]);
+                    let high = self.after(stretch.end - 1);
+                    let high = high.map(|at| self.across[at] - self.gap[at - 1]);
                     self.settle(stretch.clone(), sweep, |offset, place| {
                         let place = high.map_or(place, |high| place.min(high - (total - offset)));
                         low.map_or(place, |low| place.max(low + offset))
@@ -212,68 +286,6 @@ fn stiffness(a: LayerItem, b: LayerItem) -> f64 {
         (LayerItem::Bend, _) | (_, LayerItem::Bend) => 8.0,
         _ => 24.0,
     }
-}
-
-/// Gives each border one place in all its layers: the middle of the highest and the lowest places that keep every gap.
-fn straighten_borders(
-    layers: &Layers,
-    rows: &LayerRows,
-    apart: &[Vec<f64>],
-    y: &[f64],
-) -> Vec<f64> {
-    let n = y.len();
-    let mut same: Vec<usize> = (0..n).collect();
-    for (cluster, &(low, high)) in layers.span.iter().enumerate().skip(1) {
-        let (top, bottom) = layers.borders[cluster];
-        for step in 0..=(high - low) {
-            same[top + 2 * step] = top;
-            same[bottom + 2 * step] = bottom;
-        }
-    }
-    let mut options = vec![(0.0, 0.0); n];
-    for v in 0..n {
-        let (sum, count) = &mut options[same[v]];
-        *sum += y[v];
-        *count += 1.0;
-    }
-    let mut edges = Vec::new();
-    for (row, apart) in rows.iter().zip(apart) {
-        for (pair, gap) in row.windows(2).zip(apart) {
-            edges.push((same[pair[0]], same[pair[1]], *gap));
-        }
-    }
-    let goal: Vec<f64> = options
-        .iter()
-        .map(|(sum, count)| sum / f64::max(*count, 1.0))
-        .collect();
-    let low = pushed(n, edges.iter().copied(), &goal);
-    let negative: Vec<f64> = goal.iter().map(|g| -g).collect();
-    let high = pushed(n, edges.iter().map(|&(a, b, gap)| (b, a, gap)), &negative);
-    (0..n)
-        .map(|v| (low[same[v]] - high[same[v]]) / 2.0)
-        .collect()
-}
-
-/// The least places, not below the goals, that keep every gap.
-fn pushed(n: usize, edges: impl Iterator<Item = (usize, usize, f64)>, goal: &[f64]) -> Vec<f64> {
-    let mut after: Vec<Vec<(usize, f64)>> = vec![Vec::new(); n];
-    let mut waiting = vec![0; n];
-    for (a, b, gap) in edges {
-        after[a].push((b, gap));
-        waiting[b] += 1;
-    }
-    let mut y = goal.to_vec();
-    let mut ready: Vec<usize> = (0..n).filter(|&v| waiting[v] == 0).collect();
-    while let Some(v) = ready.pop() {
-        for &(u, gap) in &after[v] {
-            y[u] = y[u].max(y[v] + gap);
-            waiting[u] -= 1;
-            if waiting[u] == 0 {
-                ready.push(u);
-            }
-        }
-    }
-    y
 }
 
 #[cfg(test)]
