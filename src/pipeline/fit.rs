@@ -10,7 +10,7 @@ use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
 use crate::draw::picture::{self, Measured, PageOptions};
 use crate::graph::Element;
-use crate::layout::{Layout, LayoutOptions, RING, engine, extend, lay_out};
+use crate::layout::{Engine, Layout, LayoutOptions, Plan, RING, engine, extend, lay_out};
 use crate::mission::Mission;
 use crate::view::{Collapsible, Mode, View, ViewOptions, headlines, outline, view};
 
@@ -30,6 +30,7 @@ struct Fitting<'a> {
     page: PageOptions,
     options: ViewOptions,
     best: Attempt,
+    layouts: Layouts,
 }
 
 /// Chooses what is shown and lays it out on a page. With `--fit auto` the page grows, then those namespaces are collapsed in which least
@@ -38,13 +39,15 @@ struct Fitting<'a> {
 pub(super) fn compose(mission: &Mission, drawing: &Drawing, watch: &mut dyn Watch) -> Composed {
     watch.stage(Stage::Layout);
     let (page, options) = (drawing.page.clone(), drawing.view.clone());
-    let best = Attempt::new(mission, drawing, &options, &page);
+    let mut layouts = Layouts::default();
+    let best = Attempt::new(mission, drawing, (&options, &page), &mut layouts);
     let mut fitting = Fitting {
         mission,
         drawing,
         page,
         options,
         best,
+        layouts,
     };
     fitting.take_higher_page();
     if drawing.is_fitted && !fitting.is_readable() {
@@ -63,12 +66,14 @@ impl Fitting<'_> {
         self.best.is_readable(self.drawing)
     }
 
-    fn attempt(&self, options: &ViewOptions, page: &PageOptions) -> Attempt {
-        Attempt::new(self.mission, self.drawing, options, page)
+    fn attempt(&mut self, options: &ViewOptions, page: &PageOptions) -> Attempt {
+        let layouts = &mut self.layouts;
+        Attempt::new(self.mission, self.drawing, (options, page), layouts)
     }
 
     fn again(&mut self) {
-        self.best = self.attempt(&self.options, &self.page);
+        let chosen = (&self.options, &self.page);
+        self.best = Attempt::new(self.mission, self.drawing, chosen, &mut self.layouts);
     }
 
     fn make_readable(&mut self) {
@@ -98,7 +103,7 @@ impl Fitting<'_> {
                 return;
             }
             let page = self.page_of(size);
-            let attempt = self.attempt(&self.options, &page);
+            let attempt = self.attempt(&self.options.clone(), &page);
             if attempt.text > self.best.text || attempt.layout.is_none() {
                 (self.page, self.best) = (page, attempt);
             }
@@ -108,12 +113,10 @@ impl Fitting<'_> {
     /// Takes the lowest page of a purpose on which what is left can be read.
     fn take_lower_page(&mut self) {
         let sizes = self.drawing.purpose.map(Purpose::sizes).unwrap_or_default();
-        for size in sizes
-            .into_iter()
-            .take_while(|size| size.h < self.page.size.h)
-        {
+        let height = self.page.size.h;
+        for size in sizes.into_iter().take_while(|size| size.h < height) {
             let page = self.page_of(size);
-            let attempt = self.attempt(&self.options, &page);
+            let attempt = self.attempt(&self.options.clone(), &page);
             if attempt.is_readable(self.drawing) {
                 (self.page, self.best) = (page, attempt);
                 return;
@@ -203,13 +206,14 @@ impl Fitting<'_> {
         // Few boxes with many arrows among them stand best around the page.
         let is_few = boxes.items.len() <= RING && boxes.namespaces.is_empty();
         let attempt = match engine("ring").ok().filter(|_| is_few) {
-            None => self.attempt(&bundled, &self.page),
+            None => self.attempt(&bundled, &self.page.clone()),
             Some(engine) => {
                 let drawing = Drawing {
                     engine,
                     ..self.drawing.clone()
                 };
-                Attempt::new(self.mission, &drawing, &bundled, &self.page)
+                let chosen = (&bundled, &self.page);
+                Attempt::new(self.mission, &drawing, chosen, &mut Layouts::default())
             }
         };
         if boxes.items.len() > 1 && attempt.text > self.best.text {
@@ -224,7 +228,7 @@ impl Fitting<'_> {
         for name in collapsed.iter().rev().take(MOST_REOPENED) {
             let mut opened = self.options.clone();
             opened.collapse.retain(|n| n != name);
-            let attempt = self.attempt(&opened, &self.page);
+            let attempt = self.attempt(&opened, &self.page.clone());
             if attempt.is_readable(self.drawing) {
                 (self.options, self.best) = (opened, attempt);
             }
@@ -234,7 +238,8 @@ impl Fitting<'_> {
     /// The drawing with the notices about what was done to make it readable, and whether that was enough.
     fn composed(mut self) -> Composed {
         if self.best.layout.is_none() {
-            self.best = Attempt::drawn(self.mission, self.drawing, &self.options, &self.page);
+            let chosen = (&self.options, &self.page);
+            self.best = Attempt::drawn(self.mission, self.drawing, chosen, &mut self.layouts);
         }
         let (drawing, text) = (self.drawing, self.best.text);
         let mut notices = self.best.notices;
@@ -267,6 +272,23 @@ fn outermost(name: &str) -> Option<&str> {
     name.get(..end)
 }
 
+/// The layouts by one engine so far: a namespace that is collapsed inside another one, or opened there, changes nothing
+/// that is drawn.
+#[derive(Default)]
+struct Layouts(Vec<(Plan, LayoutOptions, Layout)>);
+
+impl Layouts {
+    fn of(&mut self, plan: &Plan, page: &LayoutOptions, engine: &dyn Engine) -> Layout {
+        let is_same = |made: &&(Plan, LayoutOptions, Layout)| made.1 == *page && made.0 == *plan;
+        if let Some((_, _, layout)) = self.0.iter().find(is_same) {
+            return layout.clone();
+        }
+        let layout = lay_out(plan, page, engine);
+        self.0.push((plan.clone(), *page, layout.clone()));
+        layout
+    }
+}
+
 /// A layout of the view that some options give.
 struct Attempt {
     /// The view; without its windows where there is no layout.
@@ -283,8 +305,8 @@ impl Attempt {
     fn new(
         mission: &Mission,
         drawing: &Drawing,
-        options: &ViewOptions,
-        page: &PageOptions,
+        (options, page): (&ViewOptions, &PageOptions),
+        layouts: &mut Layouts,
     ) -> Self {
         let elements = &mission.elements;
         let boxes = elements.nodes.len() + elements.topics.len();
@@ -299,15 +321,15 @@ impl Attempt {
                 };
             }
         }
-        Self::drawn(mission, drawing, options, page)
+        Self::drawn(mission, drawing, (options, page), layouts)
     }
 
     /// An attempt with a layout in any case.
     fn drawn(
         mission: &Mission,
         drawing: &Drawing,
-        options: &ViewOptions,
-        page: &PageOptions,
+        (options, page): (&ViewOptions, &PageOptions),
+        layouts: &mut Layouts,
     ) -> Self {
         // The widest labels depend on rates, so that the windows are needed too.
         let (view, notices) = view(mission, options);
@@ -318,9 +340,9 @@ impl Attempt {
         };
         let measured = Measured::new(&view, &drawing.style, &drawing.fonts, page.clone());
         let (plan, page) = (measured.plan(), measured.layout_options());
-        let placed = |page: &LayoutOptions| {
+        let mut placed = |page: &LayoutOptions| {
             let layout = match &drawing.kept {
-                None => lay_out(plan, page, drawing.engine),
+                None => layouts.of(plan, page, drawing.engine),
                 Some(kept) => extend(plan, page, drawing.engine, &known(&view, kept)),
             };
             (measured.text_px(&layout), layout)
