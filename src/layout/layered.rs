@@ -24,6 +24,7 @@ use super::{
 use super::{grid, pack, routes};
 use crate::base::error::Result;
 use crate::base::geometry::{Point, Rect, Size};
+use order::Search;
 
 /// The room between parts.
 const PART_GAP: f64 = 20.0;
@@ -51,11 +52,8 @@ pub(crate) fn lay_out(plan: &Plan, options: &LayoutOptions) -> Layout {
         labels::place(plan, &mut layout);
         return layout;
     };
-    let both = [Orientation::LeftRight, Orientation::TopBottom];
-    let wished = both
-        .into_iter()
-        .filter(|o| options.orientation.is_none_or(|options| options == *o));
-    let tries = wished.map(|orientation| draft.assembled(plan, options, orientation));
+    let tries =
+        orientations(options).map(|orientation| draft.assembled(plan, options, orientation));
     let labelled = tries.map(|(crossings, mut layout)| {
         let length = layout.routes.iter().map(Route::length).sum();
         let quality = quality(layout.size, (crossings, length), plan.links.len(), options);
@@ -139,16 +137,77 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     let pairs = ways
         .iter()
         .flat_map(|rank| lanes.iter().map(move |lane| (rank, *lane)));
-    let ordering = |(rank, lane): (&Vec<usize>, Lane)| {
-        let layers = cut(part, rank, lane);
-        let (rows, crossings) = order::order(&layers, effort);
-        Ordering {
+    let layers: Vec<Layers> = pairs.map(|(rank, lane)| cut(part, rank, lane)).collect();
+    let searches: Vec<Search> = layers.iter().map(|cut| Search::new(cut, effort)).collect();
+    let is_promising = promising(plan, options, part, &searches);
+    let both = searches.into_iter().zip(is_promising);
+    let found: Vec<_> = both
+        .map(|(search, is)| is.then(|| search.finished()))
+        .collect();
+    let ordering = |(layers, found): (Layers, Option<(LayerRows, u64)>)| {
+        let (rows, crossings) = found?;
+        Some(Ordering {
             layers,
             rows,
             crossings,
-        }
+        })
     };
-    pairs.map(ordering).collect()
+    let both = layers.into_iter().zip(found);
+    both.filter_map(ordering).collect()
+}
+
+/// The share of the best hope below which an order is not searched to the end. Of 530 plans, with and without searching all of
+/// them, fewer than one in thirty came out otherwise, as often better as worse.
+const PROMISING: f64 = 0.8;
+
+/// Whether each search may lead to the best drawing in one of the orientations, by the order that it found first.
+fn promising(
+    plan: &Plan,
+    options: &LayoutOptions,
+    part: &Component,
+    searches: &[Search],
+) -> Vec<bool> {
+    let mut promising = vec![searches.len() == 1; searches.len()];
+    for orientation in orientations(options).filter(|_| searches.len() > 1) {
+        let hope = |search: &Search| {
+            let (rows, crossings) = search.found();
+            hope(
+                plan,
+                options,
+                part,
+                (search.layers, &rows, crossings),
+                orientation,
+            )
+        };
+        let hopes: Vec<f64> = searches.iter().map(hope).collect();
+        let least = PROMISING * hopes.iter().copied().fold(0.0, f64::max);
+        for (is, hope) in promising.iter_mut().zip(hopes) {
+            *is |= hope >= least;
+        }
+    }
+    promising
+}
+
+/// The orientations to try.
+fn orientations(options: &LayoutOptions) -> impl Iterator<Item = Orientation> {
+    let wished = options.orientation;
+    let both = [Orientation::LeftRight, Orientation::TopBottom];
+    both.into_iter()
+        .filter(move |o| wished.is_none_or(|wished| wished == *o))
+}
+
+/// The most that the quality of a part with this order may be.
+fn hope(
+    plan: &Plan,
+    options: &LayoutOptions,
+    part: &Component,
+    (layers, rows, crossings): (&Layers, &LayerRows, u64),
+    orientation: Orientation,
+) -> f64 {
+    let room = Spacing::new(plan, options, part, layers, orientation);
+    let (size, length) = room.least(rows, &room.apart(rows));
+    let size = turned(size, orientation);
+    quality(size, (crossings, length), part.links.len(), options) * ROUNDING
 }
 
 /// Ranks for a part: cycles broken in different ways, shallow graphs folded.
@@ -244,10 +303,8 @@ fn best_block(
     };
     // The most promising first: most of the others can then be told to be worse before they have places.
     let hoped = |ordering: &Ordering| {
-        let room = Spacing::new(plan, options, part, &ordering.layers, orientation);
-        let apart = room.apart(&ordering.rows);
-        let (size, length) = room.least(&ordering.rows, &apart);
-        quality(turned(size, orientation), ordering.crossings, length) * ROUNDING
+        let found = (&ordering.layers, &ordering.rows, ordering.crossings);
+        hope(plan, options, part, found, orientation)
     };
     let mut ways: Vec<(f64, usize)> = orderings.iter().map(hoped).zip(0..).collect();
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));

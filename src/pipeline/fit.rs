@@ -371,8 +371,9 @@ impl Attempt {
     }
 }
 
-/// The share of the smallest text that can be read from which a drawing that fills the page better is tried.
-const ALMOST: f64 = 0.7;
+/// The share of the smallest text that can be read from which a drawing that fills the page better is tried: its text is
+/// larger by an eighth at most.
+const ALMOST: f64 = 0.85;
 
 /// The least area of a box in squares of its text's height: no box is lower than its text, nor narrower than four
 /// times that.

@@ -11,31 +11,15 @@ const PATIENCE: usize = 6;
 /// The largest number of times that the best order is shaken.
 const SHAKES: usize = 8;
 
-/// The best order found and its number of crossings, borders of clusters included. `effort` counts edges swept: the
-/// search begins anew, then shakes the best order, until it is spent.
+/// The best order found and its number of crossings, borders of clusters included; see [`Search`].
 pub(crate) fn order(layers: &Layers, effort: usize) -> (LayerRows, u64) {
-    let mut search = Search::new(layers, effort);
-    search.improve(&depth_first(layers, true), true);
-    if search.effort > 0 {
-        search.improve_flat();
-    }
-    if search.effort > 0 {
-        search.improve(&depth_first(layers, false), false);
-    }
-    let mut dice = Dice(1);
-    for _ in 0..SHAKES {
-        if search.effort == 0 || search.best.1 == 0 {
-            break;
-        }
-        let shaken = search.shaken(&mut dice);
-        search.improve(&shaken, dice.throw() > 0.0);
-    }
-    (search.sorter.rows(&search.best.0), search.best.1)
+    Search::new(layers, effort).finished()
 }
 
-/// A search for an order with few crossings.
-struct Search<'a> {
-    layers: &'a Layers,
+/// A search for an order with few crossings. Its effort counts edges swept: the search begins anew, then shakes the best
+/// order, until that is spent.
+pub(crate) struct Search<'a> {
+    pub(crate) layers: &'a Layers,
     sorter: CrossingReducer<'a>,
     effort: usize,
     /// The items of the best rows, row by row, and their crossings.
@@ -43,13 +27,44 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(layers: &'a Layers, effort: usize) -> Self {
+    /// A search that has found its first order.
+    pub(crate) fn new(layers: &'a Layers, effort: usize) -> Self {
+        let mut search = Self::unbegun(layers, effort);
+        search.improve(&depth_first(layers, true), true);
+        search
+    }
+
+    fn unbegun(layers: &'a Layers, effort: usize) -> Self {
         Self {
             layers,
             sorter: CrossingReducer::new(layers),
             effort,
             best: (Vec::new(), u64::MAX),
         }
+    }
+
+    /// The best order so far and its number of crossings.
+    pub(crate) fn found(&self) -> (LayerRows, u64) {
+        (self.sorter.rows(&self.best.0), self.best.1)
+    }
+
+    /// The best order that the effort finds.
+    pub(crate) fn finished(mut self) -> (LayerRows, u64) {
+        if self.effort > 0 {
+            self.improve_flat();
+        }
+        if self.effort > 0 {
+            self.improve(&depth_first(self.layers, false), false);
+        }
+        let mut dice = Dice(1);
+        for _ in 0..SHAKES {
+            if self.effort == 0 || self.best.1 == 0 {
+                break;
+            }
+            let shaken = self.shaken(&mut dice);
+            self.improve(&shaken, dice.throw() > 0.0);
+        }
+        self.found()
     }
 
     /// Sorts by these keys and sweeps while that gains something.
@@ -85,7 +100,7 @@ impl<'a> Search<'a> {
             return;
         }
         let flat = self.layers.without_clusters();
-        let mut search = Search::new(&flat, self.effort);
+        let mut search = Search::unbegun(&flat, self.effort);
         search.improve(&depth_first(&flat, false), true);
         self.effort = search.effort;
         let mut key = vec![f64::NAN; self.layers.rank.len()];
