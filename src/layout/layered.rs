@@ -156,8 +156,8 @@ fn orderings(plan: &Plan, part: &Component, options: &LayoutOptions) -> Vec<Orde
     both.filter_map(ordering).collect()
 }
 
-/// The share of the best hope below which an order is not searched to the end. Of 530 plans, with and without searching all of
-/// them, fewer than one in thirty came out otherwise, as often better as worse.
+/// The share of the best hope below which an order is not searched to the end. Of 392 plans, with and without searching all
+/// of them, ten came out otherwise, five of them better.
 const PROMISING: f64 = 0.8;
 
 /// Whether each search may lead to the best drawing in one of the orientations, by the order that it found first.
