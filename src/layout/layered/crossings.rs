@@ -4,11 +4,13 @@
 //! order in all layers that they share, so that their boxes can be drawn apart. A sweep changes few rows once the order
 //! settles, so that whatever follows from a row is kept until that row or one beside it changes.
 
-use std::collections::BTreeMap;
+mod brackets;
+
 use std::ops::Range;
 
 use crate::layout::isotonic::Monotone;
-use crate::layout::{LayerItem, LayerRows, Layers};
+use crate::layout::{LayerRows, Layers};
+use brackets::{bracketed, extents};
 
 /// A unit that moves as one inside its cluster: an item, or a whole cluster from its top to its bottom border.
 #[derive(Clone, Copy)]
@@ -420,51 +422,6 @@ impl<'a> CrossingReducer<'a> {
         }
         sum
     }
-}
-
-/// A row in which each cluster is one stretch, from its top border to its bottom border.
-fn bracketed(layers: &Layers, around: usize, items: Vec<usize>) -> Vec<usize> {
-    let mut row = Vec::with_capacity(items.len());
-    let mut inside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for v in items {
-        match layers.child(around, v) {
-            Some(cluster) => inside.entry(cluster).or_default().push(v),
-            None => row.push(v),
-        }
-    }
-    for (cluster, members) in inside {
-        let border = |v: &usize, kind| layers.home[*v] == cluster && layers.kind[*v] == kind;
-        row.extend(
-            members
-                .iter()
-                .copied()
-                .filter(|v| border(v, LayerItem::Top)),
-        );
-        let (borders, rest): (Vec<usize>, _) = members
-            .into_iter()
-            .partition(|v| border(v, LayerItem::Top) || border(v, LayerItem::Bottom));
-        row.extend(bracketed(layers, cluster, rest));
-        row.extend(borders.into_iter().filter(|v| border(v, LayerItem::Bottom)));
-    }
-    row
-}
-
-/// The number of items from each top border to its bottom border; 1 for any other item.
-fn extents(layers: &Layers, items: &[usize]) -> Vec<usize> {
-    let mut extent = vec![1; items.len()];
-    let mut open = Vec::new();
-    for (at, &v) in items.iter().enumerate() {
-        match layers.kind[v] {
-            LayerItem::Top => open.push(at),
-            LayerItem::Bottom => {
-                if let Some(top) = open.pop() {
-                    extent[items[top]] = at + 1 - top;
-                }
-            }
-            LayerItem::Vertex | LayerItem::Bend => {}
-        }
-    }
-    extent
 }
 
 /// The number of pairs of which the first is greater than the second; both lists are sorted.
