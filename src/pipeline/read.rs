@@ -83,6 +83,18 @@ impl Reading {
         }
     }
 
+    /// The files and folders of the user's that it reads: never overwritten.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let inputs = self.inputs.iter().filter_map(|input| match input {
+            Input::Path(path) => Some(path),
+            Input::Url(_) | Input::Stdin => None,
+        });
+        let source = self.code.iter().map(|code| &code.folder);
+        let topology = self.conclude.topology.files.iter();
+        let all = inputs.chain(source).chain(topology).chain(self.phases.file());
+        all.filter(|path| path.exists()).cloned().collect()
+    }
+
     /// The same reading with phases from another source.
     #[must_use]
     pub fn with_phases(mut self, phases: Phases) -> Self {

@@ -113,14 +113,14 @@ impl<G: Grammar> Query<'_, G> {
     pub(super) fn tell(
         &self,
         index: &Index,
-        body: impl FnOnce() -> Option<ChunkBody>,
+        body: Option<ChunkBody>,
         sink: &mut dyn Sink,
     ) {
         let wanted = self.wanted(index);
         let sizes = if wanted.is_empty() {
             None
         } else {
-            self.fetch(index, &wanted, body(), sink)
+            self.fetch(index, &wanted, body, sink)
         };
         for (raw, entries) in &index.runs {
             let Some(id) = self.connections.get(*raw) else {
