@@ -32,8 +32,8 @@ use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
 use plan::MOST_LOOKED_INTO;
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
-pub(crate) use unpack::CrcReader;
 pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass, walk};
+pub(crate) use unpack::CrcReader;
 
 /// The parser for one format of chunked bags. A value keeps what one description says about later ones.
 pub(crate) trait Grammar: Default + Send + 'static {

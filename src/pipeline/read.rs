@@ -91,7 +91,10 @@ impl Reading {
         });
         let source = self.code.iter().map(|code| &code.folder);
         let topology = self.conclude.topology.files.iter();
-        let all = inputs.chain(source).chain(topology).chain(self.phases.file());
+        let all = inputs
+            .chain(source)
+            .chain(topology)
+            .chain(self.phases.file());
         all.filter(|path| path.exists()).cloned().collect()
     }
 

@@ -50,6 +50,8 @@ struct Forward<'s, G> {
     total: Option<u64>,
     /// Whether the end of the data was met.
     ended: bool,
+    /// Whether messages stand in chunks: a chunk that was closed came before.
+    is_chunked: bool,
 }
 
 /// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if it is not known.
@@ -72,6 +74,7 @@ pub(super) fn read<G: Grammar>(
         allowance: Arc::default(),
         total: None,
         ended: false,
+        is_chunked: false,
     };
     let mut at = stream.position();
     let stop = walk(stream, u64::MAX, |stream| {
@@ -106,6 +109,9 @@ impl<G: Grammar> Forward<'_, G> {
         match record {
             RecordHead::Chunk(head) => self.chunk(stream, &head),
             RecordHead::Message { raw, time, size } => {
+                if self.is_chunked {
+                    self.damage("messages stand between chunks");
+                }
                 self.found.compression.insert(Compression::None);
                 self.message(stream, (raw, time, size))
             }
@@ -163,6 +169,7 @@ impl<G: Grammar> Forward<'_, G> {
 
     fn chunk(&mut self, stream: &mut ByteStream<'_>, head: &ChunkHead) -> Result<(), NoRecord> {
         self.settle();
+        self.is_chunked = head.packed > 0;
         self.found.compression.extend(head.how);
         if head.misnamed {
             self.damage("a chunk is marked as a record of another kind, and was read all the same");

@@ -28,6 +28,8 @@ pub(super) const FOOTER: u64 = 20;
 const DATA_END: u64 = 4;
 /// The number of bytes of statistics before the counts of channels.
 pub(super) const STATISTICS: u64 = 8 + 2 + 4 + 4 + 4 + 4 + 8 + 8;
+/// The bytes of a record that are looked at for the lengths in it; names are shorter.
+const MOST_LOOKED_AT: usize = 1024;
 /// The first of the kinds of records that the format leaves to its users.
 const FIRST_EXTENSION: u8 = 0x80;
 
@@ -64,8 +66,17 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             what: Described::Channel,
             len,
         },
-        op::HEADER if is_first => RecordHead::Other { len },
-        op::ATTACHMENT | op::METADATA => RecordHead::Other { len },
+        op::HEADER if !is_first => RecordHead::Unknown {
+            len,
+            extension: false,
+        },
+        op::HEADER | op::ATTACHMENT | op::METADATA => {
+            let content = stream.peek(MOST_LOOKED_AT)?;
+            if content_len(kind, content).is_some_and(|content| content != len) {
+                return Err(NoRecord::Broken);
+            }
+            RecordHead::Other { len }
+        }
         op::CHUNK_INDEX | op::ATTACHMENT_INDEX | op::METADATA_INDEX | op::SUMMARY_OFFSET => {
             RecordHead::Tail { len }
         }
@@ -77,6 +88,25 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             extension: kind >= FIRST_EXTENSION,
         },
     })
+}
+
+/// The length of a record as the lengths in it add up; `None` if they are not in these first bytes of it.
+fn content_len(kind: u8, content: &[u8]) -> Option<u64> {
+    let mut cursor = FieldCursor(content);
+    if kind == op::ATTACHMENT {
+        let _times = (cursor.u64()?, cursor.u64()?);
+    }
+    let mut len = content.len() - cursor.0.len();
+    len += 4 + cursor.bytes()?.len();
+    let last = match kind {
+        op::ATTACHMENT => {
+            len += 4 + cursor.bytes()?.len();
+            // The length of the data, and a checksum behind them.
+            cursor.u64()?.checked_add(8 + 4)?
+        }
+        _ => 4 + u64::from(cursor.u32()?),
+    };
+    last.checked_add(len as u64)
 }
 
 /// Takes a record's kind and the length of the content that follows in `stream`.
