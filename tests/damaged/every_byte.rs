@@ -88,7 +88,8 @@ fn flip(name: &str, bytes: &[u8], bits: impl Fn(usize) -> Range<usize>) {
             };
             let found = kept.stamps.len();
             // Records that the format leaves to its users are no damage, and said all the same.
-            let is_said = !report.complete || kept.notices.iter().any(|n| n.kind == NoticeKind::Note);
+            let is_said =
+                !report.complete || kept.notices.iter().any(|n| n.kind == NoticeKind::Note);
             if found != TINY && !is_said {
                 let notices = kept.notices;
                 faults.push(format!(
