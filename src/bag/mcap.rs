@@ -74,11 +74,12 @@ impl Grammar for Mcap {
         data: &[u8],
         known: &Connections,
     ) -> Result<Option<(u32, Connection)>, NoRecord> {
-        let described = match what {
-            Described::Schema => records::schema(self, data).map(|()| None),
+        match what {
+            Described::Schema => records::schema(self, data)
+                .ok_or(NoRecord::Broken)
+                .map(|()| None),
             Described::Channel => records::channel(self, data, known),
-        };
-        described.ok_or(NoRecord::Broken)
+        }
     }
 
     fn is_chunk(bytes: &[u8]) -> bool {

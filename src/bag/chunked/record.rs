@@ -120,7 +120,7 @@ pub(crate) fn walk<'a>(
         match step(stream) {
             Ok(()) if stream.position() > before => {}
             Ok(()) => return NoRecord::Broken,
-            Err(stop) => return stop,
+            Err(reason) => return reason,
         }
     }
     NoRecord::End

@@ -71,8 +71,9 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             extension: false,
         },
         op::HEADER | op::ATTACHMENT | op::METADATA => {
-            let content = stream.peek(MOST_LOOKED_AT)?;
-            if content_len(kind, content).is_some_and(|content| content != len) {
+            let content = content_len(kind, stream.peek(MOST_LOOKED_AT)?);
+            let is_known = content == Some(len);
+            if !is_known && (content.is_some() || len <= MOST_LOOKED_AT as u64) {
                 return Err(NoRecord::Broken);
             }
             RecordHead::Other { len }
@@ -300,18 +301,28 @@ pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// The connection that a channel record describes, if it is new; `None` if the record is damaged.
+/// The connection that a channel record describes, if it is new.
+///
+/// # Errors
+/// Where the record is damaged, or describes another channel than one of its number before.
 pub(super) fn channel(
     grammar: &Mcap,
     record: &[u8],
     known: &Connections,
-) -> Option<Option<(u32, Connection)>> {
+) -> Result<Option<(u32, Connection)>, NoRecord> {
     let mut cursor = FieldCursor(record);
-    let (id, schema) = (u32::from(cursor.u16()?), cursor.u16()?);
-    let (topic, encoding) = (cursor.text()?, cursor.text()?);
+    let mut read = || {
+        let (id, schema) = (u32::from(cursor.u16()?), cursor.u16()?);
+        Some((id, schema, cursor.text()?, cursor.text()?))
+    };
+    let (id, schema, topic, encoding) = read().ok_or(NoRecord::Broken)?;
     if let Some(at) = known.get(id) {
-        let known = &known.list()[at.0 as usize];
-        return (known.topic.as_str() == topic).then_some(None);
+        let is_same = known.list()[at.0 as usize].topic.as_str() == topic;
+        return if is_same {
+            Ok(None)
+        } else {
+            Err(NoRecord::Broken)
+        };
     }
     let schema = grammar.schemas.get(&schema);
     let mut connection = Connection {
@@ -330,7 +341,7 @@ pub(super) fn channel(
         },
     };
     describe(&mut connection, cursor.bytes().unwrap_or_default());
-    Some(Some((id, connection)))
+    Ok(Some((id, connection)))
 }
 
 /// Adds the fields that ROS keeps in a channel's metadata.

@@ -183,12 +183,12 @@ fn filled(mut cells: Vec<bool>, widths: &[i64], most: i64) -> Vec<bool> {
     cells
 }
 
-/// The exact first and last signs of the nodes of each role, or of each topic.
-pub(crate) fn ends(
-    elements: &Elements,
-    topics: bool,
-) -> BTreeMap<&str, Vec<(Option<Stamp>, Option<Stamp>)>> {
-    let mut ends: BTreeMap<&str, Vec<_>> = BTreeMap::new();
+/// The exact first and last signs of the nodes of a role, or of a topic.
+type Ends = Vec<(Option<Stamp>, Option<Stamp>)>;
+
+/// The exact first and last signs by role, or by topic.
+pub(crate) fn ends(elements: &Elements, topics: bool) -> BTreeMap<&str, Ends> {
+    let mut ends: BTreeMap<&str, Ends> = BTreeMap::new();
     if topics {
         for topic in &elements.topics {
             let of = ends.entry(topic.name.as_str()).or_default();
