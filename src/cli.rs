@@ -379,7 +379,7 @@ fn job(args: &RenderArgs) -> Result<Render, Error> {
     })
 }
 
-/// The files that are read beside the bags. A style or captions may be a name that is not a file, which does no harm.
+/// The files that only a drawing reads. A style or captions may be a name that is not a file, which does no harm.
 fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     let look = &args.look;
     let named = [
@@ -389,8 +389,7 @@ fn kept(args: &RenderArgs) -> Vec<PathBuf> {
     ];
     let named = named.into_iter().flatten().map(PathBuf::from);
     let files = [&look.font, &look.layout_from].into_iter().flatten();
-    let topologies = args.graph.topology.iter();
-    let all = named.chain(files.chain(topologies).cloned());
+    let all = named.chain(files.cloned());
     all.filter(|path| path.exists()).collect()
 }
 

@@ -638,6 +638,7 @@ fn told(entries: Vec<TopologyEntry>, windows: &[(i64, i64)]) -> Built {
     let topology = Topology {
         entries,
         notices: Vec::new(),
+        files: Vec::new(),
     };
     let options = conclude::ConcludeOptions {
         topology,
@@ -710,6 +711,7 @@ fn what_the_user_states_and_headers_say_is_among_the_evidence() {
             None,
         )],
         notices: Vec::new(),
+        files: Vec::new(),
     };
     let options = conclude::ConcludeOptions {
         topology,

@@ -142,6 +142,8 @@ fn nothing_of_the_users_is_overwritten() {
         &["render", COURIER, "--layout-from", "x.json", "-o", "x.json"],
         &["render", COURIER, "-o", "a{n}.svg", "-o", "a0.svg"],
         &["render", COURIER, "-o", "a.gif", "--poster", "./a.gif"],
+        &["render", COURIER, "-o", "a.gif", "-o", "new/../a.gif"],
+        &["render", COURIER, "--source", ".", "-o", "s.toml", "--format", "json"],
     ];
     for args in refused {
         let output = bagreel(dir.path(), args);

@@ -256,7 +256,7 @@ fn a_wrong_index_costs_time_and_no_message() {
     let (report, kept) = read(&path, Want::Stamps).unwrap();
     assert_eq!(kept.counts(), recording.counts());
     assert_eq!(report.tier, Tier::Index);
-    assert_eq!(kept.notices[0].kind, NoticeKind::Downgraded);
+    assert_eq!(kept.notices[0].kind, NoticeKind::Damaged);
 }
 
 #[test]

@@ -31,15 +31,14 @@ use crate::base::time::{Span, Stamp};
 use index::Query;
 pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slice, nameless};
 use plan::MOST_LOOKED_INTO;
-pub(crate) use plan::{Chunk, ChunkPlan, MOST_CHUNKS, Unindexed, Used};
-pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass};
+pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
+pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass, walk};
+pub(crate) use unpack::CrcReader;
 
 /// The parser for one format of chunked bags. A value keeps what one description says about later ones.
 pub(crate) trait Grammar: Default + Send + 'static {
     /// The format's name in JSON.
     const NAME: &'static str;
-    /// Whether the tail lacks the place of a chunk's index.
-    const INDEX_IS_GUESSED: bool;
     /// Whether a bag ends in a special last record.
     const HAS_END: bool;
     /// The bytes behind that record.
@@ -58,12 +57,15 @@ pub(crate) trait Grammar: Default + Send + 'static {
 
     /// The connection that a description announces, with the bag's number for it; `None` if there is none, or a known
     /// one.
+    ///
+    /// # Errors
+    /// Where the lengths in it lead out of it.
     fn describe(
         &mut self,
         what: &Self::Description,
         data: &[u8],
         known: &Connections,
-    ) -> Option<(u32, Connection)>;
+    ) -> Result<Option<(u32, Connection)>, NoRecord>;
 
     /// Whether a chunk begins here. Asked at every byte where records broke off.
     fn is_chunk(bytes: &[u8]) -> bool;
@@ -277,9 +279,16 @@ impl<G: Grammar> Indexed<G> {
 
     fn front_to_back(&self, reason: &Unindexed, sink: &mut dyn Sink) -> Report {
         let text = format!("read from the front, since {}", reason.why);
-        sink.notice(Notice::new(NoticeKind::Downgraded, text));
+        let is_wrong = reason.fault == Fault::Wrong;
+        let kind = if is_wrong {
+            NoticeKind::Damaged
+        } else {
+            NoticeKind::Downgraded
+        };
+        sink.notice(Notice::new(kind, text));
         let mut found = self.forward(sink);
-        if reason.cut && found.complete {
+        found.complete &= !is_wrong;
+        if reason.fault == Fault::Cut && found.complete {
             // Cut where a record ends, so that only the head knows.
             found.complete = false;
             let text = "the end of the bag is missing";
@@ -293,7 +302,7 @@ impl<G: Grammar> Indexed<G> {
     }
 
     /// Reads everything with the independent reader; where that refuses, reads from the front with ours, which uses no
-    /// index.
+    /// index, and verifies nothing if there was none.
     fn by_the_second_reader(&self, sink: &mut Clip<'_>) -> Report {
         let verified = G::verify(&self.source, &self.plan, sink);
         let Some(why) = verified.stopped else {
@@ -311,7 +320,8 @@ impl<G: Grammar> Indexed<G> {
         }
         let found = self.forward(sink);
         Report {
-            complete: found.complete,
+            // Without an index the first reading went the same way.
+            complete: found.complete && self.plan.is_ok(),
             tier_reason: Some(format!(
                 "the second reader refuses ({why}); read from the front instead"
             )),
@@ -330,9 +340,11 @@ impl<G: Grammar> Indexed<G> {
     }
 }
 
-/// The places of the indexes of these chunks, of those that are read whole.
+/// The places of the heads of these chunks and of their indexes, of those that are read whole.
 fn indexes(chunks: &[&Chunk]) -> Vec<Range<u64>> {
-    let ranges = chunks.iter().map(|chunk| chunk.index.clone());
+    let head = |chunk: &&Chunk| chunk.start..chunk.start + GLANCE as u64;
+    let index = |chunk: &&Chunk| chunk.index.clone();
+    let ranges = chunks.iter().flat_map(|chunk| [head(chunk), index(chunk)]);
     let is_held = |r: &Range<u64>| r.end - r.start <= LONGEST_INDEX;
     ranges.filter(is_held).collect()
 }

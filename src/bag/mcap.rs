@@ -11,7 +11,7 @@ use std::io;
 use std::path::Path;
 
 use mcap::MAGIC;
-use mcap::records::{Record as Parsed, op};
+use mcap::records::op;
 
 use crate::bag::chunked::{
     self, ChunkPlan, Connections, Grammar, Index, IndexSum, NoRecord, RecordHead, SecondReading,
@@ -50,7 +50,6 @@ enum Described {
 
 impl Grammar for Mcap {
     const NAME: &'static str = FORMAT.name;
-    const INDEX_IS_GUESSED: bool = false;
     const HAS_END: bool = true;
     const CLOSING: &'static [u8] = MAGIC;
     type Description = Described;
@@ -74,12 +73,11 @@ impl Grammar for Mcap {
         what: &Described,
         data: &[u8],
         known: &Connections,
-    ) -> Option<(u32, Connection)> {
+    ) -> Result<Option<(u32, Connection)>, NoRecord> {
         match what {
-            Described::Schema => {
-                records::schema(self, data);
-                None
-            }
+            Described::Schema => records::schema(self, data)
+                .ok_or(NoRecord::Broken)
+                .map(|()| None),
             Described::Channel => records::channel(self, data, known),
         }
     }
@@ -98,7 +96,7 @@ impl Grammar for Mcap {
             let (record, after) = rest.0.split_at_checked(len)?;
             rest = FieldCursor(after);
             if kind != op::MESSAGE_INDEX {
-                continue;
+                return None;
             }
             let mut cursor = FieldCursor(record);
             let channel = u32::from(cursor.u16()?);
@@ -129,10 +127,11 @@ impl Grammar for Mcap {
         let (Some(op::HEADER), Some(record)) = (kind, record) else {
             return Vec::new();
         };
-        let Ok(Parsed::Header(header)) = mcap::parse_record(op::HEADER, record) else {
+        let mut cursor = FieldCursor(record);
+        let (Some(profile), Some(library)) = (cursor.text(), cursor.text()) else {
             return Vec::new();
         };
-        let known = [("profile", header.profile), ("library", header.library)];
+        let known = [("profile", profile), ("library", library)];
         let known = known.into_iter().filter(|(_, value)| !value.is_empty());
         known
             .map(|(name, value)| (name.to_owned(), value))

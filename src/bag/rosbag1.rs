@@ -46,7 +46,6 @@ struct Described {
 
 impl Grammar for Rosbag1 {
     const NAME: &'static str = FORMAT.name;
-    const INDEX_IS_GUESSED: bool = true;
     const HAS_END: bool = false;
     const CLOSING: &'static [u8] = b"";
     type Description = Described;
@@ -83,9 +82,9 @@ impl Grammar for Rosbag1 {
         what: &Described,
         data: &[u8],
         known: &Connections,
-    ) -> Option<(u32, Connection)> {
+    ) -> Result<Option<(u32, Connection)>, NoRecord> {
         let is_new = known.get(what.raw).is_none();
-        is_new.then(|| (what.raw, records::connection(self, &what.topic, data)))
+        Ok(is_new.then(|| (what.raw, records::connection(self, &what.topic, data))))
     }
 
     fn is_chunk(bytes: &[u8]) -> bool {
@@ -99,9 +98,6 @@ impl Grammar for Rosbag1 {
         let mut found = IndexSum::default();
         let mut index = Index::default();
         let mut at = 0;
-        if promised.messages == 0 && record_at(bytes, 0).is_some_and(|(_, count, _)| count > 0) {
-            return None;
-        }
         while found.connections < promised.connections {
             let (raw, count, start) = record_at(bytes, at)?;
             let end = start.checked_add((count as usize).checked_mul(ENTRY as usize)?)?;
@@ -110,7 +106,9 @@ impl Grammar for Rosbag1 {
             index.add(raw, entries.filter_map(entry));
             at = end;
         }
-        (found == *promised).then_some(index)
+        // One more than the tail says: then the tail lacks a connection.
+        let is_all = record_at(bytes, at).is_none();
+        (is_all && found == *promised).then_some(index)
     }
 
     fn index_stamps(data: &[u8]) -> Vec<Stamp> {

@@ -2,7 +2,7 @@
 
 mod metadata;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -116,11 +116,11 @@ impl BagFolder {
     /// The files to read: those that the metadata names; if none of them is there, all that look like storage files.
     fn files(&mut self, path: &Path) -> Vec<PathBuf> {
         let named = std::mem::take(&mut self.metadata.files);
-        let mut found = Vec::new();
+        let (mut found, mut known) = (Vec::new(), HashSet::new());
         let mut missing = Vec::new();
         for name in named.iter().take(FILES) {
             match metadata::locate(path, name) {
-                Ok(file) if !found.contains(&file) => found.push(file),
+                Ok(file) if known.insert(file.clone()) => found.push(file),
                 Ok(_) => {}
                 Err(why) => missing.push(why),
             }
@@ -143,7 +143,7 @@ impl BagFolder {
         if instead {
             return there;
         }
-        for file in there.iter().filter(|f| !found.contains(f)) {
+        for file in there.iter().filter(|f| !known.contains(*f)) {
             let text = format!(
                 "`{}` is not named in `metadata.yaml` and was left out",
                 file_name(file)
@@ -285,8 +285,9 @@ impl<'a> PartsAdapter<'a> {
 
     /// Announces the topics that only the metadata names: they have no messages.
     fn silent(&mut self) {
+        let known: BTreeSet<Arc<str>> = self.known.keys().map(|key| Arc::clone(&key.0)).collect();
         for (name, topic) in &self.metadata.topics {
-            if self.known.keys().any(|(known, ..)| **known == **name) {
+            if known.contains(name.as_str()) {
                 continue;
             }
             let key = (Arc::from(name.as_str()), Arc::clone(&topic.type_name), None);

@@ -155,8 +155,9 @@ pub(crate) fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>
 /// what a spreadsheet would take for a formula begins with `'` (OWASP, *CSV Injection*). Names of ROS begin with none
 /// of these signs.
 pub(crate) fn cell(text: &str, is_data: bool) -> Cow<'_, str> {
-    let is_formula =
-        text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    let signs = ['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'];
+    let is_number = || !text.starts_with('+') && text.parse::<f64>().is_ok();
+    let is_formula = text.trim_start_matches(' ').starts_with(signs) && !is_number();
     let shown = if is_data { text.into() } else { visible(text) };
     if is_formula {
         format!("'{shown}").into()
@@ -208,6 +209,9 @@ mod tests {
             ("@SUM(A1)", "'@SUM(A1)"),
             ("\t=1", "'\\u{9}=1"),
             ("-5.5", "-5.5"),
+            ("+1", "'+1"),
+            ("＝1", "'＝1"),
+            ("  =1", "'  =1"),
             ("-5+cmd", "'-5+cmd"),
             ("/a\u{1b}[2J\n::error::", "/a\\u{1b}[2J\\u{a}::error::"),
             ("/größe", "/größe"),

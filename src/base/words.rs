@@ -268,8 +268,8 @@ pub(crate) fn visible_json(json: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Control characters, spaces other than the plain one, and marks that change the text direction or join the characters
-/// around them.
+/// Control characters, spaces other than the plain one, marks that change the text direction or join the characters
+/// around them, and numbers that are no character, which YAML and XML refuse.
 pub fn is_invisible(c: char) -> bool {
     if (' '..='~').contains(&c) {
         return false;
@@ -278,7 +278,7 @@ pub fn is_invisible(c: char) -> bool {
         || (c.is_whitespace() && c != ' ')
         || matches!(c, '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180b}'..='\u{180e}' | '\u{200b}'..='\u{200f}'
             | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}'
-            | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e0fff}')
+            | '\u{ffa0}' | '\u{fff9}'..='\u{fffb}' | '\u{fffe}' | '\u{ffff}' | '\u{e0000}'..='\u{e0fff}')
 }
 
 #[cfg(test)]

@@ -90,6 +90,20 @@ pub fn read(wanted: &SourceCode, end: Stamp) -> Result<Code> {
         );
         notices.push(Notice::new(NoticeKind::Note, text));
     }
+    let left_out = [
+        (
+            files.too_long,
+            "files of source code longer than 600 kB were left out",
+        ),
+        (files.too_deep, "folders nested too deep were left out"),
+    ];
+    for (count, text) in left_out.into_iter().filter(|(count, _)| *count > 0) {
+        let count = count as u64;
+        notices.push(Notice {
+            count,
+            ..Notice::new(NoticeKind::Note, text)
+        });
+    }
     let workspace = workspace(&files);
     Ok(Code {
         instances: workspace.instances(),

@@ -12,7 +12,7 @@ mod substitution;
 mod tree;
 mod yaml;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::base::budget::TOPOLOGY;
 use crate::base::error::{Error, Result};
@@ -54,6 +54,8 @@ pub struct Topology {
     pub entries: Vec<TopologyEntry>,
     /// Notices about unusable parts: includes that were not found, nodes without a name.
     pub notices: Vec<Notice>,
+    /// The files that were read: those named, and what they include.
+    pub files: Vec<PathBuf>,
 }
 
 /// Reads a file of any of the forms, told apart by its name's ending and its content.
@@ -82,6 +84,7 @@ pub fn read(path: &Path) -> Result<Topology> {
             ));
         }
     };
+    topology.files.push(path.to_owned());
     topology.entries.sort();
     topology.entries.dedup();
     Ok(topology)
@@ -97,6 +100,7 @@ pub fn read_all<P: AsRef<Path>>(paths: &[P]) -> Result<Topology> {
         let one = read(path.as_ref())?;
         all.entries.extend(one.entries);
         all.notices.extend(one.notices);
+        all.files.extend(one.files);
     }
     Ok(all)
 }

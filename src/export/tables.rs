@@ -7,6 +7,8 @@ mod mission;
 mod runs;
 pub(crate) mod writer;
 
+use std::io::Write as _;
+
 use super::{Encoder, Written};
 use crate::base::error::{Error, Result};
 use crate::base::table::{Batch, TableCell};
@@ -93,7 +95,10 @@ impl Encoder for TablesEncoder<'_> {
             write(rows, table, &file, self.format)
         };
         // All of them are whole before the first one gets its name.
-        let sinks: Vec<OutputSink> = each.map(write).collect::<Result<_>>()?;
+        let mut sinks: Vec<OutputSink> = each.map(write).collect::<Result<_>>()?;
+        for sink in &mut sinks {
+            sink.flush().map_err(sink.error())?;
+        }
         let mut written = Written::to(&self.target);
         for sink in sinks {
             written.add(sink.commit()?);

@@ -3,7 +3,7 @@
 
 use std::ffi::OsStr;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 
@@ -150,15 +150,21 @@ pub(crate) fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// Whether two paths lead to the same place; the last part need not exist.
+/// Whether two paths lead to the same place, or will once the folders in them are made.
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
+    /// The path without links and `..`: through folders that are there as the system goes, through others by their
+    /// names.
     fn full(path: &Path) -> PathBuf {
-        path.canonicalize().unwrap_or_else(|_| {
-            let folder = folder_of(path);
-            let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-            path.file_name()
-                .map_or(folder.clone(), |name| folder.join(name))
-        })
+        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let mut full = PathBuf::new();
+        for part in whole.components() {
+            match part {
+                Component::ParentDir => drop(full.pop()),
+                part => full.push(part),
+            }
+            full = full.canonicalize().unwrap_or(full);
+        }
+        full
     }
     full(a) == full(b)
 }

@@ -185,6 +185,19 @@ mod tests {
     }
 
     #[test]
+    fn odd_names_come_back_as_they_were() {
+        let signs = "\u{fffe}\u{ffff}\u{feff}\u{2028}\u{85}\u{7f}\u{1}\u{9b}\u{a0}\u{202e}\u{e0001}\u{1f600}\u{10ffff}\t\n\r\"'\\:#&*!|>%@`,[]{}?-~=<^$+ ß";
+        for sign in signs.chars() {
+            let name = format!("/a{sign}b");
+            let (written, kept) = of(0, std::slice::from_ref(&name));
+            assert_eq!((written.left_out, kept), (0, 1), "{name:?}");
+            let read = read(&written.text, Path::new("graph.yaml")).unwrap();
+            let back = format!("{:?}", read.topics);
+            assert!(back.contains(&format!("{name:?}")), "{name:?} in {back}");
+        }
+    }
+
+    #[test]
     fn names_that_are_no_keys_are_left_out() {
         // As long as they are when they are written.
         let names = [

@@ -220,6 +220,7 @@ fn what_the_user_tells_is_added_and_overwrites_nothing() {
                 ),
             ],
             notices: Vec::new(),
+            files: Vec::new(),
         },
         ..ConcludeOptions::default()
     };

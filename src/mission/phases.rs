@@ -190,11 +190,10 @@ fn differing(
     let new = majority(activity, present, after);
     let around = AROUND.0.max(activity.span().nanos() / AROUND.1);
     let near = |at: &Stamp| at.since(cell).abs() <= around;
-    let topics = is_topics(present);
-    let starts = |name: &Arc<str>| presence::ends(elements, name, topics).0;
-    let stops = |name: &Arc<str>| presence::ends(elements, name, topics).1;
-    let began = new.difference(&old).flat_map(starts);
-    let ended = old.difference(&new).flat_map(stops);
+    let ends = presence::ends(elements, is_topics(present));
+    let of = |name: &Arc<str>| ends.get(&**name).into_iter().flatten();
+    let began = new.difference(&old).flat_map(of).filter_map(|e| e.0);
+    let ended = old.difference(&new).flat_map(of).filter_map(|e| e.1);
     let mut times: Vec<Stamp> = began.chain(ended).filter(near).collect();
     times.sort_unstable();
     times.get(times.len() / 2).copied()

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use super::draw::{Body, Composed, places, unplaced, unseen};
 use super::fit::compose;
 use super::{Drawing, Phases, Reading, Stage, Watch, read, unfolded};
-use crate::bag::Input;
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, NoticeKind, Notices};
 use crate::base::words;
@@ -88,11 +87,8 @@ pub(crate) fn render(job: &Render, watch: &mut dyn Watch) -> Result<Rendered> {
 /// As [`export::check()`].
 pub(crate) fn check(job: &Render) -> Result<()> {
     check_figure(job)?;
-    let inputs = job.reading.inputs.iter().filter_map(|input| match input {
-        Input::Path(path) => Some(path),
-        Input::Url(_) | Input::Stdin => None,
-    });
-    let kept: Vec<PathBuf> = inputs.chain(&job.kept).cloned().collect();
+    let mut kept = job.reading.files();
+    kept.extend_from_slice(&job.kept);
     export::check(&job.outputs, &kept)
 }
 

@@ -1,7 +1,7 @@
 //! The figure that was asked for, drawn and put into LaTeX.
 
 use super::Drawing;
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::draw::figure::{self, Figure};
 use crate::export::Output;
 use crate::export::options::FigureOptions;
@@ -27,6 +27,12 @@ pub(super) fn draw(
             || format!("{}.pdf", options.kind.word()),
             |name| name.to_string_lossy().into_owned(),
         );
+    let is_special = |c: char| c.is_control() || "\\{}%#~^$&".contains(c);
+    if picture.contains(is_special) && outputs.iter().any(|o| o.format.word == "tex") {
+        let what = format!("LaTeX cannot include a file called `{picture}`");
+        let hint = "give the picture a name of letters, digits, `.`, `-` and `_`";
+        return Err(Error::usage(what, hint));
+    }
     let latex = figure::latex(&drawn, &picture, options);
     Ok((drawn, latex))
 }

@@ -1,10 +1,9 @@
 //! Judging: reads the expectation and the mission, holds one against the other, writes the findings.
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{Drawing, Reading, Render, Watch, read, show};
-use crate::bag::Input;
 use crate::base::error::Result;
 use crate::base::{budget, file, words};
 use crate::export::Output;
@@ -67,7 +66,7 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
     let text = file::read_text(&job.expect, budget::USER_TEXT)?;
     let expectation = crate::gate::read(&text, &job.expect)?;
     let targets: Vec<Target> = job.reports.iter().map(|r| r.target.clone()).collect();
-    let mut kept = paths(std::slice::from_ref(&job.reading));
+    let mut kept = job.reading.files();
     kept.push(job.expect.clone());
     places::check(&targets, &kept)?;
     let mut reading = job.reading.clone();
@@ -126,7 +125,7 @@ pub(crate) fn diff(job: &DiffJob, watch: &mut dyn Watch) -> Result<Compared> {
     let reports = job.reports.iter().map(|(target, _)| target.clone());
     let pictures = job.pictures.iter().map(|output| output.target.clone());
     let targets: Vec<Target> = reports.chain(pictures).collect();
-    places::check(&targets, &paths(&job.readings))?;
+    places::check(&targets, &files(&job.readings))?;
     let [first, second] = &job.readings;
     let first = read(first, watch)?;
     let second = read(second, watch)?;
@@ -196,7 +195,7 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
         Ok((path, text, expectation.period))
     });
     let old = old.transpose()?;
-    let kept = paths(&job.runs);
+    let kept = files(&job.runs);
     let target = match &old {
         Some((path, ..)) => Target::Path((*path).to_owned()),
         None => job.output.clone(),
@@ -247,16 +246,8 @@ fn name(mission: &Mission) -> String {
         .map_or_else(String::new, |bag| bag.name.clone())
 }
 
-/// The files that are read.
-fn paths(readings: &[Reading]) -> Vec<PathBuf> {
-    let inputs = readings.iter().flat_map(|reading| &reading.inputs);
-    let paths = inputs.filter_map(|input| match input {
-        Input::Path(path) => Some(path.clone()),
-        Input::Url(_) | Input::Stdin => None,
-    });
-    paths
-        .filter(|path| path.as_path() != Path::new(""))
-        .collect()
+fn files(readings: &[Reading]) -> Vec<PathBuf> {
+    readings.iter().flat_map(Reading::files).collect()
 }
 
 /// Writes a text whole or not at all.

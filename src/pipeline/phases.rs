@@ -28,6 +28,14 @@ pub enum Phases {
 }
 
 impl Phases {
+    /// The file that they come from, if they do.
+    pub(super) fn file(&self) -> Option<&PathBuf> {
+        match self {
+            Self::File(path) => Some(path),
+            _ => None,
+        }
+    }
+
     /// The topic whose texts name them; `None` where they come from elsewhere.
     pub(super) fn topic(&self) -> Option<&str> {
         match self {

@@ -83,6 +83,21 @@ impl Reading {
         }
     }
 
+    /// The files and folders of the user's that it reads: never overwritten.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let inputs = self.inputs.iter().filter_map(|input| match input {
+            Input::Path(path) => Some(path),
+            Input::Url(_) | Input::Stdin => None,
+        });
+        let source = self.code.iter().map(|code| &code.folder);
+        let topology = self.conclude.topology.files.iter();
+        let all = inputs
+            .chain(source)
+            .chain(topology)
+            .chain(self.phases.file());
+        all.filter(|path| path.exists()).cloned().collect()
+    }
+
     /// The same reading with phases from another source.
     #[must_use]
     pub fn with_phases(mut self, phases: Phases) -> Self {
@@ -162,16 +177,44 @@ fn refuse(reading: &Reading, path: &Path) -> Result<()> {
 
 const DAY: i64 = 86_400_000_000_000;
 
+/// Holds a mission in JSON to the limits of bags; the reason and a hint where it is past one.
+fn bounded(mission: &Mission) -> std::result::Result<(), (String, &'static str)> {
+    let many = i64::try_from(mission.windows.len()).unwrap_or(i64::MAX);
+    let elements = &mission.elements;
+    let nodes = elements.nodes.iter().map(|node| node.name.as_str());
+    let topics = elements.topics.iter().map(|topic| topic.name.as_str());
+    let lengths: Vec<usize> = nodes.chain(topics).map(str::len).collect();
+    let longest = lengths.iter().max().copied().unwrap_or(0);
+    let whole = lengths.iter().sum::<usize>();
+    if mission.span.nanos() / DAY >= budget::SPAN_DAYS {
+        let days = budget::SPAN_DAYS;
+        let reason = format!("its windows cover more than {days} days");
+        Err((reason, "times are nanoseconds since 1970"))
+    } else if many > budget::WINDOWS {
+        let reason = format!("{many} windows are more than {}", budget::WINDOWS);
+        Err((
+            reason,
+            "write it anew from the bag with a longer `--period`",
+        ))
+    } else if longest > budget::NAME || lengths.len() > budget::NAMES || whole > budget::NAMES_BYTES
+    {
+        let reason = "its names are too many or too long".to_owned();
+        Err((reason, "no robot has such names"))
+    } else {
+        Ok(())
+    }
+}
+
 fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
     let text = file::read_text(path, budget::MISSION_JSON)?;
     let mut mission = read_json(&text, path)?;
     drop(text);
-    if mission.span.nanos() / DAY >= budget::SPAN_DAYS {
+    if let Err((reason, hint)) = bounded(&mission) {
         return Err(Error::BadFile {
             path: path.to_owned(),
             line: 0,
-            reason: format!("its windows cover more than {} days", budget::SPAN_DAYS),
-            hint: "times are nanoseconds since 1970".to_owned(),
+            reason,
+            hint: hint.to_owned(),
         });
     }
     if !mission.knows_lives() {

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use bagreel::bag::{self, Connection, ConnectionId, Input, Message, OpenOptions, Sink, Want};
-use bagreel::internals::base::notice::Notice;
+use bagreel::internals::base::notice::{Notice, NoticeKind};
 use bagreel::internals::base::time::Stamp;
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
+use bagreel::{Output, Render};
 
 /// Calls `with` with a file of this name that holds `bytes`, in memory where the system has such a folder.
 pub fn as_file(name: &str, bytes: &[u8], with: impl FnOnce(&Path)) {
@@ -15,14 +17,23 @@ pub fn as_file(name: &str, bytes: &[u8], with: impl FnOnce(&Path)) {
     let dir = dir.expect("a folder");
     let path = dir.path().join(name);
     std::fs::write(&path, bytes).expect("a file");
+    let begin = Instant::now();
     with(&path);
+    let most = SLOWNESS * (Duration::from_secs(1) + Duration::from_micros(bytes.len() as u64));
+    assert!(begin.elapsed() < most, "{:?} for {} bytes", begin.elapsed(), bytes.len());
 }
+
+/// How many times longer than a second and a second per megabyte an input may take, on a machine that does other things
+/// and with code that counts its edges.
+const SLOWNESS: u32 = 5;
 
 /// Wants everything, keeps nothing, and holds the reader to its promises.
 #[derive(Default)]
 struct Nothing {
     connections: u32,
     stamps: u64,
+    /// Whether a notice says that something was lost or passed over.
+    is_said: bool,
 }
 
 impl Sink for Nothing {
@@ -45,6 +56,7 @@ impl Sink for Nothing {
 
     fn notice(&mut self, notice: Notice) {
         assert!(notice.count > 0 && !notice.text.is_empty());
+        self.is_said |= notice.kind.is_loss() || notice.kind == NoticeKind::Note;
     }
 }
 
@@ -59,6 +71,103 @@ pub fn read_bag(path: &Path, verify: bool) {
             assert!(nothing.stamps < 100_000_000, "{} messages", nothing.stamps);
         }
     }
+}
+
+/// The messages in a bag, and whether a notice says that something is missing; `None` if it is none.
+fn count(bytes: &[u8]) -> Option<(u64, bool)> {
+    let mut counted = None;
+    as_file("x", bytes, |path| {
+        let input = Input::Path(path.to_owned());
+        let Ok(mut reader) = bag::open(&input, &OpenOptions::default()) else {
+            return;
+        };
+        let mut nothing = Nothing::default();
+        if let Ok(report) = reader.read(None, &mut nothing) {
+            counted = Some((nothing.stamps, nothing.is_said || !report.complete));
+        }
+    });
+    counted
+}
+
+/// A small recording of two topics as an MCAP file, written in one of sixteen ways.
+pub fn healthy(way: u8) -> Vec<u8> {
+    // Without chunks and without statistics only a checksum of all bytes knows of every message, and only `--verify`
+    // looks at that.
+    let options = mcap::WriteOptions::new()
+        .compression(None)
+        .use_chunks(way & 5 != 1)
+        .chunk_size(Some(if way & 2 == 0 { 300 } else { 3000 }))
+        .emit_summary_records(way & 4 == 0)
+        .emit_message_indexes(way & 8 == 0);
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = options.create(&mut file).expect("a writer");
+    let schema = writer.add_schema("std_msgs/String", "ros1msg", b"string data").expect("a schema");
+    let channels = ["/one", "/two"].map(|topic| writer.add_channel(schema, topic, "ros1", &BTreeMap::new()).expect("a channel"));
+    for k in 0..HEALTHY {
+        let header = mcap::records::MessageHeader {
+            channel_id: channels[usize::from(k % 3 == 0)],
+            sequence: 0,
+            log_time: 1_600_000_000_000_000_000 + k * 10_000_000,
+            publish_time: 0,
+        };
+        writer.write_to_known_channel(&header, b"\x04\0\0\0ping").expect("a message");
+    }
+    writer.finish().expect("an end");
+    drop(writer);
+    file.into_inner()
+}
+
+/// Messages in a [`healthy`] file.
+pub const HEALTHY: u64 = 24;
+
+/// Damages a healthy file as the bytes say, a place and a mask in every three of them, or cuts it: what is missing
+/// then, a notice says.
+pub fn damage(bytes: &[u8]) {
+    let Some(([way, cut], edits)) = bytes.split_first_chunk() else {
+        return;
+    };
+    let mut file = healthy(*way);
+    for edit in edits.chunks_exact(3).take(4) {
+        let at = usize::from(u16::from_le_bytes([edit[0], edit[1]])) % file.len();
+        file[at] ^= edit[2];
+    }
+    if *way & 16 != 0 {
+        file.truncate(file.len() * usize::from(*cut) / 256);
+    }
+    if let Some((found, is_said)) = count(&file) {
+        assert!(found >= HEALTHY || is_said, "{found} of {HEALTHY} and no word");
+    }
+}
+
+/// Renders a bag onto a path made of the parts that the bytes choose: the bag stays as it was.
+pub fn outputs(bytes: &[u8]) {
+    const PARTS: [&str; 8] = ["..", ".", "a", "new", "x.mcap", "link.json", "0.mcap", "{n}.mcap"];
+    let folder = tempfile::tempdir().expect("a folder");
+    let inside = folder.path().join("a");
+    std::fs::create_dir(&inside).expect("a folder");
+    let bag = healthy(0);
+    let path = inside.join("x.mcap");
+    std::fs::write(&path, &bag).expect("a file");
+    std::fs::hard_link(&path, inside.join("0.mcap")).expect("a link");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(&path, inside.join("link.json")).expect("a link");
+    let mut to = inside.clone();
+    // Two steps up at most, so that nothing is written elsewhere.
+    let steps = bytes.iter().take(6).map(|byte| PARTS[usize::from(byte % 8)]);
+    let mut up = 0;
+    for step in steps {
+        up += u32::from(step == "..");
+        if up < 2 {
+            to.push(step);
+        }
+    }
+    let Ok(output) = Output::parse(&to.display().to_string(), Some("json")) else {
+        return;
+    };
+    if let Ok(job) = Render::new(bagreel::Reading::of([&path]), vec![output]) {
+        let _ = bagreel::render(&job);
+    }
+    assert!(std::fs::read(&path).expect("the bag") == bag, "overwritten by {}", to.display());
 }
 
 /// Reads whatever lies there into graphs.

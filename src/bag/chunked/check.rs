@@ -72,9 +72,10 @@ impl ToldMessages {
         }
     }
 
-    /// Reports all messages to `sink`; returns the number of those that only the index has. Where chunk and index
-    /// disagree, the index is believed if the chunk is damaged or has lost more messages than it has in excess.
-    pub(super) fn settle(&mut self, sink: &mut dyn Sink) -> u64 {
+    /// Reports all messages to `sink`; returns the number of those that only the index has, and of those that only the
+    /// chunk has. Where chunk and index disagree, the index is believed if the chunk is damaged or has lost more messages
+    /// than it has in excess.
+    pub(super) fn settle(&mut self, sink: &mut dyn Sink) -> (u64, u64) {
         let believed = self.doubtful || self.missing > self.surplus;
         let mut witnessed = 0;
         for record in self.behind.drain(..).filter(|_| believed) {
@@ -90,8 +91,9 @@ impl ToldMessages {
             }
         }
         self.gather.flush(sink);
-        (self.missing, self.surplus) = (0, 0);
+        let surplus = std::mem::take(&mut self.surplus);
+        self.missing = 0;
         (self.doubtful, self.interrupted) = (false, false);
-        witnessed
+        (witnessed, surplus)
     }
 }

@@ -10,7 +10,7 @@ use super::record::{NoRecord, RecordHead};
 use super::unpack::{Visitor, unpack};
 use crate::bag::adapters::Gather;
 use crate::bag::model::{Sink, Want, lost};
-use crate::bag::source::{ByteStream, FAR, GLANCE, NEAR};
+use crate::bag::source::{ByteStream, FAR, GLANCE};
 use crate::base::notice::{Notice, NoticeKind};
 use crate::base::time::Stamp;
 
@@ -21,28 +21,29 @@ impl<G: Grammar> Query<'_, G> {
         let Some(promised) = &chunk.promised else {
             return;
         };
-        let index = match self.index(chunk, promised) {
-            Ok(index) => index,
+        let found = match self.index(chunk, promised) {
+            Ok(found) => found,
             Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
         };
-        if let Some((index, where_expected)) = index {
-            let body = || {
-                self.body(chunk)
-                    .ok()
-                    .flatten()
-                    .or_else(|| self.moved(chunk))
-            };
-            self.tell(&index, body, sink);
-            if !where_expected {
-                self.unnamed(chunk, sink);
-            }
-            return;
+        let Some(found) = found else {
+            let text = "chunks were read whole, since their index is missing or wrong";
+            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
+            self.told(&mut stream, Share::Whole, sink);
+            return self.unnamed(chunk, sink);
+        };
+        let body = found.body.or_else(|| self.moved(chunk));
+        self.tell(&found.index, body, sink);
+        let wrong = [
+            (!found.index.spans(chunk.first, chunk.last)).then_some(OTHER_TIMES),
+            (found.place == Place::Apart).then_some(APART),
+        ];
+        for text in wrong.into_iter().flatten() {
+            sink.notice(Notice::new(NoticeKind::Damaged, text));
         }
-        let text = "chunks were read whole, since their index is missing or wrong";
-        sink.notice(Notice::new(NoticeKind::Downgraded, text));
-        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
-        self.told(&mut stream, Share::Whole, sink);
-        self.unnamed(chunk, sink);
+        if found.place != Place::Expected {
+            self.unnamed(chunk, sink);
+        }
     }
 
     /// Reads the chunks that stand behind `chunk` though the tail does not name them.
@@ -51,11 +52,13 @@ impl<G: Grammar> Query<'_, G> {
             return;
         };
         let mut stream = ByteStream::of_file(self.source, body.range.end, self.tail, FAR);
-        while next_chunk::<G>(&mut stream) && stream.position() < chunk.end {
+        let mut from = chunk.start;
+        while next_chunk::<G>(&mut stream, from) && stream.position() < chunk.end {
             let text = "chunks were read that the index does not name";
-            sink.notice(Notice::new(NoticeKind::Downgraded, text));
+            sink.notice(Notice::new(NoticeKind::Damaged, text));
+            from = stream.position();
             let here = Chunk {
-                start: stream.position(),
+                start: from,
                 end: self.tail,
                 ..chunk.clone()
             };
@@ -66,32 +69,42 @@ impl<G: Grammar> Query<'_, G> {
                 return self.told(&mut stream, Share::Payloads, sink);
             }
             self.told(&mut stream, Share::Whole, sink);
-            if stream.position() == here.start && !matches!(stream.skip(1), Ok(1)) {
-                return;
-            }
         }
     }
 
-    /// The chunk's index, if it agrees exactly with the tail, and whether it stands where it should.
-    fn index(&self, chunk: &Chunk, promised: &IndexSum) -> io::Result<Option<(Index, bool)>> {
+    /// The chunk's index, if it agrees exactly with the tail.
+    fn index(&self, chunk: &Chunk, promised: &IndexSum) -> io::Result<Option<Found>> {
         let len = chunk.index.end - chunk.index.start;
         if len > LONGEST_INDEX {
             return Ok(None);
         }
-        if len > 0
-            && let Some(found) = self.index_at(chunk.index.start, len, promised)?
-            && (!G::INDEX_IS_GUESSED || found.spans(chunk.first, chunk.last))
-        {
-            return Ok(Some((found, true)));
+        let body = self.body(chunk)?;
+        let behind = body.as_ref().map(|body| body.range.end);
+        let expected = || self.index_at(chunk.index.start, len, promised);
+        // What stands between a chunk and its index is no part of either.
+        let mut place = Place::Expected;
+        let mut index = None;
+        if behind == Some(chunk.index.start) {
+            index = expected()?;
         }
-        let Some(body) = self.body(chunk)? else {
-            return Ok(None);
-        };
-        // Behind a chunk there may be a gap, and headers may be longer than usual.
-        let most = (len * 2 + 4096).min(LONGEST_INDEX);
-        let len = chunk.end.saturating_sub(body.range.end).min(most);
-        let found = self.index_at(body.range.end, len, promised)?;
-        Ok(found.map(|index| (index, false)))
+        if let (None, Some(behind)) = (&index, behind) {
+            // Behind a chunk there may be a gap, and headers may be longer than usual.
+            let most = (len * 2 + 4096).min(LONGEST_INDEX);
+            let len = chunk.end.saturating_sub(behind).min(most);
+            index = self.index_at(behind, len, promised)?;
+            place = Place::Behind;
+        }
+        if index.is_none() && len > 0 && !behind.is_some_and(|at| self.is_index(at, chunk.end)) {
+            index = expected()?;
+            place = Place::Apart;
+        }
+        Ok(index.map(|index| Found { index, body, place }))
+    }
+
+    /// Whether an index begins at `start`, if not the stated one.
+    fn is_index(&self, start: u64, end: u64) -> bool {
+        let mut stream = ByteStream::of_file(self.source, start, end, GLANCE);
+        matches!(G::next(&mut stream), Ok(RecordHead::Index { .. }))
     }
 
     fn index_at(&self, start: u64, len: u64, promised: &IndexSum) -> io::Result<Option<Index>> {
@@ -103,8 +116,7 @@ impl<G: Grammar> Query<'_, G> {
 
     /// The chunk's compression and the place of its body.
     pub(super) fn body(&self, chunk: &Chunk) -> io::Result<Option<ChunkBody>> {
-        let step = if self.source.is_far() { GLANCE } else { NEAR };
-        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, step);
+        let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, GLANCE);
         let head = match G::next(&mut stream) {
             Ok(RecordHead::Chunk(head)) => head,
             Err(NoRecord::Io(e)) => return Err(e),
@@ -119,7 +131,7 @@ impl<G: Grammar> Query<'_, G> {
     /// The body of a chunk for which the tail names a place too early.
     fn moved(&self, chunk: &Chunk) -> Option<ChunkBody> {
         let mut stream = ByteStream::of_file(self.source, chunk.start, chunk.end, FAR);
-        let start = next_chunk::<G>(&mut stream).then(|| stream.position())?;
+        let start = next_chunk::<G>(&mut stream, chunk.start).then(|| stream.position())?;
         let here = Chunk {
             start,
             ..chunk.clone()
@@ -158,6 +170,28 @@ impl<G: Grammar> Query<'_, G> {
             Err(stop) => Err(stop.to_string()),
         }
     }
+}
+
+const OTHER_TIMES: &str = "chunks begin or end at other times than the index of the bag says";
+const APART: &str = "chunks are not where the index of the bag says, or not as long";
+
+/// The index of a chunk.
+struct Found {
+    index: Index,
+    /// The place of the chunk's records, if its head is readable.
+    body: Option<ChunkBody>,
+    place: Place,
+}
+
+/// The place of a chunk's index.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// Where the tail says, right behind the chunk.
+    Expected,
+    /// Behind the chunk, and not where the tail says.
+    Behind,
+    /// Where the tail says, and not behind the chunk: the chunk has another length, or lies elsewhere.
+    Apart,
 }
 
 /// The part of a chunk that is reported.

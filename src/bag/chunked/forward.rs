@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Grammar;
 use super::check::{Behind, ToldMessages};
 use super::index::{hand_over, nameless};
-use super::record::{ChunkHead, Connections, NoRecord, RecordHead, pass};
+use super::record::{ChunkHead, Connections, NoRecord, RecordHead, pass, walk};
 use super::unpack::{Visitor, records, unpack};
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{MOST_PAYLOAD, Sink, Want};
@@ -50,6 +50,8 @@ struct Forward<'s, G> {
     total: Option<u64>,
     /// Whether the end of the data was met.
     ended: bool,
+    /// Whether messages stand in chunks: a chunk that was closed came before.
+    is_chunked: bool,
 }
 
 /// Reads all of `stream` from the first record on; `size` is the length of the bag, 0 if it is not known.
@@ -72,32 +74,24 @@ pub(super) fn read<G: Grammar>(
         allowance: Arc::default(),
         total: None,
         ended: false,
+        is_chunked: false,
     };
-    let (stop, at) = forward.outside(stream, size);
+    let mut at = stream.position();
+    let stop = walk(stream, u64::MAX, |stream| {
+        let from = stream.position();
+        let step = G::next(stream).and_then(|record| forward.record(stream, record));
+        at = stream.position();
+        match step {
+            Err(NoRecord::Broken | NoRecord::Cut) if forward.resume(stream, from) => {}
+            step => step?,
+        }
+        forward.sink.progress(at, size);
+        Ok(())
+    });
     forward.finish(stop, at)
 }
 
 impl<G: Grammar> Forward<'_, G> {
-    /// Reads the records of the file itself; returns why and where they end.
-    fn outside(&mut self, stream: &mut ByteStream<'_>, size: u64) -> (NoRecord, u64) {
-        loop {
-            let done = match G::next(stream) {
-                Ok(RecordHead::FileEnd { len }) => {
-                    return (self.file_end(stream, len), stream.position());
-                }
-                Ok(record) => self.record(stream, record),
-                Err(stop) => Err(stop),
-            };
-            let at = stream.position();
-            match done {
-                Ok(()) => {}
-                Err(NoRecord::Broken | NoRecord::Cut) if self.resume(stream) => {}
-                Err(stop) => return (stop, at),
-            }
-            self.sink.progress(at, size);
-        }
-    }
-
     fn record(
         &mut self,
         stream: &mut ByteStream<'_>,
@@ -107,12 +101,17 @@ impl<G: Grammar> Forward<'_, G> {
             self.ended = false;
             self.damage("messages stand behind what should be the end of the data");
         }
-        if matches!(record, RecordHead::Other { .. }) {
-            self.told.interrupt();
+        if let RecordHead::Tail { .. } | RecordHead::Total { .. } = record
+            && !self.ended
+        {
+            self.damage("records of the bag's end stand among its messages");
         }
         match record {
             RecordHead::Chunk(head) => self.chunk(stream, &head),
             RecordHead::Message { raw, time, size } => {
+                if self.is_chunked {
+                    self.damage("messages stand between chunks");
+                }
                 self.found.compression.insert(Compression::None);
                 self.message(stream, (raw, time, size))
             }
@@ -126,33 +125,41 @@ impl<G: Grammar> Forward<'_, G> {
                 self.ended = true;
                 pass(stream, len)
             }
-            RecordHead::FileEnd { len } | RecordHead::Other { len } => pass(stream, len),
-        }
-    }
-
-    /// Whether the bag ends here properly.
-    fn file_end(&mut self, stream: &mut ByteStream<'_>, len: u64) -> NoRecord {
-        self.ended = true;
-        if let Err(stop) = pass(stream, len) {
-            return stop;
-        }
-        match stream.peek(G::CLOSING.len() + 1) {
-            Ok(rest) if rest != G::CLOSING => {
-                let at = stream.position();
-                self.damage(&format!(
-                    "what stands from byte {at} on is not the end of the bag"
-                ));
-                NoRecord::End
+            RecordHead::FileEnd { len } => self.file_end(stream, len),
+            RecordHead::Unknown { len, extension } => {
+                self.told.interrupt();
+                let text = "records of a kind that the format does not define were passed over";
+                if extension {
+                    self.sink.notice(Notice::new(NoticeKind::Note, text));
+                } else {
+                    self.damage(text);
+                }
+                pass(stream, len)
             }
-            Ok(_) => NoRecord::End,
-            Err(e) => NoRecord::Io(e),
+            RecordHead::Other { len } | RecordHead::Tail { len } => {
+                self.told.interrupt();
+                pass(stream, len)
+            }
         }
     }
 
-    /// Skips bytes that are not a record, up to the next chunk; returns whether there is one.
-    fn resume(&mut self, stream: &mut ByteStream<'_>) -> bool {
-        let from = stream.position();
-        let found = next_chunk::<G>(stream);
+    /// Ends the walk if the bag ends here properly.
+    fn file_end(&mut self, stream: &mut ByteStream<'_>, len: u64) -> Result<(), NoRecord> {
+        self.ended = true;
+        pass(stream, len)?;
+        if stream.peek(G::CLOSING.len() + 1)? == G::CLOSING {
+            return Err(NoRecord::End);
+        }
+        let at = stream.position();
+        self.damage(&format!(
+            "what stands from byte {at} on is not the end of the bag"
+        ));
+        Ok(())
+    }
+
+    /// Skips bytes that are not a record, from behind byte `from` up to the next chunk; returns whether there is one.
+    fn resume(&mut self, stream: &mut ByteStream<'_>, from: u64) -> bool {
+        let found = next_chunk::<G>(stream, from);
         if found {
             let lost = stream.position() - from;
             self.damage(&format!("{lost} bytes from byte {from} on are not records"));
@@ -162,6 +169,7 @@ impl<G: Grammar> Forward<'_, G> {
 
     fn chunk(&mut self, stream: &mut ByteStream<'_>, head: &ChunkHead) -> Result<(), NoRecord> {
         self.settle();
+        self.is_chunked = head.packed > 0;
         self.found.compression.extend(head.how);
         if head.misnamed {
             self.damage("a chunk is marked as a record of another kind, and was read all the same");
@@ -185,8 +193,9 @@ impl<G: Grammar> Forward<'_, G> {
             Err(e) => return NoRecord::Io(e),
         };
         match records(&mut plain, u64::MAX, self) {
-            NoRecord::Broken => NoRecord::Cut,
-            stop => stop,
+            Ok(()) => NoRecord::End,
+            Err(NoRecord::Broken) => NoRecord::Cut,
+            Err(stop) => stop,
         }
     }
 
@@ -215,10 +224,18 @@ impl<G: Grammar> Forward<'_, G> {
 
     /// Reports the messages of the last chunk, once everything behind it has been read.
     fn settle(&mut self) {
-        let mended = self.told.settle(self.sink);
+        let (mended, surplus) = self.told.settle(self.sink);
         if mended > 0 {
             self.found.complete = false;
             super::index::absent(self.sink, mended);
+        }
+        if surplus > 0 {
+            self.found.complete = false;
+            self.sink.notice(Notice {
+                kind: NoticeKind::Damaged,
+                count: surplus,
+                text: "messages are in a chunk but not in its index".to_owned(),
+            });
         }
     }
 
@@ -296,7 +313,10 @@ impl<G: Grammar> Visitor<G> for Forward<'_, G> {
             return pass(stream, len);
         }
         let data = peek_whole(stream, len)?;
-        let described = self.grammar.describe(what, data, &self.connections);
+        let Ok(described) = self.grammar.describe(what, data, &self.connections) else {
+            self.damage("what describes a connection is not readable");
+            return pass(stream, len);
+        };
         if let Some((raw, connection)) = described
             && let Some(connection) = self.connections.add(raw, connection)
         {
@@ -320,8 +340,11 @@ fn peek_whole<'s>(stream: &'s mut ByteStream<'_>, len: u64) -> Result<&'s [u8], 
     Ok(bytes)
 }
 
-/// Goes to the beginning of the next chunk; false if there is none before the end of the stream.
-pub(super) fn next_chunk<G: Grammar>(stream: &mut ByteStream<'_>) -> bool {
+/// Goes to the beginning of the next chunk behind byte `from`; false if there is none before the end of the stream.
+pub(super) fn next_chunk<G: Grammar>(stream: &mut ByteStream<'_>, from: u64) -> bool {
+    if stream.position() <= from && !matches!(stream.skip(1), Ok(1)) {
+        return false;
+    }
     while let Ok(window) = stream.peek(2 * STRIDE) {
         let len = window.len();
         let mut starts = 0..len.min(STRIDE);

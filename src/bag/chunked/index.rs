@@ -110,17 +110,12 @@ pub(super) struct Query<'a, G> {
 
 impl<G: Grammar> Query<'_, G> {
     /// Reports the stamps of `index` to `sink`, and the wanted messages from `body`.
-    pub(super) fn tell(
-        &self,
-        index: &Index,
-        body: impl FnOnce() -> Option<ChunkBody>,
-        sink: &mut dyn Sink,
-    ) {
+    pub(super) fn tell(&self, index: &Index, body: Option<ChunkBody>, sink: &mut dyn Sink) {
         let wanted = self.wanted(index);
         let sizes = if wanted.is_empty() {
             None
         } else {
-            self.fetch(index, &wanted, body(), sink)
+            self.fetch(index, &wanted, body, sink)
         };
         for (raw, entries) in &index.runs {
             let Some(id) = self.connections.get(*raw) else {

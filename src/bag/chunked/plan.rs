@@ -113,17 +113,33 @@ impl ChunkPlan {
 #[derive(Clone, Debug)]
 pub(crate) struct Unindexed {
     pub(crate) why: String,
-    /// Whether the head says that there was more.
-    pub(crate) cut: bool,
+    pub(crate) fault: Fault,
+}
+
+/// What the lack of an index says about the bag.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    /// Nothing: it was never written.
+    Missing,
+    /// The head says that there was more.
+    Cut,
+    /// The index contradicts itself or the bag.
+    Wrong,
 }
 
 impl Unindexed {
-    /// An error with this reason.
-    pub(crate) fn because<T>(why: impl Into<String>) -> Result<T, Self> {
-        Err(Self {
-            why: why.into(),
-            cut: false,
-        })
+    /// An error with this reason: the index is missing.
+    pub(crate) fn missing<T>(why: impl Into<String>) -> Result<T, Self> {
+        let fault = Fault::Missing;
+        let why = why.into();
+        Err(Self { why, fault })
+    }
+
+    /// An error with this reason: the index contradicts itself or the bag.
+    pub(crate) fn wrong<T>(why: impl Into<String>) -> Result<T, Self> {
+        let fault = Fault::Wrong;
+        let why = why.into();
+        Err(Self { why, fault })
     }
 }
 
@@ -159,7 +175,7 @@ impl Used {
         if all.all(|raw| connections.get(raw).is_some()) {
             return Ok(());
         }
-        Unindexed::because("its index counts messages of connections that it does not describe")
+        Unindexed::wrong("its index counts messages of connections that it does not describe")
     }
 }
 

@@ -29,6 +29,29 @@ pub(crate) enum RecordHead<D> {
     FileEnd { len: u64 },
     /// A record that does not concern us.
     Other { len: u64 },
+    /// A record that stands only behind the end of the data, and does not concern us.
+    Tail { len: u64 },
+    /// A record of no kind that the format defines, or that cannot be of the kind that it states. An `extension` is of
+    /// a kind that the format leaves to its users.
+    Unknown { len: u64, extension: bool },
+}
+
+impl<D> RecordHead<D> {
+    /// The number of bytes that follow, all of them of this record.
+    pub(crate) fn len(&self) -> u64 {
+        match self {
+            Self::Chunk(head) => head.packed.saturating_add(head.padding),
+            Self::Message { size, .. } => u64::from(*size),
+            Self::Description { len, .. }
+            | Self::Index { len, .. }
+            | Self::Total { len, .. }
+            | Self::DataEnd { len }
+            | Self::FileEnd { len }
+            | Self::Other { len }
+            | Self::Tail { len }
+            | Self::Unknown { len, .. } => *len,
+        }
+    }
 }
 
 /// The head of a chunk, before its records.
@@ -83,6 +106,24 @@ impl fmt::Display for NoRecord {
             Self::Io(e) => e.fmt(f),
         }
     }
+}
+
+/// Takes records up to byte `end` of `stream`, one at each step; returns why they end. A step that takes no byte ends the
+/// walk too: whatever a bag says, no walk through it has more steps than the bag has bytes.
+pub(crate) fn walk<'a>(
+    stream: &mut ByteStream<'a>,
+    end: u64,
+    mut step: impl FnMut(&mut ByteStream<'a>) -> Result<(), NoRecord>,
+) -> NoRecord {
+    while stream.position() < end {
+        let before = stream.position();
+        match step(stream) {
+            Ok(()) if stream.position() > before => {}
+            Ok(()) => return NoRecord::Broken,
+            Err(reason) => return reason,
+        }
+    }
+    NoRecord::End
 }
 
 /// Passes over `len` bytes, which must be there: if the length leads out of the file, nothing is passed.

@@ -1,10 +1,10 @@
 //! The records of a chunk, one after the other, with checks of the chunk's own numbers.
 
 use std::io::{self, Read};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use super::Grammar;
-use super::record::{ChunkHead, NoRecord, RecordHead, pass};
+use super::record::{ChunkHead, NoRecord, RecordHead, pass, walk};
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::source::ByteStream;
 use crate::base::time::Stamp;
@@ -33,7 +33,8 @@ pub(super) trait Visitor<G: Grammar> {
 /// them, if anything.
 ///
 /// # Errors
-/// Fails where the file ends first or cannot be read on.
+/// Fails where the file ends first or cannot be read on. If a chunk is stated to go on beyond the file, the stream then
+/// stands where its records end.
 pub(super) fn unpack<G: Grammar>(
     stream: &mut ByteStream<'_>,
     head: &ChunkHead,
@@ -41,133 +42,123 @@ pub(super) fn unpack<G: Grammar>(
     visitor: &mut dyn Visitor<G>,
 ) -> Result<Option<String>, NoRecord> {
     let end = stream.position().saturating_add(head.packed);
-    let found = match head.how {
-        None => Ok(Some(
-            "it is compressed in a way that no reader knows".to_owned(),
-        )),
-        Some(Compression::None) => plain(stream, end, visitor),
-        Some(how) => Ok(packed(stream, head, how, allowance, visitor)),
+    let found = match (head.how, head.crc) {
+        (None, _) => Some("it is compressed in a way that no reader knows".to_owned()),
+        (Some(Compression::None), None) => match records(stream, end, visitor) {
+            Err(NoRecord::Io(e)) => return Err(NoRecord::Io(e)),
+            Err(stop) => Some(stop.to_string()),
+            Ok(()) if head.packed != head.plain => Some(NOT_AS_LONG.to_owned()),
+            Ok(()) => None,
+        },
+        (Some(how), _) => summed(stream, head, how, allowance, visitor),
     };
-    let rest = end
-        .saturating_sub(stream.position())
-        .saturating_add(head.padding);
+    let rest = end.saturating_sub(stream.position());
     // A chunk cut by the end of the file is told once, as the cut.
-    match stream.skip(rest)? {
-        n if n < rest => Err(NoRecord::Cut),
-        _ => found,
-    }
+    pass(stream, rest.saturating_add(head.padding))?;
+    Ok(found)
 }
 
-/// Hands over the records of an uncompressed chunk. Their checksum is not verified: that would mean reading every
-/// payload.
-fn plain<G: Grammar>(
-    stream: &mut ByteStream<'_>,
-    end: u64,
-    visitor: &mut dyn Visitor<G>,
-) -> Result<Option<String>, NoRecord> {
-    match records(stream, end, visitor) {
-        NoRecord::End => Ok(None),
-        NoRecord::Io(e) => Err(NoRecord::Io(e)),
-        stop => Ok(Some(stop.to_string())),
-    }
-}
+const NOT_AS_LONG: &str = "it is not as long as it says";
 
-/// Hands over the records of a compressed chunk.
-fn packed<G: Grammar>(
+/// Hands over the records of a chunk that is compressed or has a checksum, which means reading all of it.
+fn summed<G: Grammar>(
     stream: &mut ByteStream<'_>,
     head: &ChunkHead,
     how: Compression,
     allowance: &Arc<Allowance>,
     visitor: &mut dyn Visitor<G>,
 ) -> Option<String> {
-    let crc = OnceLock::new();
     let from = stream.by_ref().take(head.packed);
-    let from = match allowance.open(how, from) {
+    let mut from = match allowance.open(how, from) {
         Ok(from) => from,
         Err(e) => return Some(e.to_string()),
     };
-    let mut records_of = ByteStream::of_reader(CrcReader {
-        from,
-        hasher: head.crc.map(|_| crc32fast::Hasher::new()),
-        at_end: &crc,
-    });
-    let stop = records(&mut records_of, u64::MAX, visitor);
-    match stop {
-        NoRecord::End if head.crc.is_some() && crc.get() != head.crc.as_ref() => {
-            Some("its checksum is wrong".to_owned())
-        }
-        NoRecord::End if records_of.position() != head.plain => {
-            Some("it is not as long as it says".to_owned())
-        }
-        NoRecord::End => None,
-        stop => Some(stop.to_string()),
+    let mut sum = None;
+    let (told, len) = if head.crc.is_some() {
+        let mut from = CrcReader::new(from);
+        let told = all_records(&mut from, visitor);
+        sum = from.sum();
+        told
+    } else {
+        all_records(&mut from, visitor)
+    };
+    match told {
+        Err(stop) => Some(stop.to_string()),
+        Ok(()) if sum != head.crc => Some("its checksum is wrong".to_owned()),
+        Ok(()) if len != head.plain => Some(NOT_AS_LONG.to_owned()),
+        Ok(()) => None,
     }
 }
 
-/// Hands over the records up to position `end` of `stream`.
+/// Hands over all records in `from`, and returns how many bytes there are.
+fn all_records<G: Grammar>(
+    from: &mut (impl Read + Send),
+    visitor: &mut dyn Visitor<G>,
+) -> (Result<(), NoRecord>, u64) {
+    let mut plain = ByteStream::of_reader(from);
+    let told = records(&mut plain, u64::MAX, visitor);
+    (told, plain.position())
+}
+
+/// Hands over the records of a chunk up to position `end` of `stream`, or to its end.
+///
+/// # Errors
+/// The reason why they end before. Records that do not belong into a chunk are passed over, and the reason at the end.
 pub(super) fn records<G: Grammar>(
     stream: &mut ByteStream<'_>,
     end: u64,
     visitor: &mut dyn Visitor<G>,
-) -> NoRecord {
-    while stream.position() < end {
-        let step = match G::next(stream) {
-            Ok(record) => one(stream, end, record, visitor),
-            Err(stop) => return stop,
-        };
-        if let Err(stop) = step {
-            return stop;
-        }
-    }
-    NoRecord::End
-}
-
-fn one<G: Grammar>(
-    stream: &mut ByteStream<'_>,
-    end: u64,
-    record: RecordHead<G::Description>,
-    visitor: &mut dyn Visitor<G>,
 ) -> Result<(), NoRecord> {
-    let left = end.saturating_sub(stream.position());
-    match record {
-        RecordHead::Message { raw, time, size } if u64::from(size) <= left => {
-            visitor.message(stream, (raw, time, size))
+    let mut is_odd = false;
+    let stop = walk(stream, end, |stream| {
+        let record = G::next(stream)?;
+        if record.len() > end.saturating_sub(stream.position()) {
+            // A length that leaves the chunk is none.
+            return Err(NoRecord::Broken);
         }
-        RecordHead::Description { what, len } if len <= left => {
-            visitor.description(stream, &what, len)
+        match record {
+            RecordHead::Message { raw, time, size } => visitor.message(stream, (raw, time, size)),
+            RecordHead::Description { what, len } => visitor.description(stream, &what, len),
+            odd => {
+                is_odd = true;
+                pass(stream, odd.len())
+            }
         }
-        // A chunk in a chunk is none.
-        RecordHead::Chunk(head) if head.packed <= left => pass(stream, head.packed),
-        RecordHead::Index { len, .. }
-        | RecordHead::Total { len, .. }
-        | RecordHead::DataEnd { len }
-        | RecordHead::FileEnd { len }
-        | RecordHead::Other { len }
-            if len <= left =>
-        {
-            pass(stream, len)
-        }
-        // A length that leaves the chunk is none.
-        _ => Err(NoRecord::Broken),
+    });
+    match stop {
+        NoRecord::End if is_odd => Err(NoRecord::Broken),
+        NoRecord::End => Ok(()),
+        stop => Err(stop),
     }
 }
 
 /// A reader that sums up the bytes it reads.
-struct CrcReader<'a, R> {
+pub(crate) struct CrcReader<R> {
     from: R,
-    hasher: Option<crc32fast::Hasher>,
-    /// The sum, set once everything has been read.
-    at_end: &'a OnceLock<u32>,
+    hasher: crc32fast::Hasher,
+    is_at_end: bool,
 }
 
-impl<R: Read> Read for CrcReader<'_, R> {
+impl<R> CrcReader<R> {
+    pub(crate) fn new(from: R) -> Self {
+        Self {
+            from,
+            hasher: crc32fast::Hasher::new(),
+            is_at_end: false,
+        }
+    }
+
+    /// The CRC-32 of all bytes; `None` before the end of them.
+    pub(crate) fn sum(&self) -> Option<u32> {
+        self.is_at_end.then(|| self.hasher.clone().finalize())
+    }
+}
+
+impl<R: Read> Read for CrcReader<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         let n = self.from.read(into)?;
-        match &mut self.hasher {
-            Some(hasher) if n > 0 => hasher.update(&into[..n]),
-            Some(hasher) => drop(self.at_end.set(hasher.clone().finalize())),
-            None => {}
-        }
+        self.hasher.update(&into[..n]);
+        self.is_at_end = n == 0;
         Ok(n)
     }
 }

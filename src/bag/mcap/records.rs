@@ -1,10 +1,11 @@
 //! The records of an MCAP file, read with bounds, and the channels they describe.
 //!
-//! The records of which there is one per file are parsed by the crate `mcap`; those of each chunk or message are parsed
-//! here, from a stream and without copies, and text that is not UTF-8 is replaced where the crate refuses the record.
+//! They are parsed here, from a stream and without copies, and no length in them sizes memory; text that is not UTF-8 is
+//! replaced where the crate `mcap` refuses the record.
 
 use std::sync::Arc;
 
+use mcap::MAGIC;
 use mcap::records::op;
 
 use super::{Described, Mcap};
@@ -25,13 +26,26 @@ pub(super) const ENTRY: usize = 16;
 /// kind.
 pub(super) const FOOTER: u64 = 20;
 const DATA_END: u64 = 4;
+/// The number of bytes of statistics before the counts of channels.
+pub(super) const STATISTICS: u64 = 8 + 2 + 4 + 4 + 4 + 4 + 8 + 8;
+/// The bytes of a record that are looked at for the lengths in it; names are shorter.
+const MOST_LOOKED_AT: usize = 1024;
+/// The first of the kinds of records that the format leaves to its users.
+const FIRST_EXTENSION: u8 = 0x80;
 
 /// Takes the head of the next record.
 pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>, NoRecord> {
+    let is_first = stream.position() == MAGIC.len() as u64;
     let (kind, len) = head(stream)?;
-    // One flipped bit makes a chunk an index, or the end of the file.
-    let is_common = matches!(kind, op::MESSAGE | op::SCHEMA | op::CHANNEL | op::CHUNK);
-    if !is_common && is_chunk_of(stream.peek(CHUNK_HEAD + 32)?, len) {
+    match kind {
+        op::MESSAGE => return message(stream, len),
+        op::CHUNK => return chunk(stream, len).map(RecordHead::Chunk),
+        // Zeros where the disk was full.
+        0 => return Err(NoRecord::Broken),
+        _ => {}
+    }
+    // One flipped bit makes a chunk an index, a description, or the end of the file.
+    if is_chunk_of(stream.peek(CHUNK_HEAD + 32)?, len) {
         let chunk = chunk(stream, len)?;
         return Ok(RecordHead::Chunk(ChunkHead {
             misnamed: true,
@@ -39,12 +53,8 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
         }));
     }
     Ok(match kind {
-        // Zeros where the disk was full.
-        0 => return Err(NoRecord::Broken),
-        op::CHUNK => RecordHead::Chunk(chunk(stream, len)?),
-        op::MESSAGE => message(stream, len)?,
         op::MESSAGE_INDEX => index(stream, len)?,
-        op::STATISTICS => RecordHead::Total {
+        op::STATISTICS if len >= STATISTICS => RecordHead::Total {
             messages: FieldCursor(stream.peek(8)?).u64().ok_or(NoRecord::Cut)?,
             len,
         },
@@ -56,11 +66,48 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             what: Described::Channel,
             len,
         },
+        op::HEADER if !is_first => RecordHead::Unknown {
+            len,
+            extension: false,
+        },
+        op::HEADER | op::ATTACHMENT | op::METADATA => {
+            let content = content_len(kind, stream.peek(MOST_LOOKED_AT)?);
+            let is_known = content == Some(len);
+            if !is_known && (content.is_some() || len <= MOST_LOOKED_AT as u64) {
+                return Err(NoRecord::Broken);
+            }
+            RecordHead::Other { len }
+        }
+        op::CHUNK_INDEX | op::ATTACHMENT_INDEX | op::METADATA_INDEX | op::SUMMARY_OFFSET => {
+            RecordHead::Tail { len }
+        }
         op::DATA_END if len == DATA_END => RecordHead::DataEnd { len },
         op::FOOTER if len == FOOTER => RecordHead::FileEnd { len },
         op::DATA_END | op::FOOTER => return Err(NoRecord::Broken),
-        _ => RecordHead::Other { len },
+        kind => RecordHead::Unknown {
+            len,
+            extension: kind >= FIRST_EXTENSION,
+        },
     })
+}
+
+/// The length of a record as the lengths in it add up; `None` if they are not in these first bytes of it.
+fn content_len(kind: u8, content: &[u8]) -> Option<u64> {
+    let mut cursor = FieldCursor(content);
+    if kind == op::ATTACHMENT {
+        let _times = (cursor.u64()?, cursor.u64()?);
+    }
+    let mut len = content.len() - cursor.0.len();
+    len += 4 + cursor.bytes()?.len();
+    let last = match kind {
+        op::ATTACHMENT => {
+            len += 4 + cursor.bytes()?.len();
+            // The length of the data, and a checksum behind them.
+            cursor.u64()?.checked_add(8 + 4)?
+        }
+        _ => 4 + u64::from(cursor.u32()?),
+    };
+    last.checked_add(len as u64)
 }
 
 /// Takes a record's kind and the length of the content that follows in `stream`.
@@ -103,8 +150,9 @@ fn index(stream: &mut ByteStream<'_>, len: u64) -> Result<RecordHead<Described>,
     let (Some(channel), Some(entries)) = (channel, entries) else {
         return Err(NoRecord::Cut);
     };
-    if entries > len.saturating_sub(6) || entries % ENTRY as u64 != 0 {
-        return Err(NoRecord::Broken);
+    if entries + 6 != len || entries % ENTRY as u64 != 0 {
+        let extension = false;
+        return Ok(RecordHead::Unknown { len, extension });
     }
     Ok(RecordHead::Index {
         raw: u32::from(channel),
@@ -231,15 +279,15 @@ pub(super) struct SchemaRecord {
     definition: Option<Arc<str>>,
 }
 
-/// Adds the schema of a record. A second one of the same id is passed over.
+/// Adds the schema of a record, `None` if it is damaged. A second one of the same id is passed over.
 pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
     let mut cursor = FieldCursor(record);
     let id = cursor.u16()?;
-    if grammar.schemas.contains_key(&id) {
-        return None;
-    }
     let (name, encoding) = (cursor.text()?, cursor.text()?);
     let data = cursor.bytes()?;
+    if grammar.schemas.contains_key(&id) {
+        return Some(());
+    }
     let is_text = encoding.starts_with("ros") || encoding.ends_with("idl");
     let text = std::str::from_utf8(data)
         .ok()
@@ -254,17 +302,28 @@ pub(super) fn schema(grammar: &mut Mcap, record: &[u8]) -> Option<()> {
 }
 
 /// The connection that a channel record describes, if it is new.
+///
+/// # Errors
+/// Where the record is damaged, or describes another channel than one of its number before.
 pub(super) fn channel(
     grammar: &Mcap,
     record: &[u8],
     known: &Connections,
-) -> Option<(u32, Connection)> {
+) -> Result<Option<(u32, Connection)>, NoRecord> {
     let mut cursor = FieldCursor(record);
-    let (id, schema) = (u32::from(cursor.u16()?), cursor.u16()?);
-    if known.get(id).is_some() {
-        return None;
+    let mut read = || {
+        let (id, schema) = (u32::from(cursor.u16()?), cursor.u16()?);
+        Some((id, schema, cursor.text()?, cursor.text()?))
+    };
+    let (id, schema, topic, encoding) = read().ok_or(NoRecord::Broken)?;
+    if let Some(at) = known.get(id) {
+        let is_same = known.list()[at.0 as usize].topic.as_str() == topic;
+        return if is_same {
+            Ok(None)
+        } else {
+            Err(NoRecord::Broken)
+        };
     }
-    let (topic, encoding) = (cursor.text()?, cursor.text()?);
     let schema = grammar.schemas.get(&schema);
     let mut connection = Connection {
         id: ConnectionId(0),
@@ -282,7 +341,7 @@ pub(super) fn channel(
         },
     };
     describe(&mut connection, cursor.bytes().unwrap_or_default());
-    Some((id, connection))
+    Ok(Some((id, connection)))
 }
 
 /// Adds the fields that ROS keeps in a channel's metadata.

@@ -3,13 +3,13 @@
 use std::io;
 
 use mcap::MAGIC;
-use mcap::records::{Record as Parsed, Statistics, op};
+use mcap::records::op;
 
 use super::records::{self, FOOTER, FieldCursor, HEAD};
 use super::{Described, Mcap};
 use crate::bag::chunked::{
-    Chunk, ChunkPlan, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead, Unindexed, Used,
-    pass,
+    Chunk, ChunkPlan, CrcReader, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead,
+    Unindexed, Used, pass, walk,
 };
 use crate::bag::model::MOST_PAYLOAD;
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
@@ -20,16 +20,22 @@ const MOST_CHANNELS: usize = 1 << 16;
 
 /// Reads the summary at the end of `source`.
 pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexed>> {
-    let start = match footer(source)? {
-        Ok(start) => start,
+    let (start, crc) = match footer(source)? {
+        Ok(found) => found,
         Err(reason) => return Ok(Err(reason)),
     };
     let mut summary = Summary::default();
     summary.plan.body = MAGIC.len() as u64..start;
-    match summary.records(source) {
+    let end = source.len() - CRC_AND_CLOSING;
+    let mut bytes = CrcReader::new(ByteStream::of_file(source, start, end, FAR));
+    let read = summary.records(&mut ByteStream::of_reader(&mut bytes));
+    match read {
         Ok(()) => {}
         Err(NoRecord::Io(e)) => return Err(e),
-        Err(_) => return Ok(Unindexed::because("its summary is damaged")),
+        Err(_) => return Ok(Unindexed::wrong("its summary is damaged")),
+    }
+    if crc != 0 && bytes.sum() != Some(crc) {
+        return Ok(Unindexed::wrong("the checksum of its summary is wrong"));
     }
     Ok(summary.settle(source))
 }
@@ -37,27 +43,31 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
 /// The number of bytes of a footer record and of the closing bytes of the file.
 const END: usize = 9 + 20 + 8;
 
-/// The place where the summary begins.
-fn footer(source: &FileSource) -> io::Result<Result<u64, Unindexed>> {
+/// The number of bytes from the checksum of the summary to the end of the file: all that it does not sum up.
+const CRC_AND_CLOSING: u64 = 4 + 8;
+
+/// The place where the summary begins, and its checksum, 0 for none.
+fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
     let mut bytes = [0; END];
     let Some(at) = source.len().checked_sub(bytes.len() as u64) else {
-        return Ok(Unindexed::because("it is cut"));
+        return Ok(Unindexed::wrong("it is cut"));
     };
     let got = source.read_at(at, &mut bytes)?;
     let mut cursor = FieldCursor(&bytes[..got]);
     let head = (cursor.u8(), cursor.u64());
-    if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(FOOTER)) {
-        return Ok(Unindexed::because("its end is missing"));
-    }
-    let Ok(Parsed::Footer(footer)) = mcap::parse_record(op::FOOTER, cursor.0) else {
-        return Ok(Unindexed::because("its end is missing"));
+    let fields = (cursor.u64(), cursor.u64(), cursor.u32());
+    let (Some(start), Some(_), Some(crc)) = fields else {
+        return Ok(Unindexed::wrong("its end is missing"));
     };
-    Ok(match footer.summary_start {
-        0 => Unindexed::because("it has no summary"),
+    if !bytes[..got].ends_with(MAGIC) || head != (Some(op::FOOTER), Some(FOOTER)) {
+        return Ok(Unindexed::wrong("its end is missing"));
+    }
+    Ok(match start {
+        0 => Unindexed::missing("it has no summary"),
         n if n < MAGIC.len() as u64 || n > at => {
-            Unindexed::because("its summary lies outside the file")
+            Unindexed::wrong("its summary lies outside the file")
         }
-        n => Ok(n),
+        n => Ok((n, crc)),
     })
 }
 
@@ -73,14 +83,16 @@ struct Summary {
 }
 
 impl Summary {
-    fn records(&mut self, source: &FileSource) -> Result<(), NoRecord> {
-        let mut stream = ByteStream::of_file(source, self.plan.body.end, source.len(), FAR);
+    /// Takes the records up to the footer. All of them are held, so none may be long.
+    fn records(&mut self, stream: &mut ByteStream<'_>) -> Result<(), NoRecord> {
         let mut channels: Vec<Vec<u8>> = Vec::new();
-        loop {
-            let (kind, len) = match records::head(&mut stream) {
-                Ok((op::FOOTER, _)) | Err(NoRecord::End) => break,
-                head => head?,
-            };
+        let stop = walk(stream, u64::MAX, |stream| {
+            let (kind, len) = records::head(stream)?;
+            if kind == op::FOOTER {
+                // To the end of what the checksum sums up.
+                stream.skip(FOOTER)?;
+                return Err(NoRecord::End);
+            }
             if len > MOST_PAYLOAD as u64 {
                 return Err(NoRecord::Broken);
             }
@@ -90,7 +102,7 @@ impl Summary {
                 return Err(NoRecord::Cut);
             }
             match kind {
-                op::SCHEMA => drop(records::schema(&mut self.grammar, record)),
+                op::SCHEMA => records::schema(&mut self.grammar, record).ok_or(NoRecord::Broken)?,
                 // A channel may stand before its schema.
                 op::CHANNEL if channels.len() < MOST_CHANNELS => channels.push(record.to_vec()),
                 op::STATISTICS => self.statistics = statistics(record),
@@ -100,13 +112,16 @@ impl Summary {
                 }
                 _ => {}
             }
-            pass(&mut stream, len)?;
-        }
+            pass(stream, len)
+        });
+        let NoRecord::End = stop else {
+            return Err(stop);
+        };
         for channel in &channels {
             let connections = &mut self.plan.connections;
             let described = self
                 .grammar
-                .describe(&Described::Channel, channel, connections);
+                .describe(&Described::Channel, channel, connections)?;
             if let Some((raw, connection)) = described {
                 connections.add(raw, connection);
             }
@@ -138,20 +153,21 @@ impl Summary {
             .iter()
             .filter_map(|c| Some(c.promised?.messages))
             .sum();
-        match &self.statistics {
-            Some(all) if all.chunk_count as usize != chunks.len() => {
-                return Unindexed::because("its index does not name all of its chunks");
-            }
-            Some(all) if all.message_count == known => {}
-            Some(all) if all.chunk_count == 0 => {
-                return Unindexed::because("its messages lie outside chunks");
-            }
-            _ if self.blind => return Unindexed::because("its chunks have no message index"),
-            Some(_) => return Unindexed::because("its index and its statistics disagree"),
-            None if chunks.is_empty() => {
-                return Unindexed::because("its summary names no chunks");
-            }
-            None => {}
+        let Some(all) = &self.statistics else {
+            return Unindexed::missing("its summary has no statistics to check its index by");
+        };
+        if all.chunks == 0 && all.messages > 0 && chunks.is_empty() {
+            return Unindexed::missing("its messages lie outside chunks");
+        }
+        if all.chunks as usize != chunks.len() {
+            return Unindexed::wrong("its index does not name all of its chunks");
+        }
+        if all.messages != known {
+            return if self.blind {
+                Unindexed::missing("its chunks have no message index")
+            } else {
+                Unindexed::wrong("its index and its statistics disagree")
+            };
         }
         self.used.are_in(&self.plan.connections)?;
         gaps(source, &self.plan)?;
@@ -166,37 +182,40 @@ fn gaps(source: &FileSource, plan: &ChunkPlan) -> Result<(), Unindexed> {
     let ends = plan.chunks.iter().map(|c| (c.start, c.end));
     for (start, end) in ends.chain([(plan.body.end, plan.body.end)]) {
         if start < free || end > plan.body.end {
-            return Unindexed::because("its index names chunks where none can be");
+            return Unindexed::wrong("its index names chunks where none can be");
         }
         let mut stream = ByteStream::of_file(source, free, start, NEAR);
-        while stream.position() < start {
-            match Mcap::next(&mut stream) {
-                Ok(RecordHead::Chunk(_) | RecordHead::Message { .. }) => {
-                    return Unindexed::because("its summary does not name all of its messages");
-                }
-                Ok(
-                    RecordHead::Description { len, .. }
-                    | RecordHead::Index { len, .. }
-                    | RecordHead::Total { len, .. }
-                    | RecordHead::DataEnd { len }
-                    | RecordHead::FileEnd { len }
-                    | RecordHead::Other { len },
-                ) if pass(&mut stream, len).is_ok() => {}
-                // Bytes that are not a record hide no message that could be read.
-                _ => break,
-            }
+        let mut hidden = false;
+        // Bytes that are not a record hide no message that could be read.
+        walk(&mut stream, start, |stream| {
+            let record = Mcap::next(stream)?;
+            hidden |= matches!(
+                record,
+                RecordHead::Chunk(_) | RecordHead::Message { .. } | RecordHead::Index { .. }
+            );
+            pass(stream, record.len())
+        });
+        if hidden {
+            return Unindexed::wrong("its summary does not name all of its messages");
         }
         free = end;
     }
     Ok(())
 }
 
-/// The counts in a statistics record.
+/// The counts of the whole file, as stated.
+struct Statistics {
+    messages: u64,
+    chunks: u32,
+}
+
 fn statistics(record: &[u8]) -> Option<Statistics> {
-    match mcap::parse_record(op::STATISTICS, record) {
-        Ok(Parsed::Statistics(statistics)) => Some(statistics),
-        _ => None,
-    }
+    let mut cursor = FieldCursor(record);
+    let messages = cursor.u64()?;
+    let (_schemas, _channels) = (cursor.u16()?, cursor.u32()?);
+    let (_attachments, _metadata) = (cursor.u32()?, cursor.u32()?);
+    let chunks = cursor.u32()?;
+    Some(Statistics { messages, chunks })
 }
 
 /// A chunk index record.

@@ -8,7 +8,9 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 
 use super::{Described, Mcap, records};
 use crate::bag::adapters::Gather;
-use crate::bag::chunked::{Connections, Grammar as _, hand_over_slice, nameless, pass};
+use crate::bag::chunked::{
+    Connections, Grammar as _, NoRecord, hand_over_slice, nameless, pass, walk,
+};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Sink, Want};
 use crate::bag::source::{ByteStream, FAR, FileSource};
@@ -56,27 +58,38 @@ pub(super) fn read(source: &FileSource, sink: &mut dyn Sink) -> Result<(), Strin
 fn bound(source: &FileSource) -> Result<(), String> {
     let mut stream = ByteStream::of_file(source, 0, source.len(), FAR);
     Mcap::begin(&mut stream);
-    while let Ok((kind, len)) = records::head(&mut stream) {
+    let mut refused = None;
+    walk(&mut stream, u64::MAX, |stream| {
+        let (kind, len) = records::head(stream)?;
         let end = stream.position().saturating_add(len);
-        if kind == op::CHUNK
-            && let Some(head) = records::chunk(&mut stream, len).ok()
-            && head.how == Some(Compression::None)
-        {
-            let end = stream.position() + head.packed;
-            while stream.position() < end {
-                let (_, len) = records::head(&mut stream).map_err(|stop| stop.to_string())?;
-                if stream.position().saturating_add(len) > end {
-                    return Err("a record is longer than its chunk".to_owned());
-                }
-                pass(&mut stream, len).map_err(|stop| stop.to_string())?;
-            }
+        if kind == op::CHUNK {
+            refused = bound_chunk(stream, len).err();
         }
-        let rest = end.saturating_sub(stream.position());
-        if pass(&mut stream, rest).is_err() {
-            break;
+        if refused.is_some() {
+            return Err(NoRecord::Broken);
         }
+        pass(stream, end.saturating_sub(stream.position()))
+    });
+    refused.map_or(Ok(()), Err)
+}
+
+fn bound_chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<(), String> {
+    let head = records::chunk(stream, len).map_err(|stop| format!("a chunk's head: {stop}"))?;
+    if head.how != Some(Compression::None) {
+        return Ok(());
     }
-    Ok(())
+    let end = stream.position() + head.packed;
+    let stop = walk(stream, end, |stream| {
+        let (_, len) = records::head(stream)?;
+        if len > end.saturating_sub(stream.position()) {
+            return Err(NoRecord::Broken);
+        }
+        pass(stream, len)
+    });
+    match stop {
+        NoRecord::End => Ok(()),
+        stop => Err(format!("a record is longer than its chunk: {stop}")),
+    }
 }
 
 impl Crate<'_> {
@@ -113,7 +126,7 @@ impl Crate<'_> {
 
     fn describe(&mut self, what: Described, data: &[u8]) {
         let described = self.grammar.describe(&what, data, &self.connections);
-        if let Some((raw, connection)) = described
+        if let Ok(Some((raw, connection))) = described
             && let Some(connection) = self.connections.add(raw, connection)
         {
             self.wants.push(self.sink.connection(connection));

@@ -43,7 +43,7 @@ pub(super) enum Header {
         count: u32,
     },
     /// An unknown operation, or one without the fields it needs.
-    Other,
+    Unknown,
 }
 
 /// The longest header that is accepted, in bytes; real ones stay below 300.
@@ -67,7 +67,11 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             count,
             len: u64::from(count.checked_mul(ENTRY).ok_or(NoRecord::Broken)?),
         },
-        _ => RecordHead::Other { len },
+        Header::Bag { .. } | Header::ChunkInfo { .. } => RecordHead::Other { len },
+        Header::Unknown => RecordHead::Unknown {
+            len,
+            extension: false,
+        },
     })
 }
 
@@ -119,7 +123,7 @@ pub(super) fn parse(header: &[u8]) -> Option<Header> {
             known.get_or_insert(value);
         }
     }
-    Some(fields.record().unwrap_or(Header::Other))
+    Some(fields.record().unwrap_or(Header::Unknown))
 }
 
 /// The values of a header's fields, of two of one name the first. There is a header before every message.
@@ -233,7 +237,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// The connection that a record describes.
+/// The connection that a record describes, with the fields before the first damaged one.
 pub(super) fn connection(grammar: &mut Rosbag1, topic: &[u8], mut data: &[u8]) -> Connection {
     let mut connection = blank(text(topic).into());
     while let Some((name, value, rest)) = field(data) {

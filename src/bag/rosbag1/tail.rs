@@ -5,7 +5,8 @@ use std::io;
 use super::records::{self, ENTRY, Header};
 use super::{Described, Rosbag1};
 use crate::bag::chunked::{
-    Chunk, ChunkPlan, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, Unindexed, Used,
+    Chunk, ChunkPlan, Fault, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, Unindexed, Used, pass,
+    walk,
 };
 use crate::bag::model::MOST_PAYLOAD;
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
@@ -19,9 +20,12 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
         Ok(found) => found,
         Err(NoRecord::Io(e)) => return Err(e),
         Err(error) => {
-            let cut = matches!(error, NoRecord::End | NoRecord::Cut);
+            let fault = match error {
+                NoRecord::End | NoRecord::Cut => Fault::Cut,
+                _ => Fault::Wrong,
+            };
             let why = "its head is damaged".to_owned();
-            return Ok(Err(Unindexed { why, cut }));
+            return Ok(Err(Unindexed { why, fault }));
         }
     };
     let Header::Bag {
@@ -31,12 +35,11 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
         encryptor,
     } = header
     else {
-        return Ok(Unindexed::because("it has no head"));
+        return Ok(Unindexed::wrong("it has no head"));
     };
     let body = stream.position() + u64::from(len);
-    if let Some(why) = misplaced(index_pos, body, source.len()) {
-        let cut = index_pos > source.len();
-        return Ok(Err(Unindexed { why, cut }));
+    if let Err(reason) = placed(index_pos, body, source.len()) {
+        return Ok(Err(reason));
     }
     let mut tail = Tail::default();
     tail.plan.body = body..index_pos;
@@ -44,19 +47,22 @@ pub(super) fn read(source: &FileSource) -> io::Result<Result<ChunkPlan, Unindexe
     match tail.records(source, (connections, chunks)) {
         Ok(()) => Ok(tail.settle()),
         Err(NoRecord::Io(e)) => Err(e),
-        Err(_) => Ok(Unindexed::because("its index is cut or damaged")),
+        Err(_) => Ok(Unindexed::wrong("its index is cut or damaged")),
     }
 }
 
-fn misplaced(index_pos: u64, body: u64, len: u64) -> Option<String> {
+/// Refuses an index that is not inside the bag.
+fn placed(index_pos: u64, body: u64, len: u64) -> Result<(), Unindexed> {
     if index_pos == 0 {
-        Some("it was never closed and has no index".to_owned())
+        Unindexed::missing("it was never closed and has no index")
     } else if index_pos > len {
-        Some(format!("its index at byte {index_pos} is cut off"))
+        let why = format!("its index at byte {index_pos} is cut off");
+        let fault = Fault::Cut;
+        Err(Unindexed { why, fault })
     } else if index_pos < body {
-        Some(format!("its index cannot be at byte {index_pos}"))
+        Unindexed::wrong(format!("its index cannot be at byte {index_pos}"))
     } else {
-        None
+        Ok(())
     }
 }
 
@@ -76,37 +82,38 @@ struct Tail {
 }
 
 impl Tail {
-    /// Reads the records of the tail: `expected` connections and chunks. Anything after them does not matter.
+    /// Reads the records of the tail: `expected` connections and chunks, and no more of them.
     fn records(&mut self, source: &FileSource, expected: (u32, u32)) -> Result<(), NoRecord> {
         let mut stream = ByteStream::of_file(source, self.plan.body.end, source.len(), FAR);
-        let (mut connections, mut chunks) = (0, 0);
-        while (connections, chunks) != expected {
-            let (header, len) = records::header(&mut stream)?;
+        let mut found = (0, 0);
+        let stop = walk(&mut stream, u64::MAX, |stream| {
+            let (header, len) = match records::header(stream) {
+                Err(_) if found == expected => return Err(NoRecord::End),
+                header => header?,
+            };
             let end = stream.position() + u64::from(len);
             match header {
                 Header::Connection { raw, topic } => {
-                    connections += 1;
-                    self.connection(&mut stream, &Described { raw, topic }, len)?;
+                    found.0 += 1;
+                    self.connection(stream, &Described { raw, topic }, len)?;
                 }
                 Header::ChunkInfo { .. } => {
-                    chunks += 1;
-                    self.chunk(&mut stream, &header, len)?;
+                    found.1 += 1;
+                    self.chunk(stream, &header, len)?;
                 }
+                _ if found == expected => return Err(NoRecord::End),
                 _ => {}
             }
             let too_many = self.plan.chunks.len() > MOST_CHUNKS;
-            if connections > expected.0 || chunks > expected.1 || too_many {
+            if found.0 > expected.0 || found.1 > expected.1 || too_many {
                 return Err(NoRecord::Broken);
             }
-            let left = end.saturating_sub(stream.position());
-            if stream.skip(left)? < left {
-                return Err(NoRecord::Cut);
-            }
-        }
-        // The head may lie as well as the tail.
-        match records::header(&mut stream) {
-            Ok((Header::ChunkInfo { .. }, _)) => Err(NoRecord::Broken),
-            _ => Ok(()),
+            pass(stream, end.saturating_sub(stream.position()))
+        });
+        match stop {
+            NoRecord::End if found == expected => Ok(()),
+            NoRecord::End => Err(NoRecord::Cut),
+            stop => Err(stop),
         }
     }
 
@@ -121,7 +128,7 @@ impl Tail {
         }
         let data = stream.peek(len as usize)?;
         let connections = &mut self.plan.connections;
-        if let Some((raw, connection)) = self.grammar.describe(what, data, connections) {
+        if let Some((raw, connection)) = self.grammar.describe(what, data, connections)? {
             connections.add(raw, connection);
         }
         Ok(())
@@ -165,7 +172,7 @@ impl Tail {
     ) -> Result<(IndexSum, Vec<(u32, u32)>), NoRecord> {
         let mut sum = IndexSum::default();
         let mut counts = Vec::new();
-        if u64::from(count) * 8 > u64::from(len) {
+        if u64::from(count) * 8 != u64::from(len) {
             return Err(NoRecord::Broken);
         }
         for _ in 0..count {
@@ -187,12 +194,12 @@ impl Tail {
         let body = self.plan.body.clone();
         let chunks = &mut self.plan.chunks;
         if chunks.is_empty() && body.end > body.start {
-            return Unindexed::because("its index names no chunks");
+            return Unindexed::wrong("its index names no chunks");
         }
         chunks.sort_by_key(|c| c.start);
         chunks.dedup_by_key(|c| c.start);
         if chunks.iter().any(|c| !body.contains(&c.start)) {
-            return Unindexed::because("its index names chunks outside the bag");
+            return Unindexed::wrong("its index names chunks outside the bag");
         }
         let mut end = body.end;
         for chunk in chunks.iter_mut().rev() {

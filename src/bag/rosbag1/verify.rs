@@ -11,7 +11,7 @@ use super::{Described, Rosbag1};
 use crate::bag::adapters::Gather;
 use crate::bag::chunked::{
     ChunkBody, ChunkPlan, Connections, Grammar as _, NoRecord, SecondReading, hand_over_slice,
-    nameless, pass,
+    nameless, pass, walk,
 };
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::model::{Sink, Want};
@@ -55,25 +55,30 @@ fn bound(
 ) -> Result<(), String> {
     let allowance = Arc::default();
     let mut stream = ByteStream::of_file(source, plan.body.start, plan.body.end, FAR);
-    loop {
-        let (header, len) = match records::header(&mut stream) {
-            Ok(found) => found,
-            Err(NoRecord::End) => return Ok(()),
-            Err(_) => return Err("the chunks are not one behind the other".to_owned()),
-        };
+    let mut refused = None;
+    let stop = walk(&mut stream, u64::MAX, |stream| {
+        let (header, len) = records::header(stream)?;
         let start = stream.position();
-        pass(&mut stream, u64::from(len)).map_err(|stop| stop.to_string())?;
-        match header {
-            Header::Chunk { compression, size } => {
-                let how = Compression::named(&compression)
-                    .ok_or("a chunk is compressed in an unknown way")?;
-                verified.compression.insert(how);
-                let range = start..start + u64::from(len);
-                bound_chunk(source, &ChunkBody { how, range }, size, &allowance)?;
-            }
-            Header::Index { count, .. } if count.checked_mul(ENTRY) == Some(len) => {}
-            _ => return Err("a record among the chunks is not what it should be".to_owned()),
-        }
+        pass(stream, u64::from(len))?;
+        let found = match header {
+            Header::Chunk { compression, size } => match Compression::named(&compression) {
+                Some(how) => {
+                    verified.compression.insert(how);
+                    let range = start..start + u64::from(len);
+                    bound_chunk(source, &ChunkBody { how, range }, size, &allowance)
+                }
+                None => Err("a chunk is compressed in an unknown way".to_owned()),
+            },
+            Header::Index { count, .. } if count.checked_mul(ENTRY) == Some(len) => Ok(()),
+            _ => Err("a record among the chunks is not what it should be".to_owned()),
+        };
+        refused = found.err();
+        refused.as_ref().map_or(Ok(()), |_| Err(NoRecord::Broken))
+    });
+    match (stop, refused) {
+        (NoRecord::End, _) => Ok(()),
+        (_, Some(why)) => Err(why),
+        (_, None) => Err("the chunks are not one behind the other".to_owned()),
     }
 }
 
@@ -161,7 +166,7 @@ impl Crate<'_> {
             topic: found.storage_topic.as_bytes().to_vec(),
         };
         let described = self.grammar.describe(&what, &data, &self.connections);
-        if let Some((raw, connection)) = described
+        if let Ok(Some((raw, connection))) = described
             && let Some(connection) = self.connections.add(raw, connection)
         {
             self.wants.push(self.sink.connection(connection));

@@ -58,6 +58,9 @@ const SKIPPED: &[&str] = &[
 pub(super) struct Files {
     pub(super) list: Vec<SourceFile>,
     pub(super) is_cut: bool,
+    /// The number of files left out since they are too long, and of folders since they nest too deep.
+    pub(super) too_long: usize,
+    pub(super) too_deep: usize,
     bytes: usize,
 }
 
@@ -147,13 +150,18 @@ pub(super) fn of_folder(folder: &Path) -> Result<Files> {
             } else {
                 format!("{below}/{name}")
             };
-            if file_type.is_dir() && depth < DEEPEST && !is_skipped(&name) {
-                open.push((entry.path(), path, depth + 1));
-            } else if file_type.is_file()
-                && kind(&path).is_some()
-                && let Some(bytes) = read(&entry.path())
-            {
-                files.add(path, &bytes);
+            if file_type.is_dir() && !is_skipped(&name) {
+                if depth < DEEPEST {
+                    open.push((entry.path(), path, depth + 1));
+                } else {
+                    files.too_deep += 1;
+                }
+            } else if file_type.is_file() && kind(&path).is_some() {
+                if entry.metadata().is_ok_and(|about| about.len() > LONGEST) {
+                    files.too_long += usize::from(kind(&path) != Some(FileKind::Script));
+                } else if let Some(bytes) = read(&entry.path()) {
+                    files.add(path, &bytes);
+                }
             }
         }
     }
@@ -161,12 +169,9 @@ pub(super) fn of_folder(folder: &Path) -> Result<Files> {
     Ok(files)
 }
 
-/// The bytes of a file; `None` if it is too long or cannot be read.
+/// The bytes of a file; `None` if it cannot be read.
 fn read(path: &Path) -> Option<Vec<u8>> {
     let file = fs::File::open(path).ok()?;
-    if file.metadata().ok()?.len() > LONGEST {
-        return None;
-    }
     let mut bytes = Vec::new();
     file.take(LONGEST).read_to_end(&mut bytes).ok()?;
     Some(bytes)
@@ -205,8 +210,12 @@ mod tests {
         fs::write(folder.path().join("script"), "#!/usr/bin/env python\n").unwrap();
         fs::write(folder.path().join("LICENSE"), "words").unwrap();
         fs::write(folder.path().join("a.py"), [0xff, 0xfe]).unwrap();
-        let found = of_folder(folder.path()).unwrap().list;
-        let paths: Vec<&str> = found.iter().map(|f| f.path.as_str()).collect();
+        let mut deep = folder.path().to_owned();
+        (0..=DEEPEST).for_each(|_| deep.push("d"));
+        fs::create_dir_all(&deep).unwrap();
+        let found = of_folder(folder.path()).unwrap();
+        let paths: Vec<&str> = found.list.iter().map(|f| f.path.as_str()).collect();
         assert_eq!(paths, ["a.py", "script"]);
+        assert_eq!((found.too_long, found.too_deep), (1, 1));
     }
 }

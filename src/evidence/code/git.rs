@@ -38,6 +38,9 @@ pub(super) fn files(folder: &Path, version: &Version, end: Stamp) -> Result<Chec
         let note = Some(format!("the code was read as it lies, for {why}"));
         Ok(Checkout::Lying { note })
     };
+    if !git_link::is_plain(folder) {
+        return lying("there are pipes or devices in its repository");
+    }
     let prefix = match (prefix(folder), version) {
         (Ok(prefix), _) => prefix,
         (Err(reason), Version::Commit(name)) => return Err(unknown(folder, name, &reason)),
@@ -215,12 +218,14 @@ fn of_commit(folder: &Path, commit: &str, prefix: &str) -> Option<Files> {
     if entries.iter().any(|entry| entry.size.is_none()) {
         return None;
     }
-    let small = entries.into_iter().filter(|e| e.size <= Some(LONGEST));
-    let mut wanted: Vec<(String, String)> = small.map(|e| (e.path, e.id)).collect();
+    let (small, long): (Vec<_>, Vec<_>) =
+        entries.into_iter().partition(|e| e.size <= Some(LONGEST));
+    let mut wanted: Vec<(String, String)> = small.into_iter().map(|e| (e.path, e.id)).collect();
     let is_cut = is_cut || wanted.len() > MOST_FILES;
     wanted.truncate(MOST_FILES);
     let mut files = bytes(folder, wanted)?;
     files.is_cut |= is_cut;
+    files.too_long = long.len();
     Some(files)
 }
 

@@ -26,6 +26,40 @@ pub(super) fn is_own(folder: &Path, setting: impl Fn(&Path, &str) -> Option<Stri
     }
 }
 
+/// The most entries of a repository that are looked at.
+const MOST_ENTRIES: usize = 1 << 18;
+
+/// Whether the nearest `.git` folder at a folder or above it holds nothing but files, folders and links: git waits for
+/// ever for a pipe.
+pub(super) fn is_plain(folder: &Path) -> bool {
+    let Ok(folder) = folder.canonicalize() else {
+        return true;
+    };
+    let mut above = folder.ancestors().map(|above| above.join(".git"));
+    let mut open: Vec<PathBuf> = above.find(|git| git.is_dir()).into_iter().collect();
+    let mut left = MOST_ENTRIES;
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(&folder)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .take(left)
+        {
+            left -= 1;
+            match entry.file_type() {
+                Ok(kind) if kind.is_dir() => open.push(entry.path()),
+                Ok(kind) if kind.is_file() => {}
+                // What a link leads to.
+                _ if fs::metadata(entry.path()).is_ok_and(|m| !m.is_file() && !m.is_dir()) => {
+                    return false;
+                }
+                _ => {}
+            }
+        }
+    }
+    true
+}
+
 /// The repository that a `.git` file names.
 fn repository(entry: &Path) -> Option<PathBuf> {
     let text = text(entry)?;
@@ -53,7 +87,8 @@ fn is_same(a: &Path, b: &Path) -> bool {
 /// The text of a small file.
 fn text(path: &Path) -> Option<String> {
     let mut text = String::new();
-    let file = fs::File::open(path).ok()?;
+    // Nobody waits for a pipe.
+    let file = path.is_file().then(|| fs::File::open(path).ok())??;
     file.take(LONGEST).read_to_string(&mut text).ok()?;
     Some(text)
 }

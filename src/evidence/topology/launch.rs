@@ -324,6 +324,7 @@ impl Launch {
             arguments: self.passed(path, tree, scope),
             remaps: Rc::clone(&scope.remaps),
         };
+        self.topology.files.push(found.clone());
         let included = tree_of(&found, &text)?.unwrap_or_default();
         self.stack.push(found.clone());
         let done = self.inside(&found, &included, &mut inner);

@@ -1,5 +1,6 @@
 //! The presence of each element of the graph in the cells of the activity, by which phases are cut.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::base::name::is_quiet;
@@ -183,20 +184,23 @@ fn filled(mut cells: Vec<bool>, widths: &[i64], most: i64) -> Vec<bool> {
 }
 
 /// The exact first and last signs of the nodes of a role, or of a topic.
-pub(crate) fn ends(elements: &Elements, name: &str, topics: bool) -> (Vec<Stamp>, Vec<Stamp>) {
-    let (mut first, mut last) = (Vec::new(), Vec::new());
+type Ends = Vec<(Option<Stamp>, Option<Stamp>)>;
+
+/// The exact first and last signs by role, or by topic.
+pub(crate) fn ends(elements: &Elements, topics: bool) -> BTreeMap<&str, Ends> {
+    let mut ends: BTreeMap<&str, Ends> = BTreeMap::new();
     if topics {
-        for topic in elements.topics.iter().filter(|t| t.name.as_str() == name) {
-            first.extend(topic.first);
-            last.extend(topic.last);
+        for topic in &elements.topics {
+            let of = ends.entry(topic.name.as_str()).or_default();
+            of.push((topic.first, topic.last));
         }
     } else {
-        for node in elements.nodes.iter().filter(|n| &*n.role == name) {
-            first.extend(node.first);
-            last.extend(node.last);
+        for node in &elements.nodes {
+            let of = ends.entry(&*node.role).or_default();
+            of.push((node.first, node.last));
         }
     }
-    (first, last)
+    ends
 }
 
 #[cfg(test)]

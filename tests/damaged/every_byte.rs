@@ -1,0 +1,215 @@
+//! Bags of two kilobytes, of which every bit is flipped and which are cut behind every byte: whatever is damaged, reading
+//! ends, invents nothing, and does not lose a message without a word.
+
+use std::fs;
+use std::ops::Range;
+
+use bagreel::bag::{OpenOptions, Want};
+use bagreel::internals::base::notice::NoticeKind;
+
+use super::{placed, read_bytes};
+use crate::support::rosbag1::Pack;
+use crate::support::{Recording, mcap, read, read_as, rosbag1};
+
+/// Bags of two kilobytes: each of their bits can be tried.
+pub(super) fn tiny() -> Vec<(&'static str, Vec<u8>)> {
+    let mut recording = Recording::default();
+    let one = recording.publisher("/a", "/one", "std_msgs/String");
+    let other = recording.publisher("/b", "/two", "std_msgs/String");
+    recording.send(one, (0, 1000), 100, b"\x04\0\0\0ping");
+    recording.send(other, (50, 1000), 300, b"\x04\0\0\0pong");
+    let bag = |how| rosbag1::write(&recording, how, 150);
+    let chunked = |summary, compression| {
+        let options = mcap::Options {
+            summary,
+            compression,
+            chunk: 150,
+            ..mcap::Options::default()
+        };
+        mcap::write(&recording, &options)
+    };
+    let unchunked = |summary| {
+        let options = mcap::Options {
+            summary,
+            chunked: false,
+            ..mcap::Options::default()
+        };
+        mcap::write(&recording, &options)
+    };
+    vec![
+        ("none.bag", bag(Pack::None)),
+        ("bz2.bag", bag(Pack::Bz2)),
+        ("lz4.bag", bag(Pack::Lz4)),
+        ("front_none.bag", rosbag1::unindexed(&bag(Pack::None))),
+        ("front_lz4.bag", rosbag1::unindexed(&bag(Pack::Lz4))),
+        ("none.mcap", chunked(true, None)),
+        ("zstd.mcap", chunked(true, Some(::mcap::Compression::Zstd))),
+        ("front_none.mcap", chunked(false, None)),
+        (
+            "front_zstd.mcap",
+            chunked(false, Some(::mcap::Compression::Zstd)),
+        ),
+        (
+            "front_lz4.mcap",
+            chunked(false, Some(::mcap::Compression::Lz4)),
+        ),
+        ("unchunked.mcap", unchunked(true)),
+        ("front_unchunked.mcap", unchunked(false)),
+    ]
+}
+
+/// Messages in one of the [`tiny`] bags.
+pub(super) const TINY: usize = 14;
+
+/// The spaces behind the head of a ROS 1 bag, which mean nothing.
+const PADDING: Range<usize> = 100..4100;
+
+/// The places in a bag that mean something.
+fn bytes_of(name: &str, bytes: &[u8]) -> impl Iterator<Item = usize> {
+    let is_bag = !name.contains("mcap");
+    (0..bytes.len()).filter(move |at| !(is_bag && PADDING.contains(at)))
+}
+
+/// Reads the bag with each of these bits of every byte flipped: never more messages than there were, and fewer only with
+/// a word.
+fn flip(name: &str, bytes: &[u8], bits: impl Fn(usize) -> Range<usize>) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    let mut faults = Vec::new();
+    for at in bytes_of(name, bytes) {
+        for bit in bits(at) {
+            let mut bytes = bytes.to_vec();
+            bytes[at] ^= 1 << bit;
+            fs::write(&path, &bytes).unwrap();
+            let Ok((report, kept)) = read(&path, Want::Payload) else {
+                // The first bytes say what it is, and there is no second copy of them.
+                assert!(at < 16, "{name}: bit {bit} of byte {at}");
+                continue;
+            };
+            let found = kept.stamps.len();
+            // Records that the format leaves to its users are no damage, and said all the same.
+            let is_said =
+                !report.complete || kept.notices.iter().any(|n| n.kind == NoticeKind::Note);
+            if found != TINY && !is_said {
+                let notices = kept.notices;
+                faults.push(format!(
+                    "bit {bit} of byte {at}: {found} and no word, {notices:?}"
+                ));
+            }
+        }
+    }
+    assert!(
+        faults.is_empty(),
+        "{name}: {}\n{}",
+        faults.len(),
+        faults.join("\n")
+    );
+}
+
+#[test]
+fn a_bit_of_any_byte_costs_no_message_without_a_word() {
+    for (name, bytes) in tiny() {
+        flip(name, &bytes, |at| at % 8..at % 8 + 1);
+    }
+}
+
+#[test]
+#[ignore = "minutes; by hand after changes to a reader"]
+fn no_bit_at_all_costs_a_message_without_a_word() {
+    for (name, bytes) in tiny() {
+        flip(name, &bytes, |_| 0..8);
+    }
+}
+
+#[test]
+fn a_bag_cut_behind_any_byte_has_the_messages_before_it() {
+    for (name, bytes) in tiny() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(name);
+        let whole = read_bytes(name, &bytes).1.payloads();
+        assert_eq!(whole.len(), TINY, "{name}");
+        let mut before = 0;
+        for end in bytes_of(name, &bytes).skip(1) {
+            fs::write(&path, &bytes[..end]).unwrap();
+            let Ok((report, kept)) = read(&path, Want::Payload) else {
+                assert!(end < 16 && before == 0, "{name}: cut at {end}");
+                continue;
+            };
+            let kept = kept.payloads();
+            assert!(
+                kept.len() >= before,
+                "{name}: cut at {end}: {} after {before}",
+                kept.len()
+            );
+            assert!(
+                kept.iter().all(|m| whole.contains(m)),
+                "{name}: cut at {end}"
+            );
+            let is_said = !report.complete || name.starts_with("front") && name.ends_with(".bag");
+            assert!(kept.len() == TINY || is_said, "{name}: cut at {end}");
+            before = kept.len();
+        }
+    }
+}
+
+/// The places of the values of this field in a ROS 1 bag.
+fn values(bytes: &[u8], field: &[u8]) -> Vec<usize> {
+    let starts = bytes.windows(field.len()).enumerate();
+    let starts = starts.filter(|(_, window)| *window == field);
+    starts.map(|(at, _)| at + field.len()).collect()
+}
+
+#[test]
+fn chunk_infos_that_count_too_few_connections_lose_no_message() {
+    let bytes = rosbag1::write(&super::short(), Pack::None, 4000);
+    let truth = super::short().messages.len();
+    let infos = values(&bytes, b"op=\x06");
+    assert!(infos.len() > 3, "{}", infos.len());
+    for info in infos {
+        let count = values(&bytes[info..], b"count=")[0] + info;
+        let stated = bytes[count];
+        for fewer in 0..stated {
+            let mut lying = bytes.clone();
+            lying[count] = fewer;
+            let (_, kept) = read_bytes("x.bag", &lying);
+            assert_eq!(kept.stamps.len(), truth, "{fewer} of {stated} at {info}");
+            assert!(!kept.notices.is_empty());
+            // The same lie, told by the length of the record and its content as well.
+            let len = count + 4 + 4;
+            let pairs = len + 8 * usize::from(fewer)..len + 8 * usize::from(stated);
+            let later = values(&bytes, b"index_pos=")[0];
+            assert!(later < info, "the head comes first");
+            lying[count + 4] = 8 * fewer;
+            lying.drain(pairs.start..pairs.end);
+            let (report, kept) = read_bytes("x.bag", &lying);
+            assert_eq!(kept.stamps.len(), truth, "{fewer} of {stated} at {info}");
+            assert!(!report.complete, "{fewer} of {stated} at {info}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_message_in_a_chunk_is_said_by_both_readings() {
+    let recording = super::short();
+    let truth = recording.messages.len();
+    let mut bytes = rosbag1::unindexed(&rosbag1::write(&recording, Pack::None, 4000));
+    // What the index behind a chunk knows is believed; here there is none.
+    let mut lost = 0;
+    for at in values(&bytes, b"op=\x02").into_iter().step_by(2) {
+        bytes[at - 1] = 10;
+        lost += 1;
+    }
+    for at in values(&bytes, b"op=\x04") {
+        bytes[at - 1] = 10;
+    }
+    for verify in [false, true] {
+        let options = OpenOptions {
+            verify,
+            ..OpenOptions::default()
+        };
+        let (_dir, path) = placed("x.bag", &bytes);
+        let (report, kept) = read_as(&path, Want::Stamps, None, &options).unwrap();
+        assert_eq!(kept.stamps.len(), truth - lost, "{:?}", kept.notices);
+        assert!(!report.complete, "{:?}", kept.notices);
+    }
+}
