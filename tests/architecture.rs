@@ -59,7 +59,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["sequence", "sink"],
         &["check", "encoder"],
         &["spells"],
-        &["animated_svg", "apng", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
+        &["animated_svg", "apng", "arrow", "dot", "gexf", "gif", "graphml", "html", "json", "mermaid", "parquet", "pdf", "png", "svg", "tex", "video"],
         &["report", "run", "tables"],
     ]),
     ("gate", &[

@@ -311,7 +311,7 @@ mod tests {
         assert_eq!(levels.defined, [2, 2, 1, 0, 2]);
         assert_eq!(levels.repeated, [0, 2, 1, 0, 0]);
         assert_eq!(places(&lists, 0..2), 0..2);
-        assert_eq!(places(&lists, 1..2), 2..2);
+        assert!(places(&lists, 1..2).is_empty());
         assert_eq!(places(&lists, 2..3), 2..3);
     }
 }

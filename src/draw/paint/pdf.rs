@@ -115,7 +115,6 @@ impl<'a> PdfFace<'a> {
     }
 
     /// The glyphs of a text from left to right, in em.
-    #[expect(clippy::cast_precision_loss, reason = "lengths in units of a font")]
     fn shape(&self, text: &str) -> Vec<KrillaGlyph> {
         let mut buffer = UnicodeBuffer::new();
         buffer.push_str(text);
