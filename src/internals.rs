@@ -23,7 +23,7 @@ pub mod graph {
 /// See `src/mission.rs`.
 pub mod mission {
     pub use crate::mission::{
-        Activity, Ledger, Mission, Window, events, info, ledger, phases, read_json, write_json,
+        Ledger, Mission, Window, events, info, ledger, phases, read_json, write_json,
     };
 }
 

@@ -40,8 +40,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["restarts"],
         &["conclude"],
     ]),
-    ("graph", &[&["graphs", "lives", "sending"], &["build", "diff", "window"]]),
-    ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
+    ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
+    ("mission", &[&["ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "showing"],
         &["hubs", "settle"],

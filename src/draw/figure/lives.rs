@@ -8,21 +8,24 @@
 
 use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use super::incidents::{Handover, Incident, handovers, incidents, relative};
+use super::marks::{Marks, Sign, relative};
 use super::rows::{FigureRow, folded_label, rows};
 use super::source::FigureSource;
-use super::tracks::{SendingBar, Track, TrackLife, of_nodes, of_topics};
+use super::tracks::{SendingBar, Steps, Track, TrackLife, mean, of_nodes, of_topics};
 use crate::base::geometry::{Point, Rect};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::Stamp;
 use crate::base::words;
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
+use crate::mission::EntryId;
+use crate::mission::events::sentence;
 
 /// Lengths in pitches of 2.75 mm, as fractions of the pitch.
 const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
 const TICK: (f64, f64) = (0.4, 2.24 / 2.75);
 const CROSS: f64 = 0.5;
 const LETTER: f64 = 1.08;
+const DOT: f64 = 0.5;
 /// The least distance between letters and arrows in millimetres.
 const APART: f64 = 2.3;
 /// The least width of a figure with a column of the topics that each row sends and receives, and the width of that
@@ -34,10 +37,7 @@ pub(crate) struct LivesFigure<'a> {
     pub(crate) source: &'a FigureSource<'a>,
     pub(crate) tracks: Vec<Track>,
     pub(crate) rows: Vec<FigureRow>,
-    pub(crate) incidents: Vec<Incident>,
-    /// The number of smaller ones without a letter or arrow.
-    pub(crate) unmarked: usize,
-    pub(crate) handovers: Vec<Handover>,
+    pub(crate) marks: Marks,
 }
 
 /// The places of the rows of a figure, in millimetres.
@@ -70,17 +70,13 @@ impl<'a> LivesFigure<'a> {
 
     /// The lives of these rows.
     pub(crate) fn of(source: &'a FigureSource<'a>, tracks: Vec<Track>) -> Self {
-        let (incidents, mut unmarked) = incidents(source, &tracks);
-        let (handovers, more) = handovers(source, &tracks);
-        unmarked += more;
-        let rows = rows(&tracks, source.span(), &incidents, &handovers);
+        let marks = Marks::new(source, &tracks);
+        let rows = rows(&tracks, source.span(), &marks);
         Self {
             source,
             tracks,
             rows,
-            incidents,
-            unmarked,
-            handovers,
+            marks,
         }
     }
 
@@ -132,18 +128,25 @@ impl<'a> LivesFigure<'a> {
             let y = top + (k as f64 + 0.5) * pitch;
             self.row(canvas, place, y, row);
         }
-        canvas.begin("handovers");
         let y_of = |track: usize| {
             let at = self.rows.iter().position(|r| r.holds(track))?;
             Some(top + (at as f64 + 0.5) * pitch)
         };
+        self.signs(canvas, place, y_of);
         let mut taken = self.arrows(canvas, place, y_of);
-        canvas.begin("incidents");
-        for (k, incident) in self.incidents.iter().enumerate() {
-            if let Some(y) = y_of(incident.track) {
-                let ends = self.tracks[incident.track].lives.iter().filter(|l| l.ends);
-                taken.extend(ends.map(|l| (place.axis.x(l.span.end), y, y)));
-                letter(canvas, place, (incident.at, y), k, &mut taken);
+        for sign in self.marks.signs.iter().filter(|s| s.sign == Sign::End) {
+            if let Some(y) = y_of(sign.track) {
+                taken.push((place.axis.x(sign.at), y, y));
+            }
+        }
+        for (k, letter) in self.marks.letters.iter().enumerate() {
+            if let Some(y) = y_of(letter.mark.track) {
+                canvas.begin_mark(
+                    "letter",
+                    &[letter.mark.entry],
+                    self.sentence(letter.mark.entry),
+                );
+                put_letter(canvas, place, (letter.mark.at, y), k, &mut taken);
             }
         }
         canvas.begin("axis");
@@ -252,6 +255,37 @@ impl<'a> LivesFigure<'a> {
         }
     }
 
+    /// What the log says of an event.
+    fn sentence(&self, entry: EntryId) -> String {
+        let mission = self.source.mission;
+        let event = mission.ledger.entries.get(entry as usize);
+        event.map_or_else(String::new, |event| sentence(mission, entry, event))
+    }
+
+    /// Draws the ticks, the crosses and the small circles.
+    fn signs(
+        &self,
+        canvas: &mut PaperCanvas<'_>,
+        place: &RowPlace,
+        y_of: impl Fn(usize) -> Option<f64>,
+    ) {
+        for mark in &self.marks.signs {
+            let Some(y) = y_of(mark.track) else { continue };
+            let x = place.axis.x(mark.at);
+            let class = match mark.sign {
+                Sign::Start => "start",
+                Sign::End => "end",
+                Sign::Dot => "event",
+            };
+            canvas.begin_mark(class, &[mark.entry], self.sentence(mark.entry));
+            match mark.sign {
+                Sign::Start => start(canvas, x, y),
+                Sign::End => cross(canvas, x, y),
+                Sign::Dot => dot(canvas, x, y),
+            }
+        }
+    }
+
     /// Draws the arrows of hand-overs; returns the places of them and their labels: x, from y, to y.
     fn arrows(
         &self,
@@ -260,9 +294,9 @@ impl<'a> LivesFigure<'a> {
         y_of: impl Fn(usize) -> Option<f64>,
     ) -> Vec<(f64, f64, f64)> {
         let mut taken: Vec<(f64, f64, f64)> = Vec::new();
-        let mut told: Vec<(usize, usize)> = Vec::new();
+        let mut told: Vec<((usize, usize), &String)> = Vec::new();
         let stroke = Stroke::solid(ink::CHANGED, 0.3);
-        for handover in &self.handovers {
+        for handover in &self.marks.handovers {
             let (Some(from), Some(to)) = (y_of(handover.from), y_of(handover.to)) else {
                 continue;
             };
@@ -274,6 +308,7 @@ impl<'a> LivesFigure<'a> {
             {
                 x += 1.0;
             }
+            canvas.begin_mark("handover", &[handover.entry], self.sentence(handover.entry));
             let side = if to > from { -1.0 } else { 1.0 };
             let tip = Point::new(x, to + side * 0.15);
             canvas.line(Point::new(x, from), Point::new(x, to + side * 1.0), &stroke);
@@ -284,9 +319,13 @@ impl<'a> LivesFigure<'a> {
                 handover.from.min(handover.to),
                 handover.from.max(handover.to),
             );
-            if !told.contains(&pair) {
-                told.push(pair);
-                let text = words::some_of(&handover.topics, 1);
+            if !told.contains(&(pair, &handover.topic)) {
+                told.push((pair, &handover.topic));
+                let text = canvas.cut(
+                    &handover.topic,
+                    Type::Small,
+                    place.axis.right - place.axis.left,
+                );
                 let wide = canvas.width(&text, Type::Small);
                 let left = (x + 0.6).min(place.axis.right - wide);
                 let y = from + (to - from) * 0.66;
@@ -299,7 +338,7 @@ impl<'a> LivesFigure<'a> {
 }
 
 /// Draws a circled letter at a moment of a row, beside the letters and arrows that are there already.
-fn letter(
+fn put_letter(
     canvas: &mut PaperCanvas<'_>,
     place: &RowPlace,
     (at, y): (Stamp, f64),
@@ -332,7 +371,7 @@ fn letter(
     canvas.text_middle(x, y, Type::Strong, ink::CHANGED, &sign(k));
 }
 
-/// The letter of an incident: a, b, c, …
+/// The letter of an event: a, b, c, …
 pub(crate) fn sign(k: usize) -> String {
     let letters = "abcdefghijklmnopqrstuvwxyz";
     letters
@@ -354,7 +393,7 @@ fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>)
     canvas.text_end(right, y, Type::Small, ink::QUIET, &text);
 }
 
-/// Draws the lives and the bars of a row, its starts and its ends.
+/// Draws the lives and the bars of a row.
 fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) {
     for life in &track.lives {
         thin(canvas, place, y, life);
@@ -362,14 +401,6 @@ fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) 
     let color = if place.is_live { ink::FOLDED } else { ink::BAR };
     for bar in &track.bars {
         thick(canvas, place, y, bar, color);
-    }
-    for life in &track.lives {
-        if life.begins {
-            start(canvas, place.axis.x(life.span.start), y);
-        }
-        if life.ends {
-            cross(canvas, place.axis.x(life.span.end), y);
-        }
     }
 }
 
@@ -415,6 +446,12 @@ pub(crate) fn cross(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     let (a, b) = (CROSS, CROSS * 1.35);
     canvas.line(Point::new(x - a, y - b), Point::new(x + a, y + b), &stroke);
     canvas.line(Point::new(x - a, y + b), Point::new(x + a, y - b), &stroke);
+}
+
+/// Draws the mark of an event without a letter.
+pub(crate) fn dot(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
+    let stroke = Stroke::solid(ink::CHANGED, 0.25);
+    canvas.disc(Point::new(x, y), DOT, ink::PAPER, &stroke);
 }
 
 /// Draws the topics that a node sends, the fastest first, and those that it receives, as far as there is room; of a
@@ -481,18 +518,16 @@ fn talk(
 
 fn sent_by<'s>(source: &'s FigureSource<'_>, track: &Track) -> Vec<&'s str> {
     let mut rated: Vec<(f64, &str)> = Vec::new();
+    let steps = Steps::new(source);
     for edge in source.publications(&track.nodes) {
-        let count: f64 = source.sent(edge).iter().sum();
-        let seconds: i64 = source.sending(edge).iter().map(Span::nanos).sum();
-        let hz = if seconds > 0 {
-            count / (seconds as f64 / 1e9)
-        } else {
-            0.0
-        };
+        let senders = source.senders(&[edge]);
+        let hz = senders
+            .first()
+            .and_then(|s| mean(&steps.pieces(s, source.span())));
         if let Some(of) = source.mission.elements.publishes.get(edge as usize)
             && !source.is_hub(of.topic)
         {
-            rated.push((hz, source.topic(of.topic)));
+            rated.push((hz.unwrap_or(0.0), source.topic(of.topic)));
         }
     }
     rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::band::{clock, title};
 use super::canvas::{PX_PER_MM, PaperCanvas, ink};
 use super::groups::{cut, depths, groups};
-use super::incidents::configurations;
+use super::marks::{Marks, Sign};
 use super::notes::{Unbroken, flow, sentence};
 use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
 use super::panel::{Fate, INSIDE, Panel, PanelBox, items, paint};
@@ -18,10 +18,14 @@ use super::{MOST_HEIGHT, RowKind};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
+use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::scene::Scene;
+use crate::graph::Element;
 use crate::layout::{Link, Outline, Plan, Vertex, engine};
-use crate::mission::phases::{Configuration, cells_of};
+use crate::mission::EntryId;
+use crate::mission::ledger::Detail;
+use crate::mission::phases::{Configuration, configurations};
 
 /// The number of steps shown unless some are asked for.
 const SHOWN: usize = 6;
@@ -41,6 +45,8 @@ struct Studio<'s> {
     tracks: Vec<Track>,
     talks: Talks<'s>,
     found: Vec<Configuration>,
+    /// The events of the log on the rows.
+    marks: Marks,
     /// The number of panels side by side.
     columns: usize,
     /// How many parts of namespaces tell groups apart.
@@ -68,7 +74,8 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         columns,
         depth: depths(&tracks).next().unwrap_or(1),
         talks: Talks::new(sheet.source, &tracks),
-        found: configurations(sheet.source),
+        found: configurations(sheet.source.mission, sheet.source.phases),
+        marks: Marks::new(sheet.source, &tracks),
         tracks,
         sheet,
     };
@@ -102,8 +109,41 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
 impl Studio<'_> {
     /// The weight of a boundary, larger for one that changes more.
     fn weight(&self, k: usize) -> usize {
-        let phase = &self.sheet.source.phases[k];
-        (phase.nodes_added + phase.nodes_removed) as usize * 4 + self.handed(k).len()
+        let turns = [Sign::Start, Sign::End].map(|sign| self.turned(k, sign).len());
+        (turns[0] + turns[1]) * 4 + self.handed(k).len()
+    }
+
+    /// The time of the step into phase `k`: from the middle of the phase before to its own.
+    fn time(&self, k: usize) -> Span {
+        let middle = |k: usize| {
+            let span = self.sheet.source.phases[k].span;
+            span.start.plus(span.nanos() / 2)
+        };
+        Span {
+            start: middle(k - 1),
+            end: middle(k),
+        }
+    }
+
+    /// The nodes of which phase `k` has more, or fewer, than the one before, with the events by which they began or ended.
+    fn turned(&self, k: usize, sign: Sign) -> BTreeMap<usize, Vec<EntryId>> {
+        let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
+        let (old, new) = match sign {
+            Sign::Start => (before, after),
+            Sign::End | Sign::Dot => (after, before),
+        };
+        let around = Span {
+            start: self.sheet.source.phases[k - 1].span.start,
+            end: self.sheet.source.phases[k].span.end,
+        };
+        let events = |track: usize| -> Vec<EntryId> {
+            let own = self.marks.signs.iter().filter(|s| s.track == track);
+            let own = own.filter(|s| s.sign == sign && around.contains(s.at));
+            own.map(|s| s.entry).collect()
+        };
+        let tracks = new.difference(old).filter_map(|name| self.track(name));
+        let tracks = tracks.map(|track| (track, events(track)));
+        tracks.filter(|(_, events)| !events.is_empty()).collect()
     }
 
     /// The boundaries to show, by the place of the phase that begins.
@@ -134,15 +174,39 @@ impl Studio<'_> {
         chosen.retain(|k| Some(*k) != least);
     }
 
-    /// Topics that others send from phase `k` on: topic, before, after.
-    fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>)> {
-        let (before, after) = (&self.found[k - 1].senders, &self.found[k].senders);
-        let changed = after.iter().filter_map(|(topic, to)| {
-            let from = before.get(topic).filter(|from| *from != to)?;
-            let shown = self.sheet.source.shows(*topic) && !self.sheet.source.is_hub(*topic);
-            shown.then(|| (*topic, Arc::clone(from), Arc::clone(to)))
+    /// The hand-overs of the log in the step into phase `k`: topic, before, after.
+    fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>, EntryId)> {
+        let source = self.sheet.source;
+        let role = |nodes: &[u32]| {
+            let node = source
+                .mission
+                .elements
+                .nodes
+                .get(*nodes.first()? as usize)?;
+            Some(Arc::clone(&node.role))
+        };
+        let headlines = source.mission.ledger.headlines(self.time(k));
+        let handed = headlines.filter_map(|(id, event)| match (&event.detail, event.what) {
+            (Detail::Senders { from, to }, Element::Topic(topic)) => {
+                let shown = source.shows(topic) && !source.is_hub(topic);
+                let (from, to) = (role(from)?, role(to)?);
+                shown.then_some((topic, from, to, id))
+            }
+            _ => None,
         });
-        changed.collect()
+        handed.collect()
+    }
+
+    /// The events in the step into phase `k` on the rows of a box.
+    fn events(&self, k: usize, members: &[usize]) -> BTreeSet<EntryId> {
+        let time = self.time(k);
+        let letters = self.marks.letters.iter().map(|l| &l.mark);
+        let marks = self.marks.signs.iter().chain(letters);
+        let own = marks.filter(|m| members.contains(&m.track) && time.contains(m.at));
+        let hands = self.marks.handovers.iter().filter(|h| {
+            time.contains(h.at) && (members.contains(&h.from) || members.contains(&h.to))
+        });
+        own.map(|m| m.entry).chain(hands.map(|h| h.entry)).collect()
     }
 
     fn too_wide(&self) -> Error {
@@ -170,10 +234,12 @@ impl Studio<'_> {
         let canvas = self.sheet.canvas();
         let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
         let place_of = |name: &Arc<str>| self.track(name);
-        let began: BTreeSet<usize> = after.difference(before).filter_map(place_of).collect();
-        let ended: BTreeSet<usize> = before.difference(after).filter_map(place_of).collect();
+        let turned = [Sign::Start, Sign::End].map(|sign| self.turned(k, sign));
+        let [began, ended] = turned
+            .each_ref()
+            .map(|t| t.keys().copied().collect::<BTreeSet<_>>());
         let handed = self.handed(k);
-        let partners = handed.iter().flat_map(|(_, from, to)| [from, to]);
+        let partners = handed.iter().flat_map(|(_, from, to, _)| [from, to]);
         let partners: BTreeSet<usize> = partners
             .filter_map(place_of)
             .filter(|at| !began.contains(at) && !ended.contains(at))
@@ -199,13 +265,20 @@ impl Studio<'_> {
             .enumerate()
             .map(|(at, (fate, members))| {
                 let named = (at >= changed).then(|| linked.get(&at).copied()).flatten();
-                self.look(*fate, members, named, home)
+                let mut events = self.events(k, members);
+                let turned = turned
+                    .iter()
+                    .flat_map(|t| members.iter().filter_map(|m| t.get(m)));
+                events.extend(turned.flatten());
+                let mut look = self.look(*fate, members, named, home);
+                look.entries = events.into_iter().collect();
+                look
             })
             .collect();
         let phase = &source.phases[k];
         let at = clock(phase.span.start.since(source.span().start));
         let mut notes = Vec::new();
-        for (topic, from, to) in &handed {
+        for (topic, from, to, _) in &handed {
             let text = format!(
                 "{}: {} → {}",
                 last_part(source.topic(*topic)),
@@ -226,7 +299,10 @@ impl Studio<'_> {
             format!("{k} → {}", k + 1),
             format!("{at} {}", title(source, k)),
         );
+        let entries = looks.iter().flat_map(|look| &look.entries).copied();
+        let entries: BTreeSet<EntryId> = entries.chain(handed.iter().map(|h| h.3)).collect();
         Some(Panel {
+            entries: entries.into_iter().collect(),
             heading,
             home: home.map_or_else(String::new, |space| format!("in {space}")),
             looks,
@@ -277,7 +353,7 @@ impl Studio<'_> {
         let own: Vec<Option<usize>> = (0..self.tracks.len()).map(Some).collect();
         let mut links: BTreeMap<usize, usize> = BTreeMap::new();
         for (phase, names, fate) in [(k - 1, names.0, Fate::Ended), (k, names.1, Fate::Began)] {
-            let range = cells_of(&source.mission.activity, source.phases[phase].span);
+            let range = source.phases[phase].span;
             for talk in self.talks.between(&own, range, true) {
                 for (a, b) in [(talk.from, talk.to), (talk.to, talk.from)] {
                     let changes = vertex[a].is_some_and(|v| boxes[v].0 == fate);
@@ -320,12 +396,12 @@ impl Studio<'_> {
         k: usize,
         vertex: &[Option<usize>],
         fates: &[Fate],
-        handed: &[(u32, Arc<str>, Arc<str>)],
+        handed: &[(u32, Arc<str>, Arc<str>, EntryId)],
     ) -> Vec<(Talk, Fate)> {
         let source = self.sheet.source;
         let mut all = Vec::new();
         for (phase, fate) in [(k - 1, Fate::Ended), (k, Fate::Began)] {
-            let range = cells_of(&source.mission.activity, source.phases[phase].span);
+            let range = source.phases[phase].span;
             for mut talk in self.talks.between(vertex, range, true) {
                 let ends = [fates[talk.from], fates[talk.to]];
                 if ends.contains(&fate) {
@@ -341,7 +417,7 @@ impl Studio<'_> {
                 // Of a partner only what it hands over, or takes over.
                 talk.topics.retain(|(topic, _)| {
                     let moved = handed.iter().find(|(t, ..)| t == topic);
-                    moved.is_some_and(|(_, from, to)| {
+                    moved.is_some_and(|(_, from, to, _)| {
                         let sender = if fate == Fate::Ended { from } else { to };
                         self.track(sender).and_then(|at| vertex[at]) == Some(talk.from)
                     })
@@ -399,6 +475,7 @@ impl Studio<'_> {
             fate,
             space: space.to_owned(),
             lines,
+            entries: Vec::new(),
         }
     }
 
@@ -438,7 +515,7 @@ impl Studio<'_> {
         let heights: Vec<f64> = panels.iter().map(|p| p.height).collect();
         let mut ends = vec![0.1_f64; columns];
         for (at, (panel, column)) in panels.iter().zip(in_columns(&heights, columns)).enumerate() {
-            canvas.begin(&format!("step-{}", at + 1));
+            canvas.begin_step(at + 1, &panel.entries);
             let x = (wide + BETWEEN) * column as f64;
             let rect = Rect::new(x + 0.1, ends[column], wide - 0.2, panel.height);
             paint(&mut canvas, panel, rect);
