@@ -15,8 +15,8 @@ pub mod evidence {
 /// See `src/graph.rs`.
 pub mod graph {
     pub use crate::graph::{
-        Built, EdgeState, Element, Elements, Graph, NodeState, State, TopicState, build, diff,
-        window,
+        Built, EdgeState, Element, Elements, Graph, NodeState, PerElement, State, TopicState,
+        build, diff, window,
     };
 }
 

@@ -212,9 +212,7 @@ fn column(
         ColumnValues::U64(v) => values::<Int64Type>(to, column, rows, |at| v[at].cast_signed()),
         ColumnValues::F32(v) => values::<FloatType>(to, column, rows, |at| v[at]),
         ColumnValues::F64(v) => values::<DoubleType>(to, column, rows, |at| v[at]),
-        ColumnValues::Texts(v) => {
-            values::<ByteArrayType>(to, column, rows, texts(v))
-        }
+        ColumnValues::Texts(v) => values::<ByteArrayType>(to, column, rows, texts(v)),
         ColumnValues::Words(v) => {
             let words: Vec<ByteArray> = (0..v.words.ends.len()).map(texts(&v.words)).collect();
             let word = |at: usize| words[v.numbers[at] as usize].clone();
@@ -244,7 +242,8 @@ fn values<T: DataType>(
         let part = start..rows.min(start + AT_ONCE);
         if !column.lists.is_empty() {
             let mut levels = ListLevels::default();
-            part.clone().for_each(|row| levels.add(&column.lists, 0, row, 0));
+            part.clone()
+                .for_each(|row| levels.add(&column.lists, 0, row, 0));
             let places = places(&column.lists, part);
             let values: Vec<T::T> = places.map(&value).collect();
             writer.write_batch(&values, Some(&levels.defined), Some(&levels.repeated))?;
@@ -262,10 +261,12 @@ fn values<T: DataType>(
 
 /// The places of the values inside these rows of lists.
 fn places(lists: &[Vec<i32>], rows: Range<usize>) -> Range<usize> {
-    lists.iter().fold(rows, |inside, ends| match inside.is_empty() {
-        true => 0..0,
-        false => span(ends, inside.start).start..span(ends, inside.end - 1).end,
-    })
+    lists
+        .iter()
+        .fold(rows, |inside, ends| match inside.is_empty() {
+            true => 0..0,
+            false => span(ends, inside.start).start..span(ends, inside.end - 1).end,
+        })
 }
 
 /// The levels of lists as Parquet (and Dremel, Melnik et al. 2010) has them: one entry per value and per empty list.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Item, ItemKind, View, ViewOptions};
 use crate::base::name::namespace;
-use crate::graph::{Edge, Element};
+use crate::graph::Element;
 use crate::mission::Mission;
 
 /// The namespaces to collapse and those to keep open.

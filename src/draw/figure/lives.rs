@@ -328,7 +328,10 @@ impl<'a> LivesFigure<'a> {
                 );
                 let wide = canvas.width(&text, Type::Small);
                 let left = (x + 0.6).min(place.axis.right - wide);
-                let y = from + (to - from) * 0.66;
+                // Between two rows, so that it covers no mark of theirs.
+                let (top, pitch) = (self.top(place), canvas.sizes.pitch());
+                let rows = libm::round((from + (to - from) * 0.66 - top) / pitch);
+                let y = top + rows * pitch;
                 canvas.label(left + wide / 2.0, y, Type::Small, ink::CHANGED, &text);
                 taken.push((left + wide / 2.0, y - 1.2, y + 1.2));
             }

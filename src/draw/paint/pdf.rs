@@ -125,19 +125,23 @@ impl<'a> PdfFace<'a> {
         let shaped = shaper.shape(buffer, ShapeOptions::new());
         let em = self.embedded.units_per_em();
         let (infos, positions) = (shaped.glyph_infos(), shaped.glyph_positions());
-        let glyphs = infos.iter().zip(positions).enumerate().map(|(at, (info, to))| {
-            let later = infos[at..].iter().find(|next| next.cluster > info.cluster);
-            let end = later.map_or(text.len(), |next| next.cluster as usize);
-            KrillaGlyph::new(
-                GlyphId::new(info.glyph_id),
-                to.x_advance as f32 / em,
-                to.x_offset as f32 / em,
-                to.y_offset as f32 / em,
-                to.y_advance as f32 / em,
-                info.cluster as usize..end,
-                None,
-            )
-        });
+        let glyphs = infos
+            .iter()
+            .zip(positions)
+            .enumerate()
+            .map(|(at, (info, to))| {
+                let later = infos[at..].iter().find(|next| next.cluster > info.cluster);
+                let end = later.map_or(text.len(), |next| next.cluster as usize);
+                KrillaGlyph::new(
+                    GlyphId::new(info.glyph_id),
+                    to.x_advance as f32 / em,
+                    to.x_offset as f32 / em,
+                    to.y_offset as f32 / em,
+                    to.y_advance as f32 / em,
+                    info.cluster as usize..end,
+                    None,
+                )
+            });
         glyphs.collect()
     }
 }

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::rows::{ends, nanos};
+use super::rows::nanos;
 use crate::base::time::Stamp;
 use crate::graph::diff::Change;
-use crate::graph::{Edge, Element, Elements};
+use crate::graph::{Element, Elements};
 use crate::mission::EntryId;
 
 /// An element by its name, or an edge by its two names.

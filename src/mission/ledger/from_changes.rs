@@ -199,7 +199,7 @@ impl<'a> WindowTurns<'a> {
     fn sender(&self, what: Element) -> Option<usize> {
         let topic = match what {
             Element::Topic(topic) => topic,
-            _ => self.edge(what)?.topic,
+            _ => self.edge(what)?.1,
         };
         if let Some(at) = self.handed.get(&topic) {
             return Some(*at);
