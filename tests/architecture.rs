@@ -17,7 +17,7 @@ const STATIONS: &[&str] = &[
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
-        &["budget", "leftovers", "words"],
+        &["budget", "leftovers", "rhythm", "words"],
         &["digest", "error", "geometry", "name", "nearest", "notice", "time", "yaml"],
         &["file", "role", "table"],
         &["csv"],

@@ -19,6 +19,7 @@ mod panel;
 mod parts;
 mod place;
 pub(crate) mod rows;
+mod signs;
 pub(crate) mod source;
 mod steps;
 mod talks;

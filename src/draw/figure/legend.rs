@@ -1,10 +1,11 @@
 //! The legend of a figure of lives, with only the signs that are drawn.
 
 use super::canvas::{PaperCanvas, Type, ink};
-use super::lives::{LivesFigure, cross, dot, start};
+use super::lives::LivesFigure;
 use super::marks::Sign;
 use super::notes::{InlineSign, TextRun, Unbroken};
 use super::rows::FigureRow;
+use super::signs::{cross, dot, start};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::Stroke;
 

@@ -10,10 +10,10 @@ use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::marks::{Marks, Sign, relative};
 use super::rows::{FigureRow, folded_label, rows};
+use super::signs::{cross, dot, put_letter, start};
 use super::source::FigureSource;
 use super::tracks::{SendingBar, Steps, Track, TrackLife, mean, of_nodes, of_topics};
 use crate::base::geometry::{Point, Rect};
-use crate::base::time::Stamp;
 use crate::base::words;
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
@@ -22,12 +22,6 @@ use crate::mission::events::sentence;
 
 /// Lengths in pitches of 2.75 mm, as fractions of the pitch.
 const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
-const TICK: (f64, f64) = (0.4, 2.24 / 2.75);
-const CROSS: f64 = 0.5;
-const LETTER: f64 = 1.08;
-const DOT: f64 = 0.5;
-/// The least distance between letters and arrows in millimetres.
-const APART: f64 = 2.3;
 /// The least width of a figure with a column of the topics that each row sends and receives, and the width of that
 /// column; in millimetres.
 pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
@@ -340,49 +334,6 @@ impl<'a> LivesFigure<'a> {
     }
 }
 
-/// Draws a circled letter at a moment of a row, beside the letters and arrows that are there already.
-fn put_letter(
-    canvas: &mut PaperCanvas<'_>,
-    place: &RowPlace,
-    (at, y): (Stamp, f64),
-    k: usize,
-    taken: &mut Vec<(f64, f64, f64)>,
-) {
-    let mut x = place.axis.x(at) + LETTER;
-    let near = |x: f64, taken: &[(f64, f64, f64)]| {
-        let hit = |(o, low, high): &&(f64, f64, f64)| {
-            (o - x).abs() < APART && *low - 1.0 < y && y < *high + 1.0
-        };
-        taken.iter().find(hit).map(|t| t.0)
-    };
-    let mut tries = 0;
-    while let Some(other) = near(x, taken).filter(|_| tries < 12) {
-        x = other + APART;
-        tries += 1;
-    }
-    if x > place.axis.right - LETTER {
-        x = place.axis.x(at) - LETTER;
-        while let Some(other) = near(x, taken).filter(|_| tries < 24) {
-            x = other - APART;
-            tries += 1;
-        }
-    }
-    taken.push((x, y, y));
-    let radius = LETTER * canvas.sizes.pitch() / 2.75;
-    let stroke = Stroke::solid(ink::CHANGED, 0.25);
-    canvas.disc(Point::new(x, y), radius, ink::PAPER, &stroke);
-    canvas.text_middle(x, y, Type::Strong, ink::CHANGED, &sign(k));
-}
-
-/// The letter of an event: a, b, c, …
-pub(crate) fn sign(k: usize) -> String {
-    let letters = "abcdefghijklmnopqrstuvwxyz";
-    letters
-        .chars()
-        .nth(k)
-        .map_or_else(String::new, String::from)
-}
-
 fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>) {
     let Some(right) = place.rates else { return };
     // Two digits from 1 Hz on, one below: more is not known, and not needed.
@@ -434,27 +385,6 @@ pub(crate) fn thick(
     let (from, to) = (place.axis.x(bar.span.start), place.axis.x(bar.span.end));
     let wide = (to - from).max(0.25);
     canvas.fill(Rect::new(from, y - high / 2.0, wide, high), color);
-}
-
-/// Draws the mark of a start.
-pub(crate) fn start(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    let high = TICK.1 * canvas.sizes.pitch();
-    let rect = Rect::new(x - TICK.0 / 2.0, y - high / 2.0, TICK.0, high);
-    canvas.fill(rect, ink::ADDED);
-}
-
-/// Draws the mark of an end.
-pub(crate) fn cross(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    let stroke = Stroke::solid(ink::REMOVED, 0.38);
-    let (a, b) = (CROSS, CROSS * 1.35);
-    canvas.line(Point::new(x - a, y - b), Point::new(x + a, y + b), &stroke);
-    canvas.line(Point::new(x - a, y + b), Point::new(x + a, y - b), &stroke);
-}
-
-/// Draws the mark of an event without a letter.
-pub(crate) fn dot(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    let stroke = Stroke::solid(ink::CHANGED, 0.25);
-    canvas.disc(Point::new(x, y), DOT, ink::PAPER, &stroke);
 }
 
 /// Draws the topics that a node sends, the fastest first, and those that it receives, as far as there is room; of a

@@ -209,11 +209,12 @@ impl Marks {
         own.into_iter().collect()
     }
 
-    /// The rows with any mark.
+    /// The rows with any mark but ticks, which a folded row can bear too.
     pub(crate) fn marked(&self) -> BTreeSet<usize> {
         let letters = self.letters.iter().map(|l| l.mark.track);
         let hands = self.handovers.iter().flat_map(|h| [h.from, h.to]);
-        let signs = self.signs.iter().map(|s| s.track);
+        let signs = self.signs.iter().filter(|s| s.sign != Sign::Start);
+        let signs = signs.map(|s| s.track);
         letters.chain(hands).chain(signs).collect()
     }
 

@@ -3,9 +3,10 @@
 use super::band::{Axis, clock, names};
 use super::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
 use super::groups::depths;
-use super::lives::{LivesFigure, RowPlace, WIDE, sign};
+use super::lives::{LivesFigure, RowPlace, WIDE};
 use super::notes::{TextRun, Unbroken, flow, sentence};
 use super::rows::FigureRow;
+use super::signs::sign;
 use super::source::FigureSource;
 use super::tracks::Track;
 use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind, legend};

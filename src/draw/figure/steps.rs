@@ -1,6 +1,8 @@
 //! Steps: one panel per phase boundary, with only the nodes that began or ended, the topics that changed hands, and the
 //! nodes linked to them.
 
+mod events;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -18,13 +20,10 @@ use super::{MOST_HEIGHT, RowKind};
 use crate::base::error::{Error, Result};
 use crate::base::geometry::{Rect, Size};
 use crate::base::name::{last_part, namespace};
-use crate::base::time::Span;
 use crate::base::words;
 use crate::draw::scene::Scene;
-use crate::graph::Element;
 use crate::layout::{Link, Outline, Plan, Vertex, engine};
 use crate::mission::EntryId;
-use crate::mission::ledger::Detail;
 use crate::mission::phases::{Configuration, configurations};
 
 /// The number of steps shown unless some are asked for.
@@ -40,7 +39,7 @@ const MOST_WAYS: usize = 729;
 const BETWEEN: f64 = 2.0;
 
 /// The source of panels.
-struct Studio<'s> {
+struct StepSource<'s> {
     sheet: &'s FigureSheet<'s>,
     tracks: Vec<Track>,
     talks: Talks<'s>,
@@ -70,7 +69,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         w if w >= 110.0 => 2,
         _ => 1,
     };
-    let mut studio = Studio {
+    let mut studio = StepSource {
         columns,
         depth: depths(&tracks).next().unwrap_or(1),
         talks: Talks::new(sheet.source, &tracks),
@@ -106,46 +105,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     }
 }
 
-impl Studio<'_> {
-    /// The weight of a boundary, larger for one that changes more.
-    fn weight(&self, k: usize) -> usize {
-        let turns = [Sign::Start, Sign::End].map(|sign| self.turned(k, sign).len());
-        (turns[0] + turns[1]) * 4 + self.handed(k).len()
-    }
-
-    /// The time of the step into phase `k`: from the middle of the phase before to its own.
-    fn time(&self, k: usize) -> Span {
-        let middle = |k: usize| {
-            let span = self.sheet.source.phases[k].span;
-            span.start.plus(span.nanos() / 2)
-        };
-        Span {
-            start: middle(k - 1),
-            end: middle(k),
-        }
-    }
-
-    /// The nodes of which phase `k` has more, or fewer, than the one before, with the events by which they began or ended.
-    fn turned(&self, k: usize, sign: Sign) -> BTreeMap<usize, Vec<EntryId>> {
-        let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
-        let (old, new) = match sign {
-            Sign::Start => (before, after),
-            Sign::End | Sign::Dot => (after, before),
-        };
-        let around = Span {
-            start: self.sheet.source.phases[k - 1].span.start,
-            end: self.sheet.source.phases[k].span.end,
-        };
-        let events = |track: usize| -> Vec<EntryId> {
-            let own = self.marks.signs.iter().filter(|s| s.track == track);
-            let own = own.filter(|s| s.sign == sign && around.contains(s.at));
-            own.map(|s| s.entry).collect()
-        };
-        let tracks = new.difference(old).filter_map(|name| self.track(name));
-        let tracks = tracks.map(|track| (track, events(track)));
-        tracks.filter(|(_, events)| !events.is_empty()).collect()
-    }
-
+impl StepSource<'_> {
     /// The boundaries to show, by the place of the phase that begins.
     fn chosen(&self) -> Result<Vec<usize>> {
         let many = self.sheet.source.phases.len();
@@ -172,41 +132,6 @@ impl Studio<'_> {
             .copied()
             .min_by_key(|k| (self.weight(*k), std::cmp::Reverse(*k)));
         chosen.retain(|k| Some(*k) != least);
-    }
-
-    /// The hand-overs of the log in the step into phase `k`: topic, before, after.
-    fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>, EntryId)> {
-        let source = self.sheet.source;
-        let role = |nodes: &[u32]| {
-            let node = source
-                .mission
-                .elements
-                .nodes
-                .get(*nodes.first()? as usize)?;
-            Some(Arc::clone(&node.role))
-        };
-        let headlines = source.mission.ledger.headlines(self.time(k));
-        let handed = headlines.filter_map(|(id, event)| match (&event.detail, event.what) {
-            (Detail::Senders { from, to }, Element::Topic(topic)) => {
-                let shown = source.shows(topic) && !source.is_hub(topic);
-                let (from, to) = (role(from)?, role(to)?);
-                shown.then_some((topic, from, to, id))
-            }
-            _ => None,
-        });
-        handed.collect()
-    }
-
-    /// The events in the step into phase `k` on the rows of a box.
-    fn events(&self, k: usize, members: &[usize]) -> BTreeSet<EntryId> {
-        let time = self.time(k);
-        let letters = self.marks.letters.iter().map(|l| &l.mark);
-        let marks = self.marks.signs.iter().chain(letters);
-        let own = marks.filter(|m| members.contains(&m.track) && time.contains(m.at));
-        let hands = self.marks.handovers.iter().filter(|h| {
-            time.contains(h.at) && (members.contains(&h.from) || members.contains(&h.to))
-        });
-        own.map(|m| m.entry).chain(hands.map(|h| h.entry)).collect()
     }
 
     fn too_wide(&self) -> Error {
