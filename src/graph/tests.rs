@@ -397,7 +397,10 @@ fn a_refused_client_is_there_for_a_moment() {
         .nodes
         .iter()
         .position(|n| n.name.as_str() == "/bad");
-    let ended = built.lives.of(Element::Node(bad.unwrap())).unwrap()[0]
+    let ended = built
+        .lives
+        .of(Element::Node(u32::try_from(bad.unwrap()).unwrap()))
+        .unwrap()[0]
         .ended
         .unwrap();
     assert_eq!(

@@ -160,7 +160,13 @@ impl Marks {
                 .total_cmp(&weight(&circles[*a]))
                 .then(a.cmp(b))
         });
-        let lettered: BTreeSet<usize> = order.into_iter().take(MOST.0).collect();
+        // A connection says enough by its circle: words for each of them would fill the page.
+        let has_words = |at: &usize| {
+            let event = entries.get(circles[*at].entry as usize);
+            event.is_some_and(|e| !matches!(e.kind, Kind::Appeared | Kind::Vanished))
+        };
+        let lettered = order.into_iter().filter(has_words).take(MOST.0);
+        let lettered: BTreeSet<usize> = lettered.collect();
         for (at, mark) in circles.into_iter().enumerate() {
             let Some(event) = entries.get(mark.entry as usize) else {
                 continue;

@@ -43,25 +43,25 @@ pub(super) fn put_letter(
     k: usize,
     taken: &mut Vec<(f64, f64, f64)>,
 ) {
-    let mut x = place.axis.x(at) + LETTER;
     let near = |x: f64, taken: &[(f64, f64, f64)]| {
         let hit = |(o, low, high): &&(f64, f64, f64)| {
             (o - x).abs() < APART && *low - 1.0 < y && y < *high + 1.0
         };
         taken.iter().find(hit).map(|t| t.0)
     };
-    let mut tries = 0;
-    while let Some(other) = near(x, taken).filter(|_| tries < 12) {
-        x = other + APART;
-        tries += 1;
-    }
-    if x > place.axis.right - LETTER {
-        x = place.axis.x(at) - LETTER;
-        while let Some(other) = near(x, taken).filter(|_| tries < 24) {
-            x = other - APART;
-            tries += 1;
+    // The nearest free place, to the right or to the left.
+    let free = |mut x: f64, step: f64| {
+        for _ in 0..12 {
+            let Some(other) = near(x, taken) else { break };
+            x = other + step;
         }
-    }
+        x
+    };
+    let at = place.axis.x(at);
+    let (right, left) = (free(at + LETTER, APART), free(at - LETTER, -APART));
+    let is_left = left > place.axis.left && at - left < right - at;
+    let is_left = is_left || right > place.axis.right - LETTER;
+    let x = if is_left { left } else { right };
     taken.push((x, y, y));
     let radius = LETTER * canvas.sizes.pitch() / 2.75;
     let stroke = Stroke::solid(ink::CHANGED, 0.25);

@@ -230,10 +230,21 @@ mod tests {
 
     #[test]
     fn short_absences_inside_a_life_are_filled() {
-        let cells = |text: &str| text.chars().map(|c| c == '#').collect::<Vec<_>>();
-        let widths = [10; 9];
-        let filled = |text: &str| filled(cells(text), &widths, 20);
-        assert_eq!(filled(".#..#...#"), cells(".####...#"));
-        assert_eq!(filled("..#......"), cells("..#......"));
+        let span = |start: i64, end: i64| Span {
+            start: Stamp(start),
+            end: Stamp(end),
+        };
+        let presence = Presence {
+            subject: PresentThing::Node(Arc::from("/n")),
+            spans: Span::joined(vec![span(10, 20), span(40, 50), span(80, 90)], 20),
+        };
+        let cells: Vec<Span> = (0..9).map(|k| span(10 * k, 10 * k + 10)).collect();
+        let there: String = presence
+            .cells(&cells)
+            .into_iter()
+            .map(|is| if is { '#' } else { '.' })
+            .collect();
+        assert_eq!(there, ".####...#");
+        assert!(presence.fills(span(10, 90)) && !presence.fills(span(50, 90)));
     }
 }
