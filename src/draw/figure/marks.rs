@@ -161,11 +161,13 @@ impl Marks {
                 .then(a.cmp(b))
         });
         // A connection says enough by its circle: words for each of them would fill the page.
-        let has_words = |at: &usize| {
-            let event = entries.get(circles[*at].entry as usize);
-            event.is_some_and(|e| !matches!(e.kind, Kind::Appeared | Kind::Vanished))
+        let has_words = |e: &Entry| !matches!(e.kind, Kind::Appeared | Kind::Vanished);
+        let is_lettered = |at: &usize| {
+            entries
+                .get(circles[*at].entry as usize)
+                .is_some_and(has_words)
         };
-        let lettered = order.into_iter().filter(has_words).take(MOST.0);
+        let lettered = order.into_iter().filter(is_lettered).take(MOST.0);
         let lettered: BTreeSet<usize> = lettered.collect();
         for (at, mark) in circles.into_iter().enumerate() {
             let Some(event) = entries.get(mark.entry as usize) else {
@@ -175,7 +177,7 @@ impl Marks {
                 let text = text(source, event, &tracks[mark.track]);
                 self.letters.push(Letter { mark, text });
             } else {
-                self.unlettered += 1;
+                self.unlettered += usize::from(has_words(event));
                 if event.kind != Kind::Restarted {
                     self.signs.push(mark);
                 }

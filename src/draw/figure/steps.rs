@@ -164,7 +164,9 @@ impl StepSource<'_> {
             .each_ref()
             .map(|t| t.keys().copied().collect::<BTreeSet<_>>());
         let handed = self.handed(k);
+        // One that ended long ago stands in the note alone.
         let partners = handed.iter().flat_map(|(_, from, to, _)| [from, to]);
+        let partners = partners.filter(|name| before.contains(*name) || after.contains(*name));
         let partners: BTreeSet<usize> = partners
             .filter_map(place_of)
             .filter(|at| !began.contains(at) && !ended.contains(at))
