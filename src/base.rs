@@ -11,6 +11,7 @@ pub(crate) mod leftovers;
 pub mod name;
 pub(crate) mod nearest;
 pub mod notice;
+pub(crate) mod rhythm;
 pub(crate) mod role;
 pub(crate) mod table;
 pub mod time;

@@ -6,13 +6,13 @@
 mod build;
 pub mod diff;
 mod graphs;
-pub(crate) mod lives;
-pub(crate) mod sending;
+pub(crate) mod history;
+mod per_element;
 pub mod window;
 
 use std::sync::Arc;
 
-use crate::base::name::{NodeName, TopicName};
+use crate::base::name::{NodeName, TopicName, is_player, is_quiet, is_recorder};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 
@@ -22,7 +22,8 @@ pub(crate) use graphs::{Column, ColumnCursor, ColumnWriter, GraphsWriter, Number
 pub use graphs::{Graphs, Iter as GraphsIter};
 
 pub use build::{Built, build};
-pub(crate) use build::{History, TopicCount, Windowed, counts, graphs, history};
+pub(crate) use build::{History, TopicCount, Windowed, counts, graphs, made};
+pub use per_element::PerElement;
 
 /// A node's place in [`Elements::nodes`].
 pub type NodeId = u32;
@@ -46,6 +47,19 @@ pub struct Node {
     pub last: Option<Stamp>,
     /// The intervals in which it exists, in order, half-open; empty where only windows are known.
     pub runs: Vec<Span>,
+}
+
+impl Node {
+    /// Whether it records or plays bags, by its name or its log records.
+    pub(crate) fn records(&self) -> bool {
+        let name = self.name.as_str();
+        is_recorder(name) || is_player(name) || self.evidence.words().any(|w| w == "recorder")
+    }
+
+    /// Whether it is housekeeping, a recorder or a player: events, phases and figures leave it out.
+    pub(crate) fn is_tool(&self) -> bool {
+        self.records() || is_quiet(self.name.as_str())
+    }
 }
 
 /// A topic, over the whole mission.
@@ -208,6 +222,20 @@ pub enum Element {
 }
 
 impl Element {
+    /// Makes an element of each kind from its id: nodes, topics, publications, subscriptions.
+    pub(crate) const KINDS: [fn(u32) -> Self; 4] =
+        [Self::Node, Self::Topic, Self::Publish, Self::Subscribe];
+
+    /// The place of its kind among [`Element::KINDS`], and its id.
+    pub(crate) fn place(self) -> (usize, usize) {
+        match self {
+            Self::Node(id) => (0, id as usize),
+            Self::Topic(id) => (1, id as usize),
+            Self::Publish(id) => (2, id as usize),
+            Self::Subscribe(id) => (3, id as usize),
+        }
+    }
+
     /// The word for the element's kind in JSON: `node`, `topic`, `publish` or `subscribe`.
     pub fn word(self) -> &'static str {
         match self {
@@ -220,6 +248,42 @@ impl Element {
 }
 
 impl Elements {
+    /// Every element: nodes, topics, publications, subscriptions.
+    pub(crate) fn all(&self) -> impl Iterator<Item = Element> + use<> {
+        let many = [
+            self.nodes.len(),
+            self.topics.len(),
+            self.publishes.len(),
+            self.subscribes.len(),
+        ];
+        let kinds = Element::KINDS.into_iter().zip(many);
+        kinds.flat_map(|(kind, many)| (0..u32::try_from(many).unwrap_or(u32::MAX)).map(kind))
+    }
+
+    /// Every edge: publications, then subscriptions.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = (Element, &Edge)> {
+        let publishes = (0..).map(Element::Publish).zip(&self.publishes);
+        publishes.chain((0..).map(Element::Subscribe).zip(&self.subscribes))
+    }
+
+    /// The names of the node and the topic of an element: both of an edge, one of the others.
+    pub(crate) fn names(&self, element: Element) -> (Option<&str>, Option<&str>) {
+        let (node, topic) = self.ends(element);
+        let node = node.and_then(|id| self.nodes.get(id as usize));
+        let topic = topic.and_then(|id| self.topics.get(id as usize));
+        (
+            node.map(|node| node.name.as_str()),
+            topic.map(|topic| topic.name.as_str()),
+        )
+    }
+
+    /// The publication of a topic by a node.
+    pub fn publication(&self, node: NodeId, topic: TopicId) -> Option<EdgeId> {
+        let key = |edge: &Edge| (edge.node, edge.topic);
+        let at = self.publishes.binary_search_by_key(&(node, topic), key);
+        EdgeId::try_from(at.ok()?).ok()
+    }
+
     /// The node and the topic of an element: both of an edge, one of the others.
     pub fn ends(&self, element: Element) -> (Option<NodeId>, Option<TopicId>) {
         let ends = |edge: Option<&Edge>| (edge.map(|e| e.node), edge.map(|e| e.topic));
@@ -251,6 +315,17 @@ impl Elements {
             Element::Subscribe(id) => self.subscribes.get(id as usize).map(|e| &e.runs),
         };
         runs.map_or(&[], Vec::as_slice)
+    }
+
+    /// As [`Elements::runs`], to change them; `None` for an element that is not there.
+    pub(crate) fn runs_mut(&mut self, element: Element) -> Option<&mut Vec<Span>> {
+        let id = element.place().1;
+        match element {
+            Element::Node(_) => self.nodes.get_mut(id).map(|n| &mut n.runs),
+            Element::Topic(_) => self.topics.get_mut(id).map(|t| &mut t.runs),
+            Element::Publish(_) => self.publishes.get_mut(id).map(|e| &mut e.runs),
+            Element::Subscribe(_) => self.subscribes.get_mut(id).map(|e| &mut e.runs),
+        }
     }
 
     /// The first and the last sign of life of an element, where known.

@@ -17,15 +17,15 @@ pub mod evidence {
 /// See `src/graph.rs`.
 pub mod graph {
     pub use crate::graph::{
-        Built, EdgeState, Element, Elements, Graph, NodeState, State, TopicState, build, diff,
-        window,
+        Built, EdgeState, Element, Elements, Graph, NodeState, PerElement, State, TopicState,
+        build, diff, window,
     };
 }
 
 /// See `src/mission.rs`.
 pub mod mission {
     pub use crate::mission::{
-        Activity, Ledger, Mission, Window, events, info, ledger, phases, read_json, write_json,
+        Ledger, Mission, Window, events, info, ledger, phases, read_json, write_json,
     };
 }
 

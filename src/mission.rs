@@ -1,6 +1,5 @@
 //! The mission: every window with its graph and changes; written as JSON and read back as an input.
 
-pub(crate) mod activity;
 pub mod events;
 pub mod info;
 pub mod ledger;
@@ -18,9 +17,9 @@ use crate::base::geometry::Rect;
 use crate::base::notice::Notices;
 use crate::base::time::{Period, Span, Stamp};
 use crate::graph::diff::{Change, Changes};
+use crate::graph::history::Sending;
 use crate::graph::{Elements, Graph, Graphs, NodeId};
 
-pub use activity::Activity;
 pub(crate) use ledger::EntryId;
 pub use ledger::Ledger;
 
@@ -64,8 +63,8 @@ pub struct Mission {
     pub graphs: Graphs,
     /// The events, in continuous time.
     pub ledger: Ledger,
-    /// The activity of all elements on a grid of its own.
-    pub activity: Activity,
+    /// The messages of every sender, in continuous time.
+    pub sending: Sending,
     /// The places of the drawing, if one was made.
     pub layout: Option<Places>,
     /// Problems that did not stop the reading.
@@ -115,8 +114,8 @@ impl Mission {
         }
     }
 
-    /// Finds the changes from each window to the next, and makes the ledger from them: for missions of which only the
-    /// windows are known. A rate must change by more than the share `threshold`; `restarts` are nodes that restarted
+    /// Finds the changes from each window to the next, and makes lives, sending and ledger from them: for missions of which
+    /// only the windows are known. A rate must change by more than the share `threshold`; `restarts` are nodes that restarted
     /// under the same name, with the times, sorted by time.
     pub fn find_changes(&mut self, threshold: f64, restarts: &[(NodeId, Stamp)]) {
         let mut changes = Changes::new(&self.elements, threshold);
@@ -128,6 +127,15 @@ impl Mission {
                 .collect();
             window.changes = changes.next(window.span, &graph, &inside);
         }
+        for what in self.elements.all() {
+            let rows = self.graphs.rows(what);
+            let windows = rows.filter_map(|(at, _)| Some(self.windows.get(at)?.span));
+            let lives = Span::joined(windows.collect(), 0);
+            if let Some(runs) = self.elements.runs_mut(what) {
+                *runs = lives;
+            }
+        }
+        self.sending = Sending::of_windows(&self.elements, &self.graphs);
         self.ledger = Ledger::from_changes(&self.elements, &self.windows);
         let places = ledger::places(&self.ledger, &self.windows);
         for (window, places) in self.windows.iter_mut().zip(places) {

@@ -17,7 +17,7 @@ const STATIONS: &[&str] = &[
 #[rustfmt::skip]
 const FLOORS: &[(&str, &[&[&str]])] = &[
     ("base", &[
-        &["budget", "leftovers", "words"],
+        &["budget", "leftovers", "rhythm", "words"],
         &["digest", "error", "geometry", "name", "nearest", "notice", "time", "yaml"],
         &["file", "role", "table"],
         &["csv"],
@@ -40,8 +40,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["restarts"],
         &["conclude"],
     ]),
-    ("graph", &[&["graphs", "lives", "sending"], &["build", "diff", "window"]]),
-    ("mission", &[&["activity", "ledger"], &["json", "phases"], &["events"], &["info"]]),
+    ("graph", &[&["graphs", "history", "per_element"], &["build", "diff", "window"]]),
+    ("mission", &[&["ledger"], &["json", "phases"], &["events"], &["info"]]),
     ("view", &[
         &["cluster", "collapse", "counts", "filter", "lives", "names", "replicas", "roles", "runs", "showing"],
         &["hubs", "settle"],

@@ -137,18 +137,17 @@ fn frames_show_who_lived_when_below_the_graph() {
     let (folder, done) = rendered("warehouse.bag", &[], &["{n}.svg"]);
     assert!(done.status.success(), "{}", said(&done));
     let svg = text(&folder, "2.svg");
-    let lives = svg
-        .split("id=\"lives\"")
-        .nth(1)
-        .unwrap()
-        .split("</g>")
-        .next()
-        .unwrap();
-    for (what, color) in [
-        ("starts", "#00795C"),
-        ("ends", "#C44900"),
-        ("hand-overs", "#6A35C9"),
+    for (class, color) in [
+        ("start", "#00795C"),
+        ("end", "#C44900"),
+        ("handover", "#6A35C9"),
     ] {
-        assert!(lives.to_uppercase().contains(color), "{what}: {lives}");
+        let tag = format!("<g class=\"{class}\" data-entry=\"");
+        let group = svg
+            .split(&tag)
+            .nth(1)
+            .and_then(|rest| rest.split("</g>").next());
+        let group = group.unwrap_or_else(|| panic!("no {class}"));
+        assert!(group.to_uppercase().contains(color), "{class}: {group}");
     }
 }

@@ -416,7 +416,11 @@ fn publishers_that_nobody_names_are_counted() {
     bag.at(scan, 30_000, vec![0, 1, 0, 0, 9]);
     assert_eq!(edges(&bag, "unknown"), ["/scan ? > /scan declared"]);
     let (built, _) = concluded(&bag, CollectOptions::default());
-    let begins = |id: usize| built.lives.topics[id].lives[0].span.start;
+    let begins = |id: u32| {
+        built.lives.of(graph::Element::Topic(id)).unwrap()[0]
+            .span
+            .start
+    };
     assert_eq!(begins(1), Stamp(ORIGIN + 30 * SECOND));
 }
 

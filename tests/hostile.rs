@@ -143,7 +143,9 @@ fn nothing_of_the_users_is_overwritten() {
         &["render", COURIER, "-o", "a{n}.svg", "-o", "a0.svg"],
         &["render", COURIER, "-o", "a.gif", "--poster", "./a.gif"],
         &["render", COURIER, "-o", "a.gif", "-o", "new/../a.gif"],
-        &["render", COURIER, "--source", ".", "-o", "s.toml", "--format", "json"],
+        &[
+            "render", COURIER, "--source", ".", "-o", "s.toml", "--format", "json",
+        ],
     ];
     for args in refused {
         let output = bagreel(dir.path(), args);

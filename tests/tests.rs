@@ -24,6 +24,7 @@ mod gate;
 mod hostile;
 mod info;
 mod layout;
+mod marks;
 mod options;
 mod pages;
 mod pairs;

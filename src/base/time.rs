@@ -70,6 +70,26 @@ pub struct Span {
 }
 
 impl Span {
+    /// The time that two intervals share, in nanoseconds; 0 or less where they share none.
+    pub(crate) fn shared(&self, other: Self) -> i64 {
+        self.end.min(other.end).since(self.start.max(other.start))
+    }
+
+    /// Some intervals, sorted, with those joined that overlap or are at most `gap` nanoseconds apart.
+    pub(crate) fn joined(mut spans: Vec<Self>, gap: i64) -> Vec<Self> {
+        spans.sort_unstable_by_key(|span| (span.start, span.end));
+        let mut all: Vec<Self> = Vec::new();
+        for span in spans {
+            match all.last_mut() {
+                Some(last) if span.start.since(last.end) <= gap => {
+                    last.end = last.end.max(span.end);
+                }
+                _ => all.push(span),
+            }
+        }
+        all
+    }
+
     /// The length in nanoseconds, ≥ 0.
     pub const fn nanos(&self) -> i64 {
         self.end.since(self.start)

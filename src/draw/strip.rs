@@ -406,7 +406,7 @@ mod tests {
             windows: Vec::new(),
             graphs: crate::graph::Graphs::default(),
             ledger: crate::mission::Ledger::default(),
-            activity: crate::mission::Activity::default(),
+            sending: crate::graph::history::Sending::default(),
             undrawn: Vec::new(),
             layout: None,
             notices: Notices::new(),

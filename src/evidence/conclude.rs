@@ -274,7 +274,9 @@ fn sentence(known: &Conclusions<'_>, what: ElementKey) -> String {
         ElementKey::Node(node) => format!("{} lives", name(node)),
         ElementKey::Topic(topic) => format!("{} exists", name(topic)),
         ElementKey::Publish(node, topic) => format!("{} publishes {}", name(node), name(topic)),
-        ElementKey::Subscribe(topic, node) => format!("{} subscribes {}", name(node), name(topic)),
+        ElementKey::Subscribe(topic, node) => {
+            format!("{} subscribes to {}", name(node), name(topic))
+        }
     }
 }
 

@@ -2,9 +2,9 @@
 
 use crate::base::time::Span;
 use crate::base::words::visible;
-use crate::evidence::{Degree, Evidence};
-use crate::graph::Edge;
-use crate::mission::{Mission, Window};
+use crate::evidence::Degree;
+use crate::graph::Element;
+use crate::mission::Mission;
 
 /// A node, a topic or an edge.
 pub(super) struct SpellOf {
@@ -22,139 +22,77 @@ pub(super) struct SpellOf {
     pub(super) evidence: String,
     /// Messages in all windows; `None` where not known.
     pub(super) messages: Option<u64>,
-    /// The times in which it is there: runs of windows, in order.
+    /// Its lives, in order.
     pub(super) spells: Vec<Span>,
     /// Its rate in messages per second over each run of windows of one rate.
     pub(super) rates: Vec<(Span, f64)>,
 }
 
-/// The state of an element in one window.
-struct SeenInWindow {
-    id: u32,
-    degree: Degree,
-    count: Option<u64>,
-    hz: Option<f64>,
-}
-
 /// Nodes and topics, then edges, all in the order of the mission's elements.
 pub(super) fn parts(mission: &Mission) -> (Vec<SpellOf>, Vec<SpellOf>) {
-    let elements = &mission.elements;
-    let node = |name: &str| format!("node:{}", visible(name));
-    let topic = |name: &str| format!("topic:{}", visible(name));
-    let ends = |edge: &Edge| {
-        (
-            node(elements.nodes[edge.node as usize].name.as_str()),
-            topic(elements.topics[edge.topic as usize].name.as_str()),
-        )
-    };
-    let plain = |id: String, name: &str, kind, evidence| {
-        let label = visible(name).into_owned();
-        SpellOf::new(id, label, kind, Default::default(), evidence)
-    };
-    let nodes = elements.nodes.iter().map(|n| {
-        let name = n.name.as_str();
-        plain(node(name), name, "node", n.evidence)
-    });
-    let topics = elements.topics.iter().map(|t| {
-        let name = t.name.as_str();
-        plain(topic(name), name, "topic", t.evidence)
-    });
-    let publishes = elements.publishes.iter().map(|edge| {
-        let (node, topic) = ends(edge);
-        let id = format!("publish:{node} {topic}");
-        let label = "publishes".to_owned();
-        SpellOf::new(id, label, "publish", (node, topic), edge.evidence)
-    });
-    let subscribes = elements.subscribes.iter().map(|edge| {
-        let (node, topic) = ends(edge);
-        let id = format!("subscribe:{topic} {node}");
-        let label = "is subscribed by".to_owned();
-        SpellOf::new(id, label, "subscribe", (topic, node), edge.evidence)
-    });
-    let mut nodes: Vec<SpellOf> = nodes.collect();
-    let mut topics: Vec<SpellOf> = topics.collect();
-    let mut publishes: Vec<SpellOf> = publishes.collect();
-    let mut subscribes: Vec<SpellOf> = subscribes.collect();
-    for (window, graph) in mission.each() {
-        let seen = |id, degree, count, hz| SeenInWindow {
-            id,
-            degree,
-            count,
-            hz,
-        };
-        add(
-            &mut nodes,
-            window,
-            graph.nodes.iter().map(|s| seen(s.id, s.degree, None, s.hz)),
-        );
-        add(
-            &mut topics,
-            window,
-            graph
-                .topics
-                .iter()
-                .map(|s| seen(s.id, s.degree, Some(s.count), s.hz)),
-        );
-        add(
-            &mut publishes,
-            window,
-            graph
-                .publishes
-                .iter()
-                .map(|s| seen(s.id, s.degree, s.count, s.hz)),
-        );
-        add(
-            &mut subscribes,
-            window,
-            graph
-                .subscribes
-                .iter()
-                .map(|s| seen(s.id, s.degree, s.count, s.hz)),
-        );
-    }
-    nodes.extend(topics);
-    publishes.extend(subscribes);
-    (nodes, publishes)
-}
-
-fn add(parts: &mut [SpellOf], window: &Window, seen: impl Iterator<Item = SeenInWindow>) {
-    for seen in seen {
-        parts[seen.id as usize].add(window.span, &seen);
-    }
+    let all = mission.elements.all();
+    let all = all.map(|what| SpellOf::new(mission, what));
+    all.partition(|part| part.ends.0.is_empty())
 }
 
 impl SpellOf {
-    fn new(
-        id: String,
-        label: String,
-        kind: &'static str,
-        ends: (String, String),
-        evidence: Evidence,
-    ) -> Self {
-        Self {
+    fn new(mission: &Mission, what: Element) -> Self {
+        let elements = &mission.elements;
+        let (node, topic) = elements.ends(what);
+        let node = node.map(|id| visible(elements.nodes[id as usize].name.as_str()));
+        let topic = topic.map(|id| visible(elements.topics[id as usize].name.as_str()));
+        let node_id = format!("node:{}", node.as_deref().unwrap_or_default());
+        let topic_id = format!("topic:{}", topic.as_deref().unwrap_or_default());
+        let (id, label, ends) = match what {
+            Element::Node(_) => (node_id, node.unwrap_or_default().into_owned(), None),
+            Element::Topic(_) => (topic_id, topic.unwrap_or_default().into_owned(), None),
+            Element::Publish(_) => (
+                format!("publish:{node_id} {topic_id}"),
+                "publishes".to_owned(),
+                Some((node_id, topic_id)),
+            ),
+            Element::Subscribe(_) => (
+                format!("subscribe:{topic_id} {node_id}"),
+                "is subscribed by".to_owned(),
+                Some((topic_id, node_id)),
+            ),
+        };
+        let inside = |life: &Span| Span {
+            start: life.start.max(mission.span.start),
+            end: life.end.min(mission.span.end),
+        };
+        let lives = elements.runs(what).iter().map(inside);
+        let mut all = Self {
             id,
             label,
-            kind,
-            ends,
+            kind: what.word(),
+            ends: ends.unwrap_or_default(),
             degree: Degree::Declared,
-            evidence: evidence.words().collect::<Vec<_>>().join(" "),
+            evidence: elements
+                .evidence(what)
+                .words()
+                .collect::<Vec<_>>()
+                .join(" "),
             messages: None,
-            spells: Vec::new(),
+            spells: lives.filter(|life| life.start < life.end).collect(),
             rates: Vec::new(),
+        };
+        for (at, row) in mission.graphs.rows(what) {
+            let span = mission.graphs.spans()[at];
+            all.degree = all.degree.min(row.degree);
+            // What a node counts are the messages of its topics.
+            if let (Some(count), false) = (row.count, matches!(what, Element::Node(_))) {
+                *all.messages.get_or_insert(0) += count;
+            }
+            if let Some(hz) = row.hz(span) {
+                all.sends(span, hz);
+            }
         }
+        all
     }
 
-    /// Adds one more window in which it is there, later than all before.
-    fn add(&mut self, span: Span, seen: &SeenInWindow) {
-        self.degree = self.degree.min(seen.degree);
-        if let Some(count) = seen.count {
-            *self.messages.get_or_insert(0) += count;
-        }
-        match self.spells.last_mut() {
-            Some(last) if span.start <= last.end => last.end = span.end,
-            _ => self.spells.push(span),
-        }
-        let Some(hz) = seen.hz else { return };
+    /// Adds the rate in one more window, later than all before.
+    fn sends(&mut self, span: Span, hz: f64) {
         match self.rates.last_mut() {
             // The bits, since equal means the same number here.
             Some((last, rate)) if rate.to_bits() == hz.to_bits() && span.start <= last.end => {

@@ -11,17 +11,12 @@ use crate::base::notice::NoticeKind;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Degree, Evidence};
-use crate::graph::lives::Bound;
+use crate::graph::history::Bound;
 use crate::graph::{Edge, Element, NodeId, State, TopicId};
 use crate::mission::Mission;
-use crate::mission::activity::is_hidden_node;
 use crate::mission::ledger::{Entry, Kind};
 
 pub(crate) use tempo::{Rate, TopicSilence};
-
-/// The time in nanoseconds before the mission's end within which an end does not count: robots are shut down before
-/// their recorder.
-pub(crate) const SHUTDOWN_NS: i64 = 5_000_000_000;
 
 /// A mission, with facts that are asked for often worked out once.
 pub(crate) struct Facts<'a> {
@@ -188,7 +183,7 @@ impl<'a> Facts<'a> {
     /// Whether a role is housekeeping or the recorder's.
     pub(crate) fn is_tool(&self, nodes: &[NodeId]) -> bool {
         let own = &self.mission.elements.nodes;
-        nodes.iter().any(|id| is_hidden_node(&own[*id as usize]))
+        nodes.iter().any(|id| own[*id as usize].is_tool())
     }
 
     /// Whether a topic is housekeeping.
@@ -279,15 +274,7 @@ impl<'a> Facts<'a> {
                 all.extend(runs);
             }
         }
-        all.sort_by_key(|span| (span.start, span.end));
-        let mut joined: Vec<Span> = Vec::new();
-        for span in all {
-            match joined.last_mut() {
-                Some(last) if span.start <= last.end => last.end = last.end.max(span.end),
-                _ => joined.push(span),
-            }
-        }
-        joined
+        Span::joined(all, 0)
     }
 
     /// The windows in which a node is, for a mission without finer times.

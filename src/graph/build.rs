@@ -12,8 +12,8 @@ pub(crate) mod tempo;
 pub(crate) mod tracks;
 pub(crate) mod windows;
 
-use super::lives::Lives;
-use super::{Elements, Graph};
+use super::history::{Life, Sending};
+use super::{Elements, Graph, PerElement};
 use crate::base::error::Result;
 use crate::base::notice::Notices;
 use crate::base::time::Span;
@@ -22,7 +22,7 @@ use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::{self, conclude};
 
 pub(crate) use assemble::{Windowed, graphs};
-pub(crate) use history::{History, history};
+pub(crate) use history::{History, made};
 pub(crate) use rates::{TopicCount, counts};
 
 /// The result of building all graphs for one division of time.
@@ -34,8 +34,10 @@ pub struct Built {
     pub graphs: Vec<Graph>,
     /// The number of messages of each window.
     pub messages: Vec<u64>,
-    /// The lives of all elements, and the sending of each publisher.
-    pub lives: Lives,
+    /// The lives of each element.
+    pub lives: PerElement<Vec<Life>>,
+    /// The messages of every sender.
+    pub sending: Sending,
     /// Notices about the user's files.
     pub notices: Notices,
     /// Every piece of evidence that was asked for.
@@ -54,13 +56,17 @@ pub fn build(
     grace: usize,
 ) -> Result<Built> {
     let findings = conclude(recorded, options)?;
-    let history = history(recorded, &findings)?;
+    let history = made(recorded, &findings)?;
     let windowed = graphs(recorded, &findings, &history, windows, grace)?;
     Ok(Built {
+        lives: PerElement::new(&history.elements, |what| {
+            let record = history.records.of(what);
+            record.map_or_else(Vec::new, |record| record.lives.clone())
+        }),
         elements: history.elements,
         graphs: windowed.graphs.iter().collect(),
         messages: windowed.messages,
-        lives: history.lives,
+        sending: history.sending,
         notices: findings.notices,
         lines: findings.lines,
     })

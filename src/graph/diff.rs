@@ -115,6 +115,30 @@ pub struct Diff {
     pub subscribes: Delta<EdgeState>,
 }
 
+impl Diff {
+    /// The elements that are new.
+    pub(crate) fn added(&self) -> impl Iterator<Item = Element> {
+        let nodes = self.nodes.added.iter().map(|s| Element::Node(s.id));
+        let topics = self.topics.added.iter().map(|s| Element::Topic(s.id));
+        let publishes = self.publishes.added.iter().map(|s| Element::Publish(s.id));
+        let subscribes = self.subscribes.added.iter();
+        let subscribes = subscribes.map(|s| Element::Subscribe(s.id));
+        nodes.chain(topics).chain(publishes).chain(subscribes)
+    }
+
+    /// The elements that are no longer there.
+    pub(crate) fn removed(&self) -> impl Iterator<Item = Element> {
+        let lists = [
+            &self.nodes.removed,
+            &self.topics.removed,
+            &self.publishes.removed,
+            &self.subscribes.removed,
+        ];
+        let lists = lists.into_iter().zip(Element::KINDS);
+        lists.flat_map(|(ids, kind)| ids.iter().copied().map(kind))
+    }
+}
+
 /// The difference between one list of two graphs. Each part is sorted by id.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Delta<T> {

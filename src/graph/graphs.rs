@@ -91,23 +91,6 @@ impl Graphs {
         self.lifecycles.get(place).map(Arc::clone)
     }
 
-    /// The same graphs without sizes, the spacing of messages and the states of lifecycles.
-    pub(crate) fn plain(mut self) -> Self {
-        let windows = self.spans.len();
-        for topic in &mut self.topics {
-            *topic = topic.map(windows, Row::without_spacing);
-        }
-        for node in self
-            .nodes
-            .iter_mut()
-            .filter(|_| !self.lifecycles.is_empty())
-        {
-            *node = node.map(windows, Row::without_lifecycle);
-        }
-        self.lifecycles = Vec::new();
-        self
-    }
-
     /// A walk through all windows that yields only differences from the window before.
     pub(crate) fn walk(&self) -> ColumnWalk<'_> {
         ColumnWalk::new([&self.nodes, &self.topics, &self.publishes, &self.subscribes])

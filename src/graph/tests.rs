@@ -79,7 +79,7 @@ fn a_node_lives_until_its_rhythm_breaks() {
     );
     assert_eq!(states(&built, "/x"), ["-", "active", "active", "-", "-"]);
     assert_eq!(built.messages, [1, 4, 2, 0, 1]);
-    let life = built.lives.nodes[1].lives[0];
+    let life = built.lives.of(Element::Node(1)).unwrap()[0];
     let ended = life.ended.unwrap();
     assert_eq!((ended.time.0, ended.latest.0), (22 * SECOND, 24 * SECOND));
     assert_eq!(life.began.unwrap().time.0, 12 * SECOND);
@@ -96,7 +96,7 @@ fn no_evidence_is_not_absence() {
     );
     assert_eq!(states(&built, "/x")[1..], ["active"; 9]);
     assert_eq!(states(&built, "/y"), ["active"; 10]);
-    assert!(built.lives.nodes[1].lives[0].ended.is_none());
+    assert!(built.lives.of(Element::Node(1)).unwrap()[0].ended.is_none());
 }
 
 #[test]
@@ -172,12 +172,12 @@ fn a_latched_message_sent_again_after_a_silence_is_a_restart() {
         10,
     );
     assert_eq!(states(&all, "/x"), ["active", "-", "-", "active"]);
-    let times: Vec<_> = all
-        .lives
-        .returns()
-        .iter()
-        .map(|(_, time)| time.0 / SECOND)
-        .collect();
+    let again = all.lives.iter().flat_map(|(what, lives)| {
+        let again = lives.iter().skip(1);
+        again.map(move |life| (what, life.span.start.0 / SECOND))
+    });
+    let again = again.filter(|(what, _)| matches!(what, Element::Node(_)));
+    let times: Vec<i64> = again.map(|(_, second)| second).collect();
     assert_eq!(times, [31]);
 }
 
@@ -398,7 +398,12 @@ fn a_refused_client_is_there_for_a_moment() {
         .nodes
         .iter()
         .position(|n| n.name.as_str() == "/bad");
-    let ended = built.lives.nodes[bad.unwrap()].lives[0].ended.unwrap();
+    let ended = built
+        .lives
+        .of(Element::Node(u32::try_from(bad.unwrap()).unwrap()))
+        .unwrap()[0]
+        .ended
+        .unwrap();
     assert_eq!(
         (ended.earliest.0, ended.latest.0),
         (15 * SECOND, 98 * SECOND)

@@ -5,7 +5,7 @@ mod sentence;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-pub(crate) use self::sentence::{sentence, sentence_with};
+pub(crate) use self::sentence::{predicate, sentence, sentence_with};
 use super::json::entries::rows;
 use crate::base::csv::table;
 use crate::base::time::Stamp;

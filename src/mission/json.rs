@@ -1,6 +1,5 @@
 //! A mission as JSON, written as a stream and read back.
 
-mod activity;
 pub(crate) mod changes;
 pub(crate) mod entries;
 pub(crate) mod lines;
@@ -9,4 +8,5 @@ pub(crate) mod raw;
 pub(crate) mod read;
 pub(crate) mod rows;
 pub(crate) mod runs;
+mod sending;
 pub(crate) mod write;

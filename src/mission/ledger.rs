@@ -14,6 +14,7 @@ mod silence;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::base::rhythm::CLOSE_NS;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{Element, Elements, NodeId};
@@ -22,9 +23,6 @@ use crate::mission::Window;
 pub(crate) use changes::{explain, places};
 pub(crate) use make::{LedgerInput, make, sorted};
 
-/// The longest time between headlines of one turn, in nanoseconds: a launch file starts its nodes one after the other,
-/// each within this time.
-const CLOSE_NS: i64 = 2_000_000_000;
 /// The most turns of a mission: as many as windows are chosen for it.
 const MOST_TURNS: i64 = crate::base::budget::CHOSEN_WINDOWS;
 

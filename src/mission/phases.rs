@@ -1,24 +1,25 @@
-//! Phases: parts of a mission that one graph describes, found by an optimal partition of its activity.
+//! Phases: parts of a mission that one graph describes, found by an optimal partition of its lives.
 //!
 //! A boundary must save enough *element-seconds* of wrongly drawn graph, so that crashes, restarts and slow topics do
 //! not cause boundaries, and the majority graph of a phase is the configuration that the mission was in. The result
 //! depends on the mission alone, never on `--period`.
 
+mod grid;
 mod name;
 mod partition;
 mod presence;
 mod ramp;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 use std::sync::Arc;
 
 use self::partition::partition;
 pub(crate) use self::presence::knows_publishers;
 use self::presence::{Presence, is_topics, presences};
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Element, Elements, TopicId};
-use crate::mission::activity::Activity;
+use crate::graph::history::Sending;
+use crate::graph::{Elements, TopicId};
+use crate::mission::Mission;
 use crate::mission::ledger::Phase;
 
 /// The distance from a boundary's cell within which its exact time is searched, in nanoseconds and as a part of the
@@ -35,165 +36,128 @@ pub(crate) struct Configuration {
 }
 
 /// The phases of a mission, in order and without gaps: one for a mission that does not change, none for one without
-/// activity.
-pub fn phases(elements: &Elements, activity: &Activity) -> Vec<Phase> {
-    let present = presences(elements, activity);
-    let cells: Vec<i64> = activity.cells().iter().map(Span::nanos).collect();
-    let cuts = partition(&cells, &present);
-    let starts: Vec<usize> = std::iter::once(0).chain(cuts).collect();
-    let ends = starts[1..].iter().copied().chain([cells.len()]);
-    let ranges: Vec<(usize, usize)> = starts.iter().copied().zip(ends).collect();
-    if cells.is_empty() {
+/// elements. `whole` is the time of the mission.
+pub fn phases(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Phase> {
+    if elements.all().next().is_none() {
         return Vec::new();
     }
-    let found: Vec<Configuration> = ranges
-        .iter()
-        .map(|(from, to)| configuration(elements, activity, &present, *from, *to))
+    let present = presences(elements, sending, whole);
+    let cells = grid::grid(whole);
+    let widths: Vec<i64> = cells.iter().map(Span::nanos).collect();
+    let rows: Vec<Vec<bool>> = present.iter().map(|p| p.cells(&cells)).collect();
+    let cuts = partition(&widths, &rows);
+    let starts: Vec<Stamp> = std::iter::once(whole.start)
+        .chain(cuts.into_iter().map(|at| cells[at].start))
         .collect();
-    let bounds = boundaries(elements, activity, &present, &ranges);
-    let spans = bounds.windows(2).map(|pair| Span {
-        start: pair[0],
-        end: pair[1],
-    });
-    let spans: Vec<Span> = spans.collect();
-    let (spans, found, ramps) = ramp::joined(&spans, &found, activity.span().nanos());
+    let of = |span: &Span| configuration(elements, sending, &present, *span);
+    let found: Vec<Configuration> = between(&starts, whole.end).iter().map(of).collect();
+    let starts = boundaries(elements, &found, &starts, whole, is_topics(&present));
+    let spans = between(&starts, whole.end);
+    let (spans, found, ramps) = ramp::joined(&spans, &found, whole.nanos());
     let unit = if is_topics(&present) { "topic" } else { "node" };
     told(&spans, &found, &ramps, unit)
 }
 
+/// The intervals from each start to the next, the last one to `end`.
+fn between(starts: &[Stamp], end: Stamp) -> Vec<Span> {
+    let ends = starts.iter().skip(1).copied().chain([end]);
+    let pairs = starts.iter().zip(ends);
+    pairs
+        .map(|(start, end)| Span { start: *start, end })
+        .collect()
+}
+
 /// The phases for intervals chosen elsewhere, such as by the user, with the changes between them, by majority.
-pub(crate) fn of_spans(elements: &Elements, activity: &Activity, spans: &[Span]) -> Vec<Phase> {
-    let present = presences(elements, activity);
-    let found: Vec<Configuration> = spans
-        .iter()
-        .map(|span| {
-            let (from, to) = cells_of(activity, *span);
-            configuration(elements, activity, &present, from, to)
-        })
-        .collect();
+pub(crate) fn of_spans(
+    elements: &Elements,
+    sending: &Sending,
+    whole: Span,
+    spans: &[Span],
+) -> Vec<Phase> {
+    let present = presences(elements, sending, whole);
+    let of = |span: &Span| configuration(elements, sending, &present, *span);
+    let found: Vec<Configuration> = spans.iter().map(of).collect();
     let unit = if is_topics(&present) { "topic" } else { "node" };
     told(spans, &found, &vec![false; spans.len()], unit)
 }
 
-/// The majority graph of a phase or of any other interval, by the cells whose middle lies in it.
-pub(crate) fn configuration_of(
-    elements: &Elements,
-    activity: &Activity,
-    span: Span,
-) -> Configuration {
-    let present = presences(elements, activity);
-    let (from, to) = cells_of(activity, span);
-    configuration(elements, activity, &present, from, to)
-}
-
-/// The cells whose middle lies in `span`, as a range; at least one if there is any.
-pub(crate) fn cells_of(activity: &Activity, span: Span) -> (usize, usize) {
-    let cells = activity.cells();
-    let middle = |cell: &Span| cell.start.plus(cell.nanos() / 2);
-    let from = cells.partition_point(|cell| middle(cell) < span.start);
-    let to = cells.partition_point(|cell| middle(cell) < span.end);
-    let from = from.min(cells.len().saturating_sub(1));
-    (from, to.max(from + 1).min(cells.len()))
+/// The majority graph of each of these phases.
+pub(crate) fn configurations(mission: &Mission, phases: &[Phase]) -> Vec<Configuration> {
+    let (elements, sending) = (&mission.elements, &mission.sending);
+    let present = presences(elements, sending, mission.span);
+    let of = |phase: &Phase| configuration(elements, sending, &present, phase.span);
+    phases.iter().map(of).collect()
 }
 
 fn configuration(
     elements: &Elements,
-    activity: &Activity,
+    sending: &Sending,
     present: &[Presence],
-    from: usize,
-    to: usize,
+    span: Span,
 ) -> Configuration {
-    Configuration {
-        names: majority(activity, present, (from, to)),
-        senders: senders(elements, activity, from..to),
-    }
-}
-
-/// The elements that exist in at least half of these cells.
-fn majority(
-    activity: &Activity,
-    present: &[Presence],
-    (from, to): (usize, usize),
-) -> BTreeSet<Arc<str>> {
     let topics = is_topics(present);
-    let cells = &activity.cells()[from..to];
-    let whole: i64 = cells.iter().map(Span::nanos).sum();
-    let is_there = |p: &&Presence| {
-        let there = cells.iter().zip(&p.cells[from..to]).filter(|(_, is)| **is);
-        let nanos: i64 = there.map(|(cell, _)| cell.nanos()).sum();
-        nanos * 2 >= whole
-    };
-    let counted = |p: &&Presence| p.counts(topics);
-    let names = present.iter().filter(counted).filter(is_there);
-    names.map(|p| p.subject.name()).collect()
-}
-
-/// The senders of more than half of a topic's messages in these cells.
-fn senders(
-    elements: &Elements,
-    activity: &Activity,
-    cells: Range<usize>,
-) -> BTreeMap<TopicId, Arc<str>> {
-    let count = |what: Element| {
-        let rows = activity.graphs.rows(what);
-        let inside = rows.filter(|(at, _)| cells.contains(at));
-        let counts = inside.map(|(_, row)| row.count.unwrap_or(0));
-        counts.fold(0, u64::saturating_add)
-    };
-    let mut sent: BTreeMap<TopicId, BTreeMap<Arc<str>, u64>> = BTreeMap::new();
-    for (id, edge) in (0..).zip(&elements.publishes) {
-        let count = count(Element::Publish(id));
-        let node = elements.nodes.get(edge.node as usize);
-        if let Some(node) = node.filter(|_| count > 0) {
-            let of = sent.entry(edge.topic).or_default();
-            *of.entry(Arc::clone(&node.role)).or_default() += count;
-        }
+    let there = present.iter().filter(|p| p.counts(topics) && p.fills(span));
+    Configuration {
+        names: there.map(|p| p.subject.name()).collect(),
+        senders: senders(elements, sending, span),
     }
-    let main = |(topic, of): (TopicId, BTreeMap<Arc<str>, u64>)| {
-        let whole = count(Element::Topic(topic));
-        let found = of.into_iter().find(|(_, n)| n * 2 > whole);
-        found.map(|(role, _)| (topic, role))
-    };
-    sent.into_iter().filter_map(main).collect()
 }
 
-/// The boundaries of phases: at the median of the exact starts and stops of the elements that differ, near the cell's
-/// start.
+/// The senders of more than half of a topic's messages in this time.
+fn senders(elements: &Elements, sending: &Sending, span: Span) -> BTreeMap<TopicId, Arc<str>> {
+    let mut main = BTreeMap::new();
+    for of in sending.senders.chunk_by(|a, b| a.topic == b.topic) {
+        let mut roles: BTreeMap<&Arc<str>, f64> = BTreeMap::new();
+        let mut whole = 0.0;
+        for sender in of {
+            let count = sender.count_in(span);
+            whole += count;
+            let node = sender
+                .node
+                .and_then(|node| elements.nodes.get(node as usize));
+            if let Some(node) = node {
+                *roles.entry(&node.role).or_default() += count;
+            }
+        }
+        let found = roles
+            .into_iter()
+            .find(|(_, n)| *n > 0.0 && *n * 2.0 > whole);
+        main.extend(found.map(|(role, _)| (of[0].topic, Arc::clone(role))));
+    }
+    main
+}
+
+/// The starts of phases: at the median of the exact starts and stops of the elements that differ, near the cell's start.
 fn boundaries(
     elements: &Elements,
-    activity: &Activity,
-    present: &[Presence],
-    ranges: &[(usize, usize)],
+    found: &[Configuration],
+    cells: &[Stamp],
+    whole: Span,
+    topics: bool,
 ) -> Vec<Stamp> {
-    let whole = activity.span();
-    let mut bounds = vec![whole.start];
-    for pair in ranges.windows(2) {
-        let (before, after) = (pair[0], pair[1]);
-        let cell = activity.cells()[after.0].start;
-        let exact = differing(elements, activity, present, (before, after), cell);
-        let last = bounds.last().copied().unwrap_or(whole.start);
-        bounds.push(exact.filter(|at| *at > last).unwrap_or(cell));
+    let mut starts = vec![whole.start];
+    let ends = presence::ends(elements, topics);
+    for (pair, cell) in found.windows(2).zip(&cells[1..]) {
+        let exact = differing(&ends, pair, *cell, whole);
+        let last = starts.last().copied().unwrap_or(whole.start);
+        starts.push(exact.filter(|at| *at > last).unwrap_or(*cell));
     }
-    bounds.push(whole.end);
-    bounds
+    starts
 }
 
 /// The median of the exact times at which the elements that differ between two phases began or ended, near `cell`.
 fn differing(
-    elements: &Elements,
-    activity: &Activity,
-    present: &[Presence],
-    (before, after): ((usize, usize), (usize, usize)),
+    ends: &BTreeMap<&str, presence::Ends>,
+    pair: &[Configuration],
     cell: Stamp,
+    whole: Span,
 ) -> Option<Stamp> {
-    let old = majority(activity, present, before);
-    let new = majority(activity, present, after);
-    let around = AROUND.0.max(activity.span().nanos() / AROUND.1);
+    let (old, new) = (&pair[0].names, &pair[1].names);
+    let around = AROUND.0.max(whole.nanos() / AROUND.1);
     let near = |at: &Stamp| at.since(cell).abs() <= around;
-    let ends = presence::ends(elements, is_topics(present));
     let of = |name: &Arc<str>| ends.get(&**name).into_iter().flatten();
-    let began = new.difference(&old).flat_map(of).filter_map(|e| e.0);
-    let ended = old.difference(&new).flat_map(of).filter_map(|e| e.1);
+    let began = new.difference(old).flat_map(of).filter_map(|e| e.0);
+    let ended = old.difference(new).flat_map(of).filter_map(|e| e.1);
     let mut times: Vec<Stamp> = began.chain(ended).filter(near).collect();
     times.sort_unstable();
     times.get(times.len() / 2).copied()

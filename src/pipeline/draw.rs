@@ -31,7 +31,7 @@ impl Body {
         match self {
             Self::Graph => false,
             Self::Board => true,
-            Self::Auto => !knows_publishers(&mission.elements, &mission.activity),
+            Self::Auto => !knows_publishers(&mission.elements, &mission.sending),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::base::error::{Error, Result};
 use crate::base::time::{Span, Stamp, parse_nanos};
 use crate::base::{budget, file};
 use crate::graph::Elements;
-use crate::mission::activity::Activity;
+use crate::graph::history::Sending;
 use crate::mission::ledger::Phase;
 use crate::mission::phases::{of_spans, phases};
 
@@ -50,11 +50,13 @@ impl Phases {
     }
 }
 
-/// The sources of phases: the activity of the mission, the texts of the topic that tells them, and the phases of an
+/// The sources of phases: the history of the mission, the texts of the topic that tells them, and the phases of an
 /// earlier run.
 pub(super) struct Basis<'a> {
     pub(super) elements: &'a Elements,
-    pub(super) activity: &'a Activity,
+    pub(super) sending: &'a Sending,
+    /// The time of the mission.
+    pub(super) whole: Span,
     pub(super) texts: &'a [(Stamp, String)],
     pub(super) earlier: Vec<Phase>,
 }
@@ -79,7 +81,7 @@ pub(super) fn wanted(reading: &Reading, basis: Basis<'_>) -> Result<Vec<Phase>> 
 impl Basis<'_> {
     fn found(self) -> Vec<Phase> {
         if self.earlier.is_empty() {
-            phases(self.elements, self.activity)
+            phases(self.elements, self.sending, self.whole)
         } else {
             self.earlier
         }
@@ -88,7 +90,7 @@ impl Basis<'_> {
     /// Phases that begin at these times, sorted, under these names. The time before the first of them is a phase under
     /// a name of our own.
     fn at(&self, begins: &[(Stamp, String)]) -> Vec<Phase> {
-        let whole = self.activity.span();
+        let whole = self.whole;
         let begins = begins.iter().filter(|(at, _)| *at < whole.end);
         let begins: Vec<_> = begins.collect();
         let mut starts: Vec<Stamp> = begins
@@ -106,7 +108,7 @@ impl Basis<'_> {
             .zip(ends)
             .map(|(start, end)| Span { start, end })
             .collect();
-        let mut all = of_spans(self.elements, self.activity, &spans);
+        let mut all = of_spans(self.elements, self.sending, whole, &spans);
         let named = all.iter_mut().skip(usize::from(is_led));
         for (phase, (_, name)) in named.zip(begins) {
             phase.name = Arc::from(name.as_str());
@@ -145,7 +147,7 @@ fn from_file(basis: Basis<'_>, text: &str, path: &Path) -> Result<Vec<Phase>> {
             ));
         }
         // What comes before the first phase belongs to it.
-        let start = basis.activity.span().start;
+        let start = basis.whole.start;
         let begins = lines.into_iter().enumerate().map(|(k, (_, (at, name)))| {
             let at = at.filter(|_| k > 0).unwrap_or(0);
             (start.plus(at), name)
@@ -175,7 +177,7 @@ fn line(text: &str) -> CaptionLine {
 /// Phases by captions: `from` is a file if there is one of that name, else a topic of type `std_msgs/String`.
 fn captions(basis: &Basis<'_>, from: &str) -> Result<Vec<Phase>> {
     let path = Path::new(from);
-    let start = basis.activity.span().start;
+    let start = basis.whole.start;
     let mut begins = if path.is_file() {
         let lines = captions_of_file(&file::read_text(path, budget::USER_TEXT)?, path)?;
         let lines = lines.into_iter().map(|(at, text)| (start.plus(at), text));

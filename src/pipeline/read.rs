@@ -20,9 +20,9 @@ use crate::evidence::code::{self, SourceCode};
 use crate::evidence::collector;
 use crate::evidence::conclude::{self, Findings, conclude};
 use crate::graph::diff::RATE_CHANGE;
+use crate::graph::history::Sending;
 use crate::graph::window::{self, Cut, Division, Length, Windows};
-use crate::graph::{History, Windowed, graphs, history};
-use crate::mission::activity::{self, Activity};
+use crate::graph::{History, Windowed, graphs, made};
 use crate::mission::ledger::{self, Ledger};
 use crate::mission::{Mission, Window, read_json};
 
@@ -226,12 +226,13 @@ fn reread(path: &Path, reading: &Reading) -> Result<Mission> {
         );
         return Err(Error::usage(what, "give the bag itself"));
     }
-    if mission.activity.graphs.is_empty() {
-        mission.activity = Activity::of_windows(&mission);
+    if mission.sending.senders.is_empty() {
+        mission.sending = Sending::of_windows(&mission.elements, &mission.graphs);
     }
     let basis = Basis {
         elements: &mission.elements,
-        activity: &mission.activity,
+        sending: &mission.sending,
+        whole: mission.span,
         texts: &[],
         earlier: std::mem::take(&mut mission.ledger.phases),
     };
@@ -259,11 +260,9 @@ fn mission(
     reading: &Reading,
 ) -> Result<Mission> {
     let recorded = &collected.recorded;
-    let history = history(recorded, findings)?;
+    let history = made(recorded, findings)?;
     let graphs = |spans: &[Span], grace| graphs(recorded, findings, &history, spans, grace);
-    // Cells are not windows, in which grace is counted.
-    let activity = activity(&history, collected.range, |spans| graphs(spans, 0))?;
-    let ledger = told(&history, &activity, collected, reading)?;
+    let ledger = told(&history, collected, reading)?;
     let mut windows = divided(reading, collected.range, &ledger)?;
     let period = windows.period;
     let mut windowed = graphs(&windows.spans, reading.grace)?;
@@ -294,7 +293,7 @@ fn mission(
         windows: list,
         graphs: windowed.graphs,
         ledger,
-        activity,
+        sending: history.sending,
         undrawn: findings.undrawn.clone(),
         layout: None,
         notices,
@@ -320,32 +319,18 @@ fn divided(reading: &Reading, span: Span, ledger: &Ledger) -> Result<Windows> {
     Ok(windows)
 }
 
-/// The graphs on the grid of cells, which does not depend on `--period`.
-fn activity(
-    history: &History,
-    span: Span,
-    graphs: impl Fn(&[Span]) -> Result<Windowed>,
-) -> Result<Activity> {
-    let graphs = graphs(&activity::grid(span))?.graphs;
-    Ok(Activity::new(graphs, history.sending.clone()))
-}
-
 /// The ledger: the events of the mission, and its phases.
-fn told(
-    history: &History,
-    activity: &Activity,
-    collected: &Collected,
-    reading: &Reading,
-) -> Result<Ledger> {
+fn told(history: &History, collected: &Collected, reading: &Reading) -> Result<Ledger> {
     let elements = &history.elements;
     let entries = ledger::make(&ledger::LedgerInput {
         elements,
-        lives: &history.lives,
+        history,
         rate_change: reading.rate_change,
     });
     let basis = Basis {
         elements,
-        activity,
+        sending: &history.sending,
+        whole: collected.range,
         texts: &collected.recorded.texts,
         earlier: Vec::new(),
     };

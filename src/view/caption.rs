@@ -178,13 +178,15 @@ impl<'a> Speaker<'a> {
 
     /// The phrase for a headline of an edge: `b now subscribes /t`; `None` for one of a node or topic.
     fn edge(&self, headline: &Headline) -> Option<String> {
-        let (edge, verb) = match headline.what {
-            Element::Publish(id) => (self.elements.publishes.get(id as usize)?, "publishes"),
-            Element::Subscribe(id) => (self.elements.subscribes.get(id as usize)?, "subscribes"),
-            Element::Node(_) | Element::Topic(_) => return None,
+        let (Some(node), Some(topic)) = self.elements.ends(headline.what) else {
+            return None;
         };
-        let node = self.name(Element::Node(edge.node));
-        let topic = self.name(Element::Topic(edge.topic));
+        let verb = match headline.what {
+            Element::Publish(_) => "publishes",
+            _ => "subscribes to",
+        };
+        let node = self.name(Element::Node(node));
+        let topic = self.name(Element::Topic(topic));
         if self.ledger.compares {
             let side = self.verb(headline.kind);
             return Some(format!("{node} {verb} {topic} {side}"));
@@ -202,17 +204,9 @@ impl<'a> Speaker<'a> {
     }
 
     fn whole_name(&self, what: Element) -> Option<&str> {
-        let topic = |id: u32| {
-            self.elements
-                .topics
-                .get(id as usize)
-                .map(|t| t.name.as_str())
-        };
         match what {
             Element::Node(id) => self.node_name(id),
-            Element::Topic(id) => topic(id),
-            Element::Publish(id) => topic(self.elements.publishes.get(id as usize)?.topic),
-            Element::Subscribe(id) => topic(self.elements.subscribes.get(id as usize)?.topic),
+            _ => self.elements.names(what).1,
         }
     }
 
@@ -307,7 +301,7 @@ mod tests {
         );
         assert_eq!(
             caption(&["/a>/t /b", "/a>/t /b</t"]),
-            "/b now subscribes /t"
+            "/b now subscribes to /t"
         );
         assert_eq!(
             caption(&["/a>/t /b>/t", "/a>/t /b"]),

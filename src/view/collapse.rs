@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Item, ItemKind, View, ViewOptions};
 use crate::base::name::namespace;
-use crate::graph::{Edge, Element};
+use crate::graph::Element;
 use crate::mission::Mission;
 
 /// The namespaces to collapse and those to keep open.
@@ -79,12 +79,10 @@ pub struct Collapsible {
 /// The node or topic that each headline is about: an edge's topic.
 pub(crate) fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_ {
     let elements = &mission.elements;
-    let topic = |edge: Option<&Edge>| edge.map(|edge| Element::Topic(edge.topic));
     let entries = mission.ledger.entries.iter().filter(|e| e.is_headline());
-    entries.filter_map(move |entry| match entry.what {
-        Element::Publish(id) => topic(elements.publishes.get(id as usize)),
-        Element::Subscribe(id) => topic(elements.subscribes.get(id as usize)),
-        other => Some(other),
+    entries.map(|entry| match elements.ends(entry.what) {
+        (Some(_), Some(topic)) => Element::Topic(topic),
+        _ => entry.what,
     })
 }
 
@@ -92,11 +90,8 @@ pub(crate) fn headlines(mission: &Mission) -> impl Iterator<Item = Element> + '_
 pub(crate) fn news(mission: &Mission) -> BTreeMap<&str, usize> {
     let (elements, mut news) = (&mission.elements, BTreeMap::new());
     for what in headlines(mission) {
-        let name = match what {
-            Element::Node(id) => elements.nodes.get(id as usize).map(|n| n.name.as_str()),
-            Element::Topic(id) => elements.topics.get(id as usize).map(|t| t.name.as_str()),
-            Element::Publish(_) | Element::Subscribe(_) => None,
-        };
+        let (node, topic) = elements.names(what);
+        let name = node.or(topic);
         *news.entry(name.unwrap_or_default()).or_default() += 1;
     }
     news

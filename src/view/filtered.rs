@@ -4,10 +4,10 @@ use super::items::Viewed;
 use super::state::{shows_node, shows_topic};
 use super::{Mode, ViewOptions};
 use crate::graph::diff::Change;
-use crate::graph::sending::Sending;
+use crate::graph::history::{Sender, Sending};
 use crate::graph::{Edge, EdgeState, Element, Elements, Graph, NodeId};
 use crate::mission::ledger::{Detail, Entry};
-use crate::mission::{Activity, EntryId, Ledger, Mission, Window};
+use crate::mission::{EntryId, Ledger, Mission, Window};
 
 /// The mission without the elements that the view leaves out. Topics in groups and elements inside collapsed namespaces
 /// are seen, so they stay, under their own names; so do changes, as they were found in the whole graph.
@@ -23,7 +23,7 @@ pub(crate) fn filtered(mission: &Mission, options: &ViewOptions) -> Mission {
         windows: windows.map(|w| keep.window(w)).collect(),
         graphs: graphs.collect(),
         ledger,
-        activity: keep.activity(&mission.activity, options, &viewed),
+        sending: keep.sending(&mission.sending),
         ..mission.clone()
     }
 }
@@ -167,16 +167,21 @@ impl Keep {
         }
     }
 
-    fn activity(&self, all: &Activity, options: &ViewOptions, viewed: &Viewed) -> Activity {
-        let cells = all.cells().iter().zip(&all.graphs);
-        let cells = cells.map(|(span, graph)| (*span, self.graph(&graph, options, viewed)));
-        Activity {
-            graphs: cells.collect(),
-            sending: Sending {
-                publishes: kept(&all.sending.publishes, &self.publishes),
-                topics: kept(&all.sending.topics, &self.topics),
-                pauses: kept(&all.sending.pauses, &self.topics),
-            },
+    fn sending(&self, all: &Sending) -> Sending {
+        let senders = all.senders.iter().filter_map(|sender| {
+            let node = sender.node.map(|id| new_id(&self.nodes, id));
+            Some(Sender {
+                topic: new_id(&self.topics, sender.topic)?,
+                // Of a node that is left out the messages stay, and are of an unknown sender.
+                node: node.flatten(),
+                ..sender.clone()
+            })
+        });
+        let mut senders: Vec<Sender> = senders.collect();
+        senders.sort_by_key(|sender| (sender.topic, sender.node));
+        Sending {
+            senders,
+            pauses: kept(&all.pauses, &self.topics),
         }
     }
 

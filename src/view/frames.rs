@@ -216,16 +216,8 @@ impl<'a> ShownWindows<'a> {
 
 /// The presence of each member of each fleet, given the elements alive before and after the window.
 fn rolls(viewed: &Viewed, before: &Alive, after: &Alive, is_first: bool) -> Vec<Vec<Attendance>> {
-    let lives = |alive: &Alive, element: &Element| {
-        let (list, id) = match element {
-            Element::Node(id) => (&alive.nodes, *id),
-            Element::Topic(id) => (&alive.topics, *id),
-            Element::Publish(_) | Element::Subscribe(_) => return false,
-        };
-        list.get(id as usize) == Some(&true)
-    };
     let attendance = |elements: &Vec<Element>| {
-        let is = |alive: &Alive| elements.iter().any(|e| lives(alive, e));
+        let is = |alive: &Alive| elements.iter().any(|e| alive.is(*e));
         match (is(before), is(after)) {
             (false, true) if is_first => Attendance::Here,
             (false, true) => Attendance::Joined,

@@ -301,17 +301,15 @@ impl Viewed {
     /// either.
     pub(crate) fn sees(&self, what: Element) -> bool {
         let is = |reasons: &[Option<_>], id: u32| reasons.get(id as usize) == Some(&None);
-        let both = |edge: Option<&(NodeId, TopicId)>| {
-            edge.is_some_and(|(node, topic)| {
-                is(&self.selection.nodes, *node) && is(&self.selection.topics, *topic)
-            })
+        let (node, topic) = match what {
+            Element::Node(id) => (Some(id), None),
+            Element::Topic(id) => (None, Some(id)),
+            Element::Publish(id) => self.published.get(id as usize).copied().unzip(),
+            Element::Subscribe(id) => self.subscribed.get(id as usize).copied().unzip(),
         };
-        match what {
-            Element::Node(id) => is(&self.selection.nodes, id),
-            Element::Topic(id) => is(&self.selection.topics, id),
-            Element::Publish(id) => both(self.published.get(id as usize)),
-            Element::Subscribe(id) => both(self.subscribed.get(id as usize)),
-        }
+        let is_node = node.is_none_or(|id| is(&self.selection.nodes, id));
+        let is_topic = topic.is_none_or(|id| is(&self.selection.topics, id));
+        (node.is_some() || topic.is_some()) && is_node && is_topic
     }
 
     /// Whether a single arrow carries a topic from its publishers.

@@ -4,7 +4,7 @@
 //! changes its look without an entry that says so.
 
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Edge, Element, Elements};
+use crate::graph::{Edge, Element, Elements, PerElement};
 use crate::mission::Mission;
 use crate::mission::ledger::Kind;
 
@@ -12,64 +12,20 @@ use crate::mission::ledger::Kind;
 pub(crate) struct ItemTurns<'a> {
     elements: &'a Elements,
     /// Per element, the times at which it began (true) and ended (false), sorted.
-    turns: PerElement<(Stamp, bool)>,
+    turns: PerElement<Vec<(Stamp, bool)>>,
     /// Per element, the times in which it was silent or away.
-    pauses: PerElement<Span>,
+    pauses: PerElement<Vec<Span>>,
 }
 
-/// A list per element, by id; most are empty, and all are looked at in many windows.
-struct PerElement<T>([Vec<Vec<T>>; 4]);
-
-impl<T> PerElement<T> {
-    fn new(elements: &Elements) -> Self {
-        fn lists<E, T>(all: &[E]) -> Vec<Vec<T>> {
-            all.iter().map(|_| Vec::new()).collect()
-        }
-        Self([
-            lists(&elements.nodes),
-            lists(&elements.topics),
-            lists(&elements.publishes),
-            lists(&elements.subscribes),
-        ])
-    }
-
-    fn place(what: Element) -> (usize, usize) {
-        match what {
-            Element::Node(id) => (0, id as usize),
-            Element::Topic(id) => (1, id as usize),
-            Element::Publish(id) => (2, id as usize),
-            Element::Subscribe(id) => (3, id as usize),
-        }
-    }
-
-    fn of(&self, what: Element) -> &[T] {
-        let (kind, id) = Self::place(what);
-        self.0[kind].get(id).map_or(&[], Vec::as_slice)
-    }
-
-    fn add(&mut self, what: Element, one: T) {
-        let (kind, id) = Self::place(what);
-        if let Some(list) = self.0[kind].get_mut(id) {
-            list.push(one);
-        }
-    }
-}
-
-/// Whether each element lives, per id.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Alive {
-    pub(crate) nodes: Vec<bool>,
-    pub(crate) topics: Vec<bool>,
-    pub(crate) publishes: Vec<bool>,
-    pub(crate) subscribes: Vec<bool>,
-}
+/// Whether each element lives.
+pub(crate) type Alive = PerElement<bool>;
 
 impl<'a> ItemTurns<'a> {
     pub(crate) fn new(mission: &'a Mission) -> Self {
         let mut lives = Self {
             elements: &mission.elements,
-            turns: PerElement::new(&mission.elements),
-            pauses: PerElement::new(&mission.elements),
+            turns: PerElement::new(&mission.elements, |_| Vec::new()),
+            pauses: PerElement::new(&mission.elements, |_| Vec::new()),
         };
         let entries = &mission.ledger.entries;
         for entry in entries {
@@ -85,15 +41,19 @@ impl<'a> ItemTurns<'a> {
                 Kind::Stopped | Kind::Vanished => false,
                 Kind::Restarted | Kind::Silent => {
                     let (start, end) = (entry.time, entry.until.unwrap_or(entry.time));
-                    lives.pauses.add(entry.what, Span { start, end });
+                    if let Some(pauses) = lives.pauses.of_mut(entry.what) {
+                        pauses.push(Span { start, end });
+                    }
                     continue;
                 }
                 _ => continue,
             };
             let turn = (whole.unwrap_or(entry).time, begins);
-            lives.turns.add(entry.what, turn);
+            if let Some(turns) = lives.turns.of_mut(entry.what) {
+                turns.push(turn);
+            }
         }
-        for turns in lives.turns.0.iter_mut().flatten() {
+        for turns in lives.turns.values_mut() {
             turns.sort_by_key(|turn| turn.0);
         }
         lives
@@ -116,89 +76,67 @@ impl<'a> ItemTurns<'a> {
     /// Elements that are silent or away all through a window. A publication pauses with its node, a topic with all of
     /// its publications, a subscription with its topic.
     pub(crate) fn paused(&self, span: Span, alive: &Alive) -> Alive {
-        let own = |element| {
+        let own = |what| {
             let covers = |pause: &Span| pause.start <= span.start && span.end <= pause.end;
-            self.pauses.of(element).iter().any(covers)
+            self.pauses
+                .of(what)
+                .is_some_and(|pauses| pauses.iter().any(covers))
         };
-        let mut paused = Alive {
-            nodes: ids(&self.elements.nodes)
-                .map(|id| own(Element::Node(id)))
-                .collect(),
-            topics: ids(&self.elements.topics)
-                .map(|id| own(Element::Topic(id)))
-                .collect(),
-            publishes: Vec::new(),
-            subscribes: Vec::new(),
-        };
-        let node = |edge: &Edge| paused.nodes.get(edge.node as usize) == Some(&true);
-        let edges = self.elements.publishes.iter().zip(0..);
-        paused.publishes = edges
-            .map(|(edge, id)| own(Element::Publish(id)) || node(edge))
-            .collect();
         let mut sent: Vec<Option<bool>> = vec![None; self.elements.topics.len()];
-        let states = alive.publishes.iter().zip(&paused.publishes);
-        for (edge, (_, is_paused)) in self
-            .elements
-            .publishes
-            .iter()
-            .zip(states)
-            .filter(|s| *s.1.0)
-        {
-            if let Some(all) = sent.get_mut(edge.topic as usize) {
-                *all = Some(all.unwrap_or(true) && *is_paused);
+        for (what, edge) in edges(&self.elements.publishes, Element::Publish) {
+            if alive.is(what)
+                && let Some(all) = sent.get_mut(edge.topic as usize)
+            {
+                let is_paused = own(what) || own(Element::Node(edge.node));
+                *all = Some(all.unwrap_or(true) && is_paused);
             }
         }
-        for (slot, all) in paused.topics.iter_mut().zip(sent) {
-            *slot |= all == Some(true);
-        }
-        let topic = |edge: &Edge| paused.topics.get(edge.topic as usize) == Some(&true);
-        paused.subscribes = self.elements.subscribes.iter().map(topic).collect();
-        paused
+        let topic = |id: u32| own(Element::Topic(id)) || sent.get(id as usize) == Some(&Some(true));
+        PerElement::new(self.elements, |what| {
+            match (what, self.elements.ends(what)) {
+                (Element::Topic(_) | Element::Subscribe(_), (_, Some(id))) => topic(id),
+                (_, (Some(node), _)) => own(what) || own(Element::Node(node)),
+                _ => false,
+            }
+        })
     }
 
-    /// `own` tells whether an element lives by its own beginnings and ends. An edge lives with its node; a topic that
-    /// nothing tells of lives with its edges.
+    /// `own` says whether an element lives by its own beginnings and ends. An edge lives with its node; a topic without
+    /// turns of its own lives with its edges.
     fn alive(&self, own: impl Fn(&[(Stamp, bool)]) -> bool) -> Alive {
-        let own = |element| {
-            let turns = self.turns.of(element);
-            (!turns.is_empty()).then(|| own(turns))
+        let own = |what| {
+            let turns = self.turns.of(what).filter(|turns| !turns.is_empty())?;
+            Some(own(turns))
         };
-        let nodes: Vec<bool> = ids(&self.elements.nodes)
-            .map(|id| own(Element::Node(id)) != Some(false))
-            .collect();
-        let topics: Vec<Option<bool>> = ids(&self.elements.topics)
-            .map(|id| own(Element::Topic(id)))
-            .collect();
-        let edge = |edge: &Edge, element| {
-            own(element) != Some(false)
-                && nodes.get(edge.node as usize) == Some(&true)
-                && topics.get(edge.topic as usize) != Some(&Some(false))
-        };
-        let publishes = self.elements.publishes.iter().zip(0..);
-        let publishes: Vec<bool> = publishes
-            .map(|(e, id)| edge(e, Element::Publish(id)))
-            .collect();
-        let subscribes = self.elements.subscribes.iter().zip(0..);
-        let subscribes: Vec<bool> = subscribes
-            .map(|(e, id)| edge(e, Element::Subscribe(id)))
-            .collect();
-        let mut carried: Vec<Option<bool>> = vec![None; topics.len()];
-        let all = self.elements.publishes.iter().zip(&publishes);
-        for (edge, lives) in all.chain(self.elements.subscribes.iter().zip(&subscribes)) {
+        let mut alive = PerElement::new(self.elements, |what| {
+            let is = |what| own(what) != Some(false);
+            match self.elements.ends(what) {
+                (Some(node), Some(topic)) => {
+                    is(what) && is(Element::Node(node)) && is(Element::Topic(topic))
+                }
+                _ => is(what),
+            }
+        });
+        let mut carried: Vec<Option<bool>> = vec![None; self.elements.topics.len()];
+        let publishes = edges(&self.elements.publishes, Element::Publish);
+        for (what, edge) in publishes.chain(edges(&self.elements.subscribes, Element::Subscribe)) {
             if let Some(carried) = carried.get_mut(edge.topic as usize) {
-                *carried = Some(carried.unwrap_or(false) || *lives);
+                *carried = Some(carried.unwrap_or(false) || alive.is(what));
             }
         }
-        let topics = topics.into_iter().zip(carried);
-        Alive {
-            topics: topics
-                .map(|(own, carried)| own.or(carried).unwrap_or(true))
-                .collect(),
-            nodes,
-            publishes,
-            subscribes,
+        for (id, carried) in (0..).zip(carried) {
+            let topic = Element::Topic(id);
+            if let (None, Some(carried), Some(is)) = (own(topic), carried, alive.of_mut(topic)) {
+                *is = carried;
+            }
         }
+        alive
     }
+}
+
+/// Edges with their elements.
+fn edges(all: &[Edge], kind: fn(u32) -> Element) -> impl Iterator<Item = (Element, &Edge)> {
+    (0..).map(kind).zip(all)
 }
 
 /// Whether an element lives after the first `done` of its turns: before the first one, if that is not a beginning.
@@ -207,8 +145,4 @@ fn lives_at(turns: &[(Stamp, bool)], done: usize) -> bool {
         Some((_, begins)) => *begins,
         None => turns.first().is_none_or(|(_, begins)| !begins),
     }
-}
-
-fn ids<T>(all: &[T]) -> impl Iterator<Item = u32> {
-    (0..).take(all.len())
 }

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use super::names::{is_debug, is_params, is_quiet, is_tf};
 use super::options::{Mode, ViewOptions};
 use crate::graph::{Elements, Topic};
-use crate::mission::activity::records;
 
 /// The reason for leaving a node or topic out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,7 +46,7 @@ pub(crate) fn select(elements: &Elements, options: &ViewOptions) -> Selection {
     let recorders: Vec<bool> = elements
         .nodes
         .iter()
-        .map(|n| hide_recorder && records(n))
+        .map(|n| hide_recorder && n.records())
         .collect();
     let nodes: Vec<Option<Reason>> = elements
         .nodes

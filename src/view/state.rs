@@ -7,7 +7,7 @@ use super::lives::Alive;
 use super::{Arrow, ArrowKind, Item, ItemKind, Mode, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
-use crate::graph::{Element, Elements, Row, State};
+use crate::graph::{Element, PerElement, Row, State};
 use crate::mission::Mission;
 
 /// Takes in an element of an item or arrow: the liveliest state and the strongest degree count, rates and counts are
@@ -66,18 +66,15 @@ pub(crate) struct LivingItems {
 impl LivingItems {
     pub(crate) fn of(viewed: &Viewed, alive: &Alive) -> Self {
         let is = |list: &[bool], id: u32| list.get(id as usize) == Some(&true);
-        let lives = |element: &Element| match element {
-            Element::Node(id) => is(&alive.nodes, *id),
-            Element::Topic(id) => is(&alive.topics, *id),
-            Element::Publish(id) => is(&alive.publishes, *id),
-            Element::Subscribe(id) => is(&alive.subscribes, *id),
-        };
+        let lives = |element: &Element| alive.is(*element);
         let items = viewed
             .items
             .iter()
             .map(|item| item.members.iter().any(lives));
         let items: Vec<bool> = items.collect();
-        let pair = |(p, s): &(u32, u32)| is(&alive.publishes, *p) && is(&alive.subscribes, *s);
+        let pair = |(p, s): &(u32, u32)| {
+            alive.is(Element::Publish(*p)) && alive.is(Element::Subscribe(*s))
+        };
         let arrow = |(at, arrow): (usize, &super::Arrow)| {
             let members = || arrow.members.iter().any(lives);
             let itself = viewed
@@ -117,34 +114,8 @@ pub(crate) struct Now<'a> {
     span: Span,
     /// The elements that live in it, and those that pause.
     lives: (Alive, Alive),
-    /// The row of the graph for each element that is in it, by kind and id.
-    rows: ElementRows,
-}
-
-/// A row per node, topic, publication and subscription that is there.
-struct ElementRows([Vec<Option<Row>>; 4]);
-
-impl ElementRows {
-    fn new(all: &Elements) -> Self {
-        Self([
-            vec![None; all.nodes.len()],
-            vec![None; all.topics.len()],
-            vec![None; all.publishes.len()],
-            vec![None; all.subscribes.len()],
-        ])
-    }
-
-    fn set(&mut self, what: Element, row: Option<Row>) {
-        let (kind, id) = match what {
-            Element::Node(id) => (0, id),
-            Element::Topic(id) => (1, id),
-            Element::Publish(id) => (2, id),
-            Element::Subscribe(id) => (3, id),
-        };
-        if let Some(slot) = self.0[kind].get_mut(id as usize) {
-            *slot = row;
-        }
-    }
+    /// The row of the graph for each element that is in it, by element.
+    rows: PerElement<Option<Row>>,
 }
 
 impl<'a> Now<'a> {
@@ -159,13 +130,15 @@ impl<'a> Now<'a> {
                 end: Stamp(0),
             },
             lives: (Alive::default(), Alive::default()),
-            rows: ElementRows::new(&mission.elements),
+            rows: PerElement::new(&mission.elements, |_| None),
         }
     }
 
     /// Sets the row of the graph for an element from now on; `None` where it has none.
     pub(crate) fn hear(&mut self, what: Element, row: Option<Row>) {
-        self.rows.set(what, row);
+        if let Some(slot) = self.rows.of_mut(what) {
+            *slot = row;
+        }
     }
 
     /// Sets the elements that live and pause from this window on.
@@ -179,18 +152,17 @@ impl<'a> Now<'a> {
     }
 
     /// The state of an element, `None` if it does not live; [`One::UNHEARD`] where it lives but was not heard.
-    fn one(&self, kind: usize, id: u32, lists: [&[bool]; 2]) -> Option<One> {
-        let at = id as usize;
-        let [alive, paused] = lists.map(|list| list.get(at) == Some(&true));
-        let row = || self.rows.0[kind].get(at)?.as_ref();
+    fn one(&self, what: Element) -> Option<One> {
+        let (alive, paused) = &self.lives;
         let heard = |row: &Row| One {
             hz: row.hz(self.span),
             count: row.count,
             ..One::new(row.state, row.degree)
         };
-        alive.then(|| {
-            let mut one = row().map_or(One::UNHEARD, heard);
-            if paused {
+        alive.is(what).then(|| {
+            let row = self.rows.of(what).and_then(Option::as_ref);
+            let mut one = row.map_or(One::UNHEARD, heard);
+            if paused.is(what) {
                 one.is_paused = true;
                 one.state = one.state.max(State::Silent);
             }
@@ -199,25 +171,9 @@ impl<'a> Now<'a> {
     }
 
     fn node(&self, id: u32) -> Option<One> {
-        let (alive, paused) = &self.lives;
         // What a node counts are the messages of its topics.
-        let one = self.one(0, id, [&alive.nodes, &paused.nodes])?;
+        let one = self.one(Element::Node(id))?;
         Some(One { count: None, ..one })
-    }
-
-    fn topic(&self, id: u32) -> Option<One> {
-        let (alive, paused) = &self.lives;
-        self.one(1, id, [&alive.topics, &paused.topics])
-    }
-
-    fn publish(&self, id: u32) -> Option<One> {
-        let (alive, paused) = &self.lives;
-        self.one(2, id, [&alive.publishes, &paused.publishes])
-    }
-
-    fn subscribe(&self, id: u32) -> Option<One> {
-        let (alive, paused) = &self.lives;
-        self.one(3, id, [&alive.subscribes, &paused.subscribes])
     }
 
     /// The look of an item; `None` where nothing of it lives. Ghosts are not among them.
@@ -230,7 +186,7 @@ impl<'a> Now<'a> {
                     .node(*node)
                     .filter(|one| shows_node(one.state, self.options)),
                 Element::Topic(topic) => self
-                    .topic(*topic)
+                    .one(Element::Topic(*topic))
                     .filter(|one| shows_topic(one.state, self.options))
                     // The nodes inside a collapsed namespace count what they publish already.
                     .map(|one| One {
@@ -245,7 +201,7 @@ impl<'a> Now<'a> {
         }
         let mut shown = slot?;
         if let ([Element::Node(node)], true) = (&item.members[..], is_single(self.viewed, id)) {
-            let row = self.rows.0[0].get(*node as usize).and_then(Option::as_ref);
+            let row = self.rows.of(Element::Node(*node)).and_then(Option::as_ref);
             shown.lifecycle = row.and_then(|row| self.mission.graphs.lifecycle_word(row));
         }
         if !item.is_replica {
@@ -269,11 +225,11 @@ impl<'a> Now<'a> {
         let shows = |one: &One| shows_topic(one.state, self.options);
         for member in &arrow.members {
             let one = match member {
-                Element::Publish(edge) => self.publish(*edge).filter(shows),
+                Element::Publish(edge) => self.one(Element::Publish(*edge)).filter(shows),
                 Element::Subscribe(edge) => {
                     let ends = self.viewed.subscribed.get(*edge as usize);
-                    let topic = ends.and_then(|(_, topic)| self.topic(*topic));
-                    self.subscribe(*edge)
+                    let topic = ends.and_then(|(_, topic)| self.one(Element::Topic(*topic)));
+                    self.one(Element::Subscribe(*edge))
                         .filter(|_| topic.as_ref().is_some_and(shows))
                 }
                 Element::Node(_) | Element::Topic(_) => None,
@@ -292,7 +248,10 @@ impl<'a> Now<'a> {
         let is_bundle = arrow.kind == ArrowKind::Bundle;
         let (mut last, mut carried) = (None, BTreeSet::new());
         for (publish, subscribe) in self.viewed.pairs.get(id as usize)? {
-            let (Some(p), Some(s)) = (self.publish(*publish), self.subscribe(*subscribe)) else {
+            let (Some(p), Some(s)) = (
+                self.one(Element::Publish(*publish)),
+                self.one(Element::Subscribe(*subscribe)),
+            ) else {
                 continue;
             };
             // What several nodes of a box hear comes once.
@@ -303,7 +262,7 @@ impl<'a> Now<'a> {
             let is_new = topic.is_some_and(|topic| carried.insert(topic));
             // The rate of the whole topic counts once, however many publish it.
             let topic = topic.filter(|_| is_new || !is_bundle);
-            let topic = topic.and_then(|topic| self.topic(topic));
+            let topic = topic.and_then(|topic| self.one(Element::Topic(topic)));
             let joined = One {
                 state: p.state.max(s.state),
                 degree: p.degree.max(s.degree),

@@ -45,7 +45,7 @@ pub(crate) fn mission(windows: &[&str]) -> Mission {
         windows,
         graphs,
         ledger: crate::mission::Ledger::default(),
-        activity: crate::mission::Activity::default(),
+        sending: crate::graph::history::Sending::default(),
         layout: None,
         notices: Notices::new(),
     };

@@ -229,7 +229,7 @@ def compare_telling(b, evolution):
     b.keys(HOME)
     for w, own in enumerate(headlines(evolution)):
         entries, numbers, listed = b.js("""const chips = document.getElementById('chips');
-            return [+chips.dataset.entries, [...chips.children].map(c => c.textContent), document.querySelectorAll('#news button').length]""")
+            return [chips.dataset.entries.split(' ').filter(Boolean).length, [...chips.children].map(c => c.textContent), document.querySelectorAll('#news button').length]""")
         assert entries == listed == len(own), (w, entries, listed, own)
         assert sum(int(n) for n in re.findall(r"\d+", " ".join(numbers))) == len(own), (w, numbers)
         for e in own[:1]:
@@ -281,7 +281,7 @@ def compare_windows(b, evolution, data):
         moved = {k for k in old.keys() & new.keys() if abs(new[k] - old[k]) > 0.25 * (old[k] or new[k])}
         differs = (old.keys() ^ new.keys()) | moved
         shown = b.js("""const more = document.querySelector('#news .more'); more?.click();
-            return [+document.getElementById('chips').dataset.entries, document.querySelectorAll('#news button').length]""")
+            return [document.getElementById('chips').dataset.entries.split(' ').filter(Boolean).length, document.querySelectorAll('#news button').length]""")
         assert shown == [len(differs), len(differs)], (before, after, shown, len(differs))
         drawn = b.js("return document.querySelectorAll('#graph .items > :is(.added, .removed, .changed), #graph .arrows > :is(.added, .removed, .changed)').length")
         assert drawn == len(differs), (drawn, len(differs))

@@ -1,9 +1,11 @@
 //! The canvas that figures are drawn on: lengths in millimetres, four kinds of type, one palette; it becomes a scene.
 
 use crate::base::geometry::{Point, Rect, Size};
+use crate::base::words::visible;
 use crate::draw::scene::{Anchor, Form, Group, Scene, Shape, Step, Stroke, Text};
 use crate::draw::style::Color;
 use crate::draw::text::{Fonts, Weight};
+use crate::mission::EntryId;
 
 /// No line of a page has room for a text of more characters than this; what is behind them is not measured.
 const LONGEST: usize = 1000;
@@ -100,6 +102,38 @@ impl<'a> PaperCanvas<'a> {
     /// Begins a group, which holds everything drawn next.
     pub(crate) fn begin(&mut self, id: &str) {
         self.groups.push(Group::named(id));
+    }
+
+    /// Begins the group of a mark: its class, and the events of the log that it stands for. The log's sentence about them
+    /// is its title.
+    pub(crate) fn begin_mark(&mut self, class: &str, entries: &[EntryId], title: String) {
+        let mut group = Group::named(&format!("{class}-{}", self.groups.len()));
+        class.clone_into(&mut group.class);
+        group.data = entry_data(entries);
+        group.title = title;
+        self.groups.push(group);
+    }
+
+    /// Begins the group of a box: the names of its members, and the events of the log about them.
+    pub(crate) fn begin_box<'n>(
+        &mut self,
+        names: impl Iterator<Item = &'n str>,
+        entries: &[EntryId],
+    ) {
+        let mut group = Group::named(&format!("node-{}", self.groups.len()));
+        "node".clone_into(&mut group.class);
+        let names: Vec<String> = names.map(|name| visible(name).into_owned()).collect();
+        group.data = vec![("name", names.join(" "))];
+        group.data.extend(entry_data(entries));
+        self.groups.push(group);
+    }
+
+    /// Begins the group of a step: its number, counted from 1, and the events of the log in it.
+    pub(crate) fn begin_step(&mut self, number: usize, entries: &[EntryId]) {
+        let mut group = Group::named(&format!("step-{number}"));
+        group.data = vec![("step", number.to_string())];
+        group.data.extend(entry_data(entries));
+        self.groups.push(group);
     }
 
     fn group(&mut self) -> Option<&mut Group> {
@@ -273,6 +307,19 @@ impl<'a> PaperCanvas<'a> {
             background: ink::PAPER,
             title,
             groups: self.into_groups(),
+        }
+    }
+}
+
+/// The attribute of a mark that names the events of the log it stands for: `data-entry` for one, `data-entries` for
+/// several.
+pub(crate) fn entry_data(entries: &[EntryId]) -> Vec<(&'static str, String)> {
+    match entries {
+        [] => Vec::new(),
+        [one] => vec![("entry", one.to_string())],
+        all => {
+            let all: Vec<String> = all.iter().map(ToString::to_string).collect();
+            vec![("entries", all.join(" "))]
         }
     }
 }

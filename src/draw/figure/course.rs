@@ -3,11 +3,12 @@
 
 use super::groups;
 use super::lives::LivesFigure;
+use super::marks::{Handover, RowMark};
 use super::rows::FigureRow;
 use super::source::FigureSource;
 use super::tracks::{SendingBar, TrackLife};
-use crate::base::time::{Span, Stamp};
-use crate::graph::{Element, NodeId};
+use crate::base::time::Span;
+use crate::graph::Element;
 
 /// The life lines of a mission, in rows from top to bottom, and its phases.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,8 +16,10 @@ pub struct Course {
     /// The phases, none if there is only one.
     pub(crate) phases: Vec<Span>,
     pub(crate) rows: Vec<CourseRow>,
-    /// Topics that others send from a moment on: the rows of the one before and the one after.
-    pub(crate) handovers: Vec<(Stamp, usize, usize)>,
+    /// Ticks, crosses and small circles, on rows.
+    pub(crate) marks: Vec<RowMark>,
+    /// Topics that others send from a moment on, from row to row.
+    pub(crate) handovers: Vec<Handover>,
 }
 
 /// A row of a course: a node, a topic, some of them that come and go together, or all that live throughout.
@@ -31,12 +34,6 @@ impl Course {
     /// topics where publishers are unknown. From the lives of [`of_all`].
     pub(crate) fn new(lives: &LivesFigure<'_>, most: usize) -> Self {
         let source = lives.source;
-        // By nodes, for a group has another name.
-        let node = |at: usize| lives.tracks.get(at)?.nodes.first().copied();
-        let handed = lives.handovers.iter();
-        let handed: Vec<(Stamp, NodeId, NodeId)> = handed
-            .filter_map(|h| Some((h.at, node(h.from)?, node(h.to)?)))
-            .collect();
         let is_grouped = rows(lives).len() > most && source.knows_publishers();
         let grouped = is_grouped.then(|| {
             let tracks = groups::tracks(source, &lives.tracks, usize::MAX);
@@ -45,22 +42,31 @@ impl Course {
         let lives = grouped.as_ref().unwrap_or(lives);
         let mut chosen = rows(lives);
         if chosen.len() > most {
-            let changes = |row: &CourseRow| row.lives.iter().filter(|l| l.begins || l.ends).count();
+            let signs = &lives.marks.signs;
+            let changes = |tracks: &[usize]| {
+                let own = signs.iter().filter(|s| tracks.contains(&s.track));
+                own.count()
+            };
             let mut order: Vec<usize> = (0..chosen.len()).collect();
-            order.sort_by_key(|at| (std::cmp::Reverse(changes(&chosen[*at].1)), *at));
+            order.sort_by_cached_key(|at| (std::cmp::Reverse(changes(&chosen[*at].0)), *at));
             let kept = &order[..most];
             let mut at = 0..;
             chosen.retain(|_| at.next().is_some_and(|at| kept.contains(&at)));
         }
-        let holds =
-            |all: &[usize], node| all.iter().any(|at| lives.tracks[*at].nodes.contains(&node));
-        let place = |node| chosen.iter().position(|(all, _)| holds(all, node));
+        let place = |track| chosen.iter().position(|(all, _)| all.contains(&track));
         Self {
             phases: source.phases.iter().map(|p| p.span).collect(),
-            handovers: handed
-                .into_iter()
-                .filter_map(|(at, from, to)| Some((at, place(from)?, place(to)?)))
-                .filter(|(_, from, to)| from != to)
+            marks: lives
+                .marks
+                .signs
+                .iter()
+                .filter_map(|m| m.on(place))
+                .collect(),
+            handovers: lives
+                .marks
+                .handovers
+                .iter()
+                .filter_map(|h| h.on(place))
                 .collect(),
             rows: chosen.into_iter().map(|(_, row)| row).collect(),
         }
@@ -95,8 +101,10 @@ fn rows(lives: &LivesFigure<'_>) -> Vec<(Vec<usize>, CourseRow)> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LifeLines {
     pub(crate) rows: Vec<LifeLine>,
-    /// Topics that others send from a moment on: the rows of the one before and the one after.
-    pub(crate) handovers: Vec<(Stamp, usize, usize)>,
+    /// Ticks, crosses and small circles, on rows.
+    pub(crate) marks: Vec<RowMark>,
+    /// Topics that others send from a moment on, from row to row.
+    pub(crate) handovers: Vec<Handover>,
 }
 
 /// A row of the life lines: a node, a topic, or the title of the namespace of those that follow.
@@ -114,13 +122,17 @@ pub(crate) struct LifeLine {
 impl LifeLines {
     /// The rows of nodes; of topics where publishers are unknown. From the lives of [`of_all`].
     pub(crate) fn new(lives: LivesFigure<'_>) -> Self {
-        let handed = lives.handovers.clone();
+        let handovers = lives.marks.handovers.clone();
         let lives = lives.opened();
         let place = |track| lives.rows.iter().position(|row| row.holds(track));
-        let handed = handed.iter();
-        let handed = handed.filter_map(|h| Some((h.at, place(h.from)?, place(h.to)?)));
+        let signs = lives.marks.signs.iter();
+        let is_hand = |m: &&RowMark| handovers.iter().any(|h| h.entry == m.entry);
         Self {
-            handovers: handed.collect(),
+            marks: signs
+                .filter(|m| !is_hand(m))
+                .filter_map(|m| m.on(place))
+                .collect(),
+            handovers: handovers.iter().filter_map(|h| h.on(place)).collect(),
             rows: lives.rows.iter().filter_map(|r| line(&lives, r)).collect(),
         }
     }

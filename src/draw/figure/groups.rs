@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::incidents::configurations;
-use super::source::{FigureSource, merged};
+use super::source::FigureSource;
 use super::tracks::{SendingBar, Track, TrackLife};
 use crate::base::name::{last_part, namespace};
 use crate::base::time::Span;
+use crate::mission::phases::configurations;
 
 /// Some nodes that are drawn as one.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +22,7 @@ pub(crate) struct NodeGroup {
 
 /// The phases that each of these roles lives in: those whose configuration holds it, else the one it is first seen in.
 pub(crate) fn phases_of(source: &FigureSource<'_>, tracks: &[Track]) -> Vec<BTreeSet<usize>> {
-    let found = configurations(source);
+    let found = configurations(source.mission, source.phases);
     let of = |track: &Track| {
         let inside = (0..found.len()).filter(|k| found[*k].names.contains(&track.name));
         let mut inside: BTreeSet<usize> = inside.collect();
@@ -85,12 +85,6 @@ fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Track]) -> T
     let whole = source.span();
     let life = |span: Span| TrackLife {
         span,
-        begins: members().any(|t| {
-            t.lives
-                .iter()
-                .any(|l| l.begins && l.span.start == span.start)
-        }),
-        ends: members().any(|t| t.lives.iter().any(|l| l.ends && l.span.end == span.end)),
         is_inferred: false,
     };
     let sends = members().flat_map(|t| &t.bars).map(|b| b.span).collect();
@@ -105,8 +99,8 @@ fn together(source: &FigureSource<'_>, group: &NodeGroup, tracks: &[Track]) -> T
         name: Arc::from(name),
         nodes: members().flat_map(|t| &t.nodes).copied().collect(),
         topic: None,
-        lives: merged(lives, 0).into_iter().map(life).collect(),
-        bars: merged(sends, whole.nanos() / 83)
+        lives: Span::joined(lives, 0).into_iter().map(life).collect(),
+        bars: Span::joined(sends, whole.nanos() / 83)
             .into_iter()
             .map(bar)
             .collect(),

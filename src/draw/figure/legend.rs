@@ -1,9 +1,11 @@
 //! The legend of a figure of lives, with only the signs that are drawn.
 
 use super::canvas::{PaperCanvas, Type, ink};
-use super::lives::{LivesFigure, cross, start};
+use super::lives::LivesFigure;
+use super::marks::Sign;
 use super::notes::{InlineSign, TextRun, Unbroken};
 use super::rows::FigureRow;
+use super::signs::{cross, dot, start};
 use crate::base::geometry::{Point, Rect};
 use crate::draw::scene::Stroke;
 
@@ -23,7 +25,8 @@ pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
         let alive: i64 = t.lives.iter().map(|l| l.span.nanos()).sum();
         alive - busy > alive / 50
     });
-    let all: [(bool, InlineSign, &str); 6] = [
+    let has = |sign| lives.marks.signs.iter().any(|m| m.sign == sign);
+    let all: [(bool, InlineSign, &str); 7] = [
         (
             open.iter().any(|t| !t.bars.is_empty()),
             (3.2, bar),
@@ -35,13 +38,14 @@ pub(crate) fn items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
             (3.2, dashed),
             "alive by inference",
         ),
-        (all_lives().any(|l| l.begins), (0.6, tick), "starts"),
-        (all_lives().any(|l| l.ends), (1.2, end), "ends"),
+        (has(Sign::Start), (0.6, tick), "starts"),
+        (has(Sign::End), (1.2, end), "ends"),
         (
-            !lives.handovers.is_empty(),
+            !lives.marks.handovers.is_empty(),
             (3.2, arrow),
             "topic changes hands",
         ),
+        (has(Sign::Dot), (1.0, circle), "changes otherwise"),
     ];
     let drawn = all.into_iter().filter(|(is, ..)| *is);
     let item = |(_, sign, words): (bool, InlineSign, &str)| {
@@ -76,6 +80,10 @@ fn tick(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
 
 fn end(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
     cross(canvas, x + 0.6, y);
+}
+
+fn circle(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
+    dot(canvas, x + 0.5, y);
 }
 
 fn arrow(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {

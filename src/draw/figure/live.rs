@@ -8,7 +8,7 @@ use crate::base::name::last_part;
 use crate::base::time::Stamp;
 
 impl LivesFigure<'_> {
-    /// The same with a row for everything, nothing folded, nothing lettered and nothing handed over.
+    /// The same with a row for everything, nothing folded, and without letters and arrows.
     pub(crate) fn opened(mut self) -> Self {
         let tracks = &self.tracks;
         let open = |row: FigureRow| match row {
@@ -29,8 +29,7 @@ impl LivesFigure<'_> {
 
     /// The same without letters and arrows.
     pub(crate) fn plain(mut self) -> Self {
-        self.incidents.clear();
-        self.handovers.clear();
+        self.marks = self.marks.plain();
         self
     }
 

@@ -8,23 +8,20 @@
 
 use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
-use super::incidents::{Handover, Incident, handovers, incidents, relative};
+use super::marks::{Marks, Sign, relative};
 use super::rows::{FigureRow, folded_label, rows};
+use super::signs::{cross, dot, put_letter, start};
 use super::source::FigureSource;
-use super::tracks::{SendingBar, Track, TrackLife, of_nodes, of_topics};
+use super::tracks::{SendingBar, Steps, Track, TrackLife, mean, of_nodes, of_topics};
 use crate::base::geometry::{Point, Rect};
-use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
+use crate::mission::EntryId;
+use crate::mission::events::sentence;
 
 /// Lengths in pitches of 2.75 mm, as fractions of the pitch.
 const BAR: (f64, f64) = (0.45 / 2.75, 1.6 / 2.75);
-const TICK: (f64, f64) = (0.4, 2.24 / 2.75);
-const CROSS: f64 = 0.5;
-const LETTER: f64 = 1.08;
-/// The least distance between letters and arrows in millimetres.
-const APART: f64 = 2.3;
 /// The least width of a figure with a column of the topics that each row sends and receives, and the width of that
 /// column; in millimetres.
 pub(crate) const WIDE: (f64, f64) = (150.0, 68.0);
@@ -34,10 +31,7 @@ pub(crate) struct LivesFigure<'a> {
     pub(crate) source: &'a FigureSource<'a>,
     pub(crate) tracks: Vec<Track>,
     pub(crate) rows: Vec<FigureRow>,
-    pub(crate) incidents: Vec<Incident>,
-    /// The number of smaller ones without a letter or arrow.
-    pub(crate) unmarked: usize,
-    pub(crate) handovers: Vec<Handover>,
+    pub(crate) marks: Marks,
 }
 
 /// The places of the rows of a figure, in millimetres.
@@ -70,17 +64,13 @@ impl<'a> LivesFigure<'a> {
 
     /// The lives of these rows.
     pub(crate) fn of(source: &'a FigureSource<'a>, tracks: Vec<Track>) -> Self {
-        let (incidents, mut unmarked) = incidents(source, &tracks);
-        let (handovers, more) = handovers(source, &tracks);
-        unmarked += more;
-        let rows = rows(&tracks, source.span(), &incidents, &handovers);
+        let marks = Marks::new(source, &tracks);
+        let rows = rows(&tracks, source.span(), &marks);
         Self {
             source,
             tracks,
             rows,
-            incidents,
-            unmarked,
-            handovers,
+            marks,
         }
     }
 
@@ -132,18 +122,25 @@ impl<'a> LivesFigure<'a> {
             let y = top + (k as f64 + 0.5) * pitch;
             self.row(canvas, place, y, row);
         }
-        canvas.begin("handovers");
         let y_of = |track: usize| {
             let at = self.rows.iter().position(|r| r.holds(track))?;
             Some(top + (at as f64 + 0.5) * pitch)
         };
+        self.signs(canvas, place, y_of);
         let mut taken = self.arrows(canvas, place, y_of);
-        canvas.begin("incidents");
-        for (k, incident) in self.incidents.iter().enumerate() {
-            if let Some(y) = y_of(incident.track) {
-                let ends = self.tracks[incident.track].lives.iter().filter(|l| l.ends);
-                taken.extend(ends.map(|l| (place.axis.x(l.span.end), y, y)));
-                letter(canvas, place, (incident.at, y), k, &mut taken);
+        for sign in self.marks.signs.iter().filter(|s| s.sign == Sign::End) {
+            if let Some(y) = y_of(sign.track) {
+                taken.push((place.axis.x(sign.at), y, y));
+            }
+        }
+        for (k, letter) in self.marks.letters.iter().enumerate() {
+            if let Some(y) = y_of(letter.mark.track) {
+                canvas.begin_mark(
+                    "letter",
+                    &[letter.mark.entry],
+                    self.sentence(letter.mark.entry),
+                );
+                put_letter(canvas, place, (letter.mark.at, y), k, &mut taken);
             }
         }
         canvas.begin("axis");
@@ -252,6 +249,37 @@ impl<'a> LivesFigure<'a> {
         }
     }
 
+    /// What the log says of an event.
+    fn sentence(&self, entry: EntryId) -> String {
+        let mission = self.source.mission;
+        let event = mission.ledger.entries.get(entry as usize);
+        event.map_or_else(String::new, |event| sentence(mission, entry, event))
+    }
+
+    /// Draws the ticks, the crosses and the small circles.
+    fn signs(
+        &self,
+        canvas: &mut PaperCanvas<'_>,
+        place: &RowPlace,
+        y_of: impl Fn(usize) -> Option<f64>,
+    ) {
+        for mark in &self.marks.signs {
+            let Some(y) = y_of(mark.track) else { continue };
+            let x = place.axis.x(mark.at);
+            let class = match mark.sign {
+                Sign::Start => "start",
+                Sign::End => "end",
+                Sign::Dot => "event",
+            };
+            canvas.begin_mark(class, &[mark.entry], self.sentence(mark.entry));
+            match mark.sign {
+                Sign::Start => start(canvas, x, y),
+                Sign::End => cross(canvas, x, y),
+                Sign::Dot => dot(canvas, x, y),
+            }
+        }
+    }
+
     /// Draws the arrows of hand-overs; returns the places of them and their labels: x, from y, to y.
     fn arrows(
         &self,
@@ -260,9 +288,9 @@ impl<'a> LivesFigure<'a> {
         y_of: impl Fn(usize) -> Option<f64>,
     ) -> Vec<(f64, f64, f64)> {
         let mut taken: Vec<(f64, f64, f64)> = Vec::new();
-        let mut told: Vec<(usize, usize)> = Vec::new();
+        let mut told: Vec<((usize, usize), &String)> = Vec::new();
         let stroke = Stroke::solid(ink::CHANGED, 0.3);
-        for handover in &self.handovers {
+        for handover in &self.marks.handovers {
             let (Some(from), Some(to)) = (y_of(handover.from), y_of(handover.to)) else {
                 continue;
             };
@@ -274,6 +302,7 @@ impl<'a> LivesFigure<'a> {
             {
                 x += 1.0;
             }
+            canvas.begin_mark("handover", &[handover.entry], self.sentence(handover.entry));
             let side = if to > from { -1.0 } else { 1.0 };
             let tip = Point::new(x, to + side * 0.15);
             canvas.line(Point::new(x, from), Point::new(x, to + side * 1.0), &stroke);
@@ -284,61 +313,25 @@ impl<'a> LivesFigure<'a> {
                 handover.from.min(handover.to),
                 handover.from.max(handover.to),
             );
-            if !told.contains(&pair) {
-                told.push(pair);
-                let text = words::some_of(&handover.topics, 1);
+            if !told.contains(&(pair, &handover.topic)) {
+                told.push((pair, &handover.topic));
+                let text = canvas.cut(
+                    &handover.topic,
+                    Type::Small,
+                    place.axis.right - place.axis.left,
+                );
                 let wide = canvas.width(&text, Type::Small);
                 let left = (x + 0.6).min(place.axis.right - wide);
-                let y = from + (to - from) * 0.66;
+                // Between two rows, so that it covers no mark of theirs.
+                let (top, pitch) = (self.top(place), canvas.sizes.pitch());
+                let rows = libm::round((from + (to - from) * 0.66 - top) / pitch);
+                let y = top + rows * pitch;
                 canvas.label(left + wide / 2.0, y, Type::Small, ink::CHANGED, &text);
                 taken.push((left + wide / 2.0, y - 1.2, y + 1.2));
             }
         }
         taken
     }
-}
-
-/// Draws a circled letter at a moment of a row, beside the letters and arrows that are there already.
-fn letter(
-    canvas: &mut PaperCanvas<'_>,
-    place: &RowPlace,
-    (at, y): (Stamp, f64),
-    k: usize,
-    taken: &mut Vec<(f64, f64, f64)>,
-) {
-    let mut x = place.axis.x(at) + LETTER;
-    let near = |x: f64, taken: &[(f64, f64, f64)]| {
-        let hit = |(o, low, high): &&(f64, f64, f64)| {
-            (o - x).abs() < APART && *low - 1.0 < y && y < *high + 1.0
-        };
-        taken.iter().find(hit).map(|t| t.0)
-    };
-    let mut tries = 0;
-    while let Some(other) = near(x, taken).filter(|_| tries < 12) {
-        x = other + APART;
-        tries += 1;
-    }
-    if x > place.axis.right - LETTER {
-        x = place.axis.x(at) - LETTER;
-        while let Some(other) = near(x, taken).filter(|_| tries < 24) {
-            x = other - APART;
-            tries += 1;
-        }
-    }
-    taken.push((x, y, y));
-    let radius = LETTER * canvas.sizes.pitch() / 2.75;
-    let stroke = Stroke::solid(ink::CHANGED, 0.25);
-    canvas.disc(Point::new(x, y), radius, ink::PAPER, &stroke);
-    canvas.text_middle(x, y, Type::Strong, ink::CHANGED, &sign(k));
-}
-
-/// The letter of an incident: a, b, c, …
-pub(crate) fn sign(k: usize) -> String {
-    let letters = "abcdefghijklmnopqrstuvwxyz";
-    letters
-        .chars()
-        .nth(k)
-        .map_or_else(String::new, String::from)
 }
 
 fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>) {
@@ -354,7 +347,7 @@ fn rate(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, hz: Option<f64>)
     canvas.text_end(right, y, Type::Small, ink::QUIET, &text);
 }
 
-/// Draws the lives and the bars of a row, its starts and its ends.
+/// Draws the lives and the bars of a row.
 fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) {
     for life in &track.lives {
         thin(canvas, place, y, life);
@@ -362,14 +355,6 @@ fn lines(canvas: &mut PaperCanvas<'_>, place: &RowPlace, y: f64, track: &Track) 
     let color = if place.is_live { ink::FOLDED } else { ink::BAR };
     for bar in &track.bars {
         thick(canvas, place, y, bar, color);
-    }
-    for life in &track.lives {
-        if life.begins {
-            start(canvas, place.axis.x(life.span.start), y);
-        }
-        if life.ends {
-            cross(canvas, place.axis.x(life.span.end), y);
-        }
     }
 }
 
@@ -400,21 +385,6 @@ pub(crate) fn thick(
     let (from, to) = (place.axis.x(bar.span.start), place.axis.x(bar.span.end));
     let wide = (to - from).max(0.25);
     canvas.fill(Rect::new(from, y - high / 2.0, wide, high), color);
-}
-
-/// Draws the mark of a start.
-pub(crate) fn start(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    let high = TICK.1 * canvas.sizes.pitch();
-    let rect = Rect::new(x - TICK.0 / 2.0, y - high / 2.0, TICK.0, high);
-    canvas.fill(rect, ink::ADDED);
-}
-
-/// Draws the mark of an end.
-pub(crate) fn cross(canvas: &mut PaperCanvas<'_>, x: f64, y: f64) {
-    let stroke = Stroke::solid(ink::REMOVED, 0.38);
-    let (a, b) = (CROSS, CROSS * 1.35);
-    canvas.line(Point::new(x - a, y - b), Point::new(x + a, y + b), &stroke);
-    canvas.line(Point::new(x - a, y + b), Point::new(x + a, y - b), &stroke);
 }
 
 /// Draws the topics that a node sends, the fastest first, and those that it receives, as far as there is room; of a
@@ -481,18 +451,16 @@ fn talk(
 
 fn sent_by<'s>(source: &'s FigureSource<'_>, track: &Track) -> Vec<&'s str> {
     let mut rated: Vec<(f64, &str)> = Vec::new();
+    let steps = Steps::new(source);
     for edge in source.publications(&track.nodes) {
-        let count: f64 = source.sent(edge).iter().sum();
-        let seconds: i64 = source.sending(edge).iter().map(Span::nanos).sum();
-        let hz = if seconds > 0 {
-            count / (seconds as f64 / 1e9)
-        } else {
-            0.0
-        };
+        let senders = source.senders(&[edge]);
+        let hz = senders
+            .first()
+            .and_then(|s| mean(&steps.pieces(s, source.span())));
         if let Some(of) = source.mission.elements.publishes.get(edge as usize)
             && !source.is_hub(of.topic)
         {
-            rated.push((hz, source.topic(of.topic)));
+            rated.push((hz.unwrap_or(0.0), source.topic(of.topic)));
         }
     }
     rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));

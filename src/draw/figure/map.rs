@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use super::band::{self, Axis};
 use super::canvas::{HAIRLINE, PaperCanvas, Type, ink};
 use super::groups::{NodeGroup, depths, groups, phases_of};
+use super::marks::Marks;
 use super::notes::{flow, sentence};
 use super::page::{FITTING, FigureSheet, TOLD, filter_that_fits, nothing};
 use super::place::{PlacedPanel, place, rooms};
@@ -44,6 +45,8 @@ enum MapBox {
 /// A map laid out.
 struct MapDrawing {
     looks: Vec<MapBox>,
+    /// The tracks in each of them.
+    members: Vec<Vec<usize>>,
     spaces: Vec<String>,
     talks: Vec<Talk>,
     labels: Vec<Vec<Vec<String>>>,
@@ -138,7 +141,7 @@ fn page(sheet: &FigureSheet<'_>, tracks: &[Track], groups: Option<&[NodeGroup]>)
     }?;
     let many = drawn.labels.len();
     let left_out = drawn.placed.left_out;
-    paint(&mut canvas, sheet, &drawn);
+    paint(&mut canvas, sheet, tracks, &drawn);
     let end = drawn.placed.size.h + 0.2;
     let told = (groups.is_some(), left_out, many);
     let y = below(&mut canvas, sheet, end, told, &drawn.alone);
@@ -208,7 +211,7 @@ fn of_pills(
     let source = sheet.source;
     let talks = Talks::new(source, tracks);
     let own: Vec<Option<usize>> = (0..tracks.len()).map(Some).collect();
-    let whole = (0, source.mission.activity.cells().len());
+    let whole = source.span();
     let all = talks.between(&own, whole, false);
     let linked: BTreeSet<usize> = all.iter().flat_map(|t| [t.from, t.to]).collect();
     let phases: Vec<String> = phases_of(source, tracks)
@@ -231,10 +234,11 @@ fn of_pills(
         Some(_) => last_part(&track.name).to_owned(),
         None => track.name.trim_start_matches('/').to_owned(),
     };
-    let mut looks = Vec::new();
+    let (mut looks, mut members) = (Vec::new(), Vec::new());
     let mut vertices = Vec::new();
     let mut vertex = vec![None; tracks.len()];
     for at in linked.iter().copied() {
+        members.push(vec![at]);
         let look = MapBox::Pill(label(&tracks[at]), phases[at].clone());
         vertex[at] = Some(vertices.len());
         vertices.push(sized(canvas, &look, home(&tracks[at]), source.phases.len()));
@@ -243,11 +247,11 @@ fn of_pills(
     for space in (0..spaces.len()).map(Some) {
         let alone =
             (0..tracks.len()).filter(|at| !linked.contains(at) && home(&tracks[*at]) == space);
-        let alone: Vec<(String, String)> = alone
-            .map(|at| (label(&tracks[at]), phases[at].clone()))
-            .collect();
+        let alone: Vec<usize> = alone.collect();
         for part in alone.chunks(8) {
-            let look = MapBox::List(part.to_vec());
+            let line = |at: &usize| (label(&tracks[*at]), phases[*at].clone());
+            let look = MapBox::List(part.iter().map(line).collect());
+            members.push(part.to_vec());
             vertices.push(sized(canvas, &look, space, source.phases.len()));
             looks.push(look);
         }
@@ -262,7 +266,11 @@ fn of_pills(
         })
         .collect();
     let drawn = finished(sheet, canvas, (looks, vertices, spaces, talks), 1)?;
-    Some(MapDrawing { alone, ..drawn })
+    Some(MapDrawing {
+        alone,
+        members,
+        ..drawn
+    })
 }
 
 /// The map with every group as a box; `None` where it does not fit.
@@ -294,9 +302,13 @@ fn of_groups(
         looks.push(look);
     }
     let talks = Talks::new(source, tracks);
-    let whole = (0, source.mission.activity.cells().len());
+    let whole = source.span();
     let talks = talks.between(&vertex, whole, false);
-    finished(sheet, canvas, (looks, vertices, Vec::new(), talks), 2)
+    let drawn = finished(sheet, canvas, (looks, vertices, Vec::new(), talks), 2)?;
+    Some(MapDrawing {
+        members: groups.iter().map(|g| g.members.clone()).collect(),
+        ..drawn
+    })
 }
 
 fn finished(
@@ -327,6 +339,7 @@ fn finished(
     let aside = (sheet.options.width_mm - placed.size.w) / 2.0;
     Some(MapDrawing {
         looks,
+        members: Vec::new(),
         spaces,
         talks,
         labels,
@@ -384,7 +397,12 @@ fn sized(canvas: &PaperCanvas<'_>, look: &MapBox, cluster: Option<usize>, phases
     }
 }
 
-fn paint(canvas: &mut PaperCanvas<'_>, sheet: &FigureSheet<'_>, drawn: &MapDrawing) {
+fn paint(
+    canvas: &mut PaperCanvas<'_>,
+    sheet: &FigureSheet<'_>,
+    tracks: &[Track],
+    drawn: &MapDrawing,
+) {
     let placed = &drawn.placed;
     let frame = Stroke::solid(ink::FOLDED, HAIRLINE);
     canvas.begin("namespaces");
@@ -403,8 +421,11 @@ fn paint(canvas: &mut PaperCanvas<'_>, sheet: &FigureSheet<'_>, drawn: &MapDrawi
     for (at, lines) in drawn.labels.iter().enumerate() {
         placed.label(canvas, at, lines);
     }
-    canvas.begin("nodes");
-    for (look, rect) in drawn.looks.iter().zip(&placed.boxes) {
+    let marks = Marks::new(sheet.source, tracks);
+    let boxes = drawn.looks.iter().zip(&drawn.members);
+    for ((look, members), rect) in boxes.zip(&placed.boxes) {
+        let names = members.iter().map(|at| &*tracks[*at].name);
+        canvas.begin_box(names, &marks.entries(members));
         match look {
             MapBox::Pill(name, phases) => pill(canvas, *rect, name, phases),
             MapBox::List(all) => list(canvas, *rect, all),

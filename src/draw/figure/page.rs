@@ -3,9 +3,10 @@
 use super::band::{Axis, clock, names};
 use super::canvas::{PX_PER_MM, PaperCanvas, Sizes, Type, ink};
 use super::groups::depths;
-use super::lives::{LivesFigure, RowPlace, WIDE, sign};
+use super::lives::{LivesFigure, RowPlace, WIDE};
 use super::notes::{TextRun, Unbroken, flow, sentence};
 use super::rows::FigureRow;
+use super::signs::sign;
 use super::source::FigureSource;
 use super::tracks::Track;
 use super::{FigureKind, FigureOptions, MOST_HEIGHT, RowKind, legend};
@@ -100,7 +101,7 @@ impl<'a> FigureSheet<'a> {
         if self.options.is_named || !self.options.is_bare {
             y = names(&mut canvas, self.source, width, y, None);
         }
-        y = flow(&mut canvas, width, y, &incident_items(lives));
+        y = flow(&mut canvas, width, y, &letter_items(lives));
         if !self.options.is_bare {
             y = flow(
                 &mut canvas,
@@ -222,19 +223,19 @@ fn lives_place(lives: &LivesFigure<'_>, canvas: &PaperCanvas<'_>, width: f64) ->
 }
 
 /// The letters explained, in order of time.
-fn incident_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
+fn letter_items(lives: &LivesFigure<'_>) -> Vec<Unbroken> {
     let start = lives.source.span().start;
-    let item = |(k, incident): (usize, &super::incidents::Incident)| {
-        let at = clock(incident.at.since(start));
+    let item = |(k, letter): (usize, &super::marks::Letter)| {
+        let at = clock(letter.mark.at.since(start));
         vec![
             TextRun::Words(Type::Strong, ink::CHANGED, format!("{} ", sign(k))),
-            TextRun::Words(Type::Small, ink::TEXT, format!("{at} {}", incident.text)),
+            TextRun::Words(Type::Small, ink::TEXT, format!("{at} {}", letter.text)),
         ]
     };
-    lives.incidents.iter().enumerate().map(item).collect()
+    lives.marks.letters.iter().enumerate().map(item).collect()
 }
 
-/// The notes below the legend: the members of folded rows where no column tells them, and the number of incidents
+/// The notes below the legend: the members of folded rows where no column tells them, and the number of events
 /// without a letter.
 fn lives_notes(lives: &LivesFigure<'_>, is_told: bool) -> Vec<Unbroken> {
     let mut items = Vec::new();
@@ -248,10 +249,10 @@ fn lives_notes(lives: &LivesFigure<'_>, is_told: bool) -> Vec<Unbroken> {
             items.push(sentence(ink::QUIET, text));
         }
     }
-    if lives.unmarked > 0 {
+    if lives.marks.unlettered > 0 {
         let text = format!(
-            "{} not marked.",
-            words::count(lives.unmarked, "smaller change")
+            "{} without a letter.",
+            words::count(lives.marks.unlettered, "smaller change")
         );
         items.push(sentence(ink::QUIET, text));
     }

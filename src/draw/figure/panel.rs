@@ -7,6 +7,7 @@ use super::talks::Talk;
 use crate::base::geometry::{Point, Rect, Size};
 use crate::draw::scene::Stroke;
 use crate::draw::style::Color;
+use crate::mission::EntryId;
 
 /// The room inside a panel's border in millimetres.
 pub(crate) const INSIDE: f64 = 1.3;
@@ -26,6 +27,8 @@ pub(crate) struct PanelBox {
     /// The namespace of its names, `/robot2`; empty for that of the whole panel.
     pub(crate) space: String,
     pub(crate) lines: Vec<String>,
+    /// The events of the log in it.
+    pub(crate) entries: Vec<EntryId>,
 }
 
 impl PanelBox {
@@ -57,6 +60,8 @@ impl PanelBox {
 
 /// A panel laid out, its top left corner at (0, 0).
 pub(crate) struct Panel {
+    /// The events of the log in it.
+    pub(crate) entries: Vec<EntryId>,
     /// Its number and its words.
     pub(crate) heading: (String, String),
     /// The namespace of the names that have none before them; empty if there is none.
@@ -123,6 +128,7 @@ pub(crate) fn paint(canvas: &mut PaperCanvas<'_>, panel: &Panel, rect: Rect) {
         placed.label(canvas, at, lines);
     }
     for (look, rect) in panel.looks.iter().zip(&placed.boxes) {
+        canvas.begin_mark("box", &look.entries, String::new());
         boxed(canvas, look, *rect);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::incidents::{Handover, Incident};
+use super::marks::Marks;
 use super::tracks::Track;
 use crate::base::name::{last_part, namespace};
 use crate::base::time::{Span, Stamp};
@@ -37,18 +37,9 @@ impl FigureRow {
     }
 }
 
-/// All rows in order. The tracks of `incidents` and `handovers` are not folded.
-pub(crate) fn rows(
-    tracks: &[Track],
-    whole: Span,
-    incidents: &[Incident],
-    handovers: &[Handover],
-) -> Vec<FigureRow> {
-    let marked: BTreeSet<usize> = incidents
-        .iter()
-        .map(|i| i.track)
-        .chain(handovers.iter().flat_map(|h| [h.from, h.to]))
-        .collect();
+/// All rows in order. Marked tracks are not folded.
+pub(crate) fn rows(tracks: &[Track], whole: Span, marks: &Marks) -> Vec<FigureRow> {
+    let marked = marks.marked();
     let mut spaces: Vec<(bool, Stamp, &str, Vec<usize>)> = Vec::new();
     for (at, track) in tracks.iter().enumerate() {
         let space = namespace(&track.name);
@@ -63,7 +54,7 @@ pub(crate) fn rows(
     spaces.sort_by(|a, b| (a.0, a.1, a.2).cmp(&(b.0, b.1, b.2)));
     let mut rows = Vec::new();
     for (_, _, space, own) in spaces {
-        rows.extend(of_space(tracks, whole, &marked, space, own));
+        rows.extend(of_space(tracks, whole, (marks, &marked), space, own));
     }
     rows
 }
@@ -71,7 +62,7 @@ pub(crate) fn rows(
 fn of_space(
     tracks: &[Track],
     whole: Span,
-    marked: &BTreeSet<usize>,
+    (marks, marked): (&Marks, &BTreeSet<usize>),
     space: &str,
     own: Vec<usize>,
 ) -> Vec<FigureRow> {
@@ -90,7 +81,7 @@ fn of_space(
     let open = own
         .into_iter()
         .filter(|at| folded.binary_search(at).is_err());
-    let open = in_order(tracks, whole, open.collect());
+    let open = in_order(tracks, whole, marks, open.collect());
     if !folded.is_empty() {
         rows.push(FigureRow::Folded(folded, space.to_owned()));
     }
@@ -108,11 +99,11 @@ fn is_throughout(track: &Track, whole: Span) -> bool {
     };
     let nanos = whole.nanos();
     let steady = track.topic.is_none() || track.bars.len() == 1;
-    life.span.start.since(whole.start) <= nanos / 20 && !life.ends && steady
+    life.span.start.since(whole.start) <= nanos / 20 && steady
 }
 
 /// The tracks sorted by burst of start, then by end, the latest first, then by name.
-fn in_order(tracks: &[Track], whole: Span, mut own: Vec<usize>) -> Vec<usize> {
+fn in_order(tracks: &[Track], whole: Span, marks: &Marks, mut own: Vec<usize>) -> Vec<usize> {
     own.sort_by_key(|at| (tracks[*at].start(), *at));
     let (near, grid) = (whole.nanos() / BURST, (whole.nanos() / END).max(1));
     let mut bursts: Vec<Vec<usize>> = Vec::new();
@@ -126,8 +117,9 @@ fn in_order(tracks: &[Track], whole: Span, mut own: Vec<usize>) -> Vec<usize> {
         last = Some(start);
     }
     let end = |at: usize| {
-        let ends = tracks[at].lives.last().is_some_and(|l| l.ends);
-        ends.then(|| tracks[at].end().since(whole.start) / grid)
+        marks
+            .ends(at)
+            .then(|| tracks[at].end().since(whole.start) / grid)
     };
     // Who never ends comes first.
     let end = |at: usize| end(at).unwrap_or(i64::MAX);

@@ -1,13 +1,15 @@
 //! Steps: one panel per phase boundary, with only the nodes that began or ended, the topics that changed hands, and the
 //! nodes linked to them.
 
+mod events;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::band::{clock, title};
 use super::canvas::{PX_PER_MM, PaperCanvas, ink};
 use super::groups::{cut, depths, groups};
-use super::incidents::configurations;
+use super::marks::{Marks, Sign};
 use super::notes::{Unbroken, flow, sentence};
 use super::page::{FITTING, FigureSheet, filter_that_fits, nothing};
 use super::panel::{Fate, INSIDE, Panel, PanelBox, items, paint};
@@ -21,7 +23,8 @@ use crate::base::name::{last_part, namespace};
 use crate::base::words;
 use crate::draw::scene::Scene;
 use crate::layout::{Link, Outline, Plan, Vertex, engine};
-use crate::mission::phases::{Configuration, cells_of};
+use crate::mission::EntryId;
+use crate::mission::phases::{Configuration, configurations};
 
 /// The number of steps shown unless some are asked for.
 const SHOWN: usize = 6;
@@ -36,11 +39,13 @@ const MOST_WAYS: usize = 729;
 const BETWEEN: f64 = 2.0;
 
 /// The source of panels.
-struct Studio<'s> {
+struct StepSource<'s> {
     sheet: &'s FigureSheet<'s>,
     tracks: Vec<Track>,
     talks: Talks<'s>,
     found: Vec<Configuration>,
+    /// The events of the log on the rows.
+    marks: Marks,
     /// The number of panels side by side.
     columns: usize,
     /// How many parts of namespaces tell groups apart.
@@ -64,11 +69,12 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
         w if w >= 110.0 => 2,
         _ => 1,
     };
-    let mut studio = Studio {
+    let mut studio = StepSource {
         columns,
         depth: depths(&tracks).next().unwrap_or(1),
         talks: Talks::new(sheet.source, &tracks),
-        found: configurations(sheet.source),
+        found: configurations(sheet.source.mission, sheet.source.phases),
+        marks: Marks::new(sheet.source, &tracks),
         tracks,
         sheet,
     };
@@ -99,13 +105,7 @@ pub(crate) fn draw(sheet: &FigureSheet<'_>) -> Result<(Scene, Vec<String>)> {
     }
 }
 
-impl Studio<'_> {
-    /// The weight of a boundary, larger for one that changes more.
-    fn weight(&self, k: usize) -> usize {
-        let phase = &self.sheet.source.phases[k];
-        (phase.nodes_added + phase.nodes_removed) as usize * 4 + self.handed(k).len()
-    }
-
+impl StepSource<'_> {
     /// The boundaries to show, by the place of the phase that begins.
     fn chosen(&self) -> Result<Vec<usize>> {
         let many = self.sheet.source.phases.len();
@@ -134,17 +134,6 @@ impl Studio<'_> {
         chosen.retain(|k| Some(*k) != least);
     }
 
-    /// Topics that others send from phase `k` on: topic, before, after.
-    fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>)> {
-        let (before, after) = (&self.found[k - 1].senders, &self.found[k].senders);
-        let changed = after.iter().filter_map(|(topic, to)| {
-            let from = before.get(topic).filter(|from| *from != to)?;
-            let shown = self.sheet.source.shows(*topic) && !self.sheet.source.is_hub(*topic);
-            shown.then(|| (*topic, Arc::clone(from), Arc::clone(to)))
-        });
-        changed.collect()
-    }
-
     fn too_wide(&self) -> Error {
         let width = self.sheet.options.width_mm;
         let hint = match self.sheet.options.rows {
@@ -170,10 +159,14 @@ impl Studio<'_> {
         let canvas = self.sheet.canvas();
         let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
         let place_of = |name: &Arc<str>| self.track(name);
-        let began: BTreeSet<usize> = after.difference(before).filter_map(place_of).collect();
-        let ended: BTreeSet<usize> = before.difference(after).filter_map(place_of).collect();
+        let turned = [Sign::Start, Sign::End].map(|sign| self.turned(k, sign));
+        let [began, ended] = turned
+            .each_ref()
+            .map(|t| t.keys().copied().collect::<BTreeSet<_>>());
         let handed = self.handed(k);
-        let partners = handed.iter().flat_map(|(_, from, to)| [from, to]);
+        // One that ended long ago stands in the note alone.
+        let partners = handed.iter().flat_map(|(_, from, to, _)| [from, to]);
+        let partners = partners.filter(|name| before.contains(*name) || after.contains(*name));
         let partners: BTreeSet<usize> = partners
             .filter_map(place_of)
             .filter(|at| !began.contains(at) && !ended.contains(at))
@@ -199,13 +192,20 @@ impl Studio<'_> {
             .enumerate()
             .map(|(at, (fate, members))| {
                 let named = (at >= changed).then(|| linked.get(&at).copied()).flatten();
-                self.look(*fate, members, named, home)
+                let mut events = self.events(k, members);
+                let turned = turned
+                    .iter()
+                    .flat_map(|t| members.iter().filter_map(|m| t.get(m)));
+                events.extend(turned.flatten());
+                let mut look = self.look(*fate, members, named, home);
+                look.entries = events.into_iter().collect();
+                look
             })
             .collect();
         let phase = &source.phases[k];
         let at = clock(phase.span.start.since(source.span().start));
         let mut notes = Vec::new();
-        for (topic, from, to) in &handed {
+        for (topic, from, to, _) in &handed {
             let text = format!(
                 "{}: {} → {}",
                 last_part(source.topic(*topic)),
@@ -226,7 +226,10 @@ impl Studio<'_> {
             format!("{k} → {}", k + 1),
             format!("{at} {}", title(source, k)),
         );
+        let entries = looks.iter().flat_map(|look| &look.entries).copied();
+        let entries: BTreeSet<EntryId> = entries.chain(handed.iter().map(|h| h.3)).collect();
         Some(Panel {
+            entries: entries.into_iter().collect(),
             heading,
             home: home.map_or_else(String::new, |space| format!("in {space}")),
             looks,
@@ -277,7 +280,7 @@ impl Studio<'_> {
         let own: Vec<Option<usize>> = (0..self.tracks.len()).map(Some).collect();
         let mut links: BTreeMap<usize, usize> = BTreeMap::new();
         for (phase, names, fate) in [(k - 1, names.0, Fate::Ended), (k, names.1, Fate::Began)] {
-            let range = cells_of(&source.mission.activity, source.phases[phase].span);
+            let range = source.phases[phase].span;
             for talk in self.talks.between(&own, range, true) {
                 for (a, b) in [(talk.from, talk.to), (talk.to, talk.from)] {
                     let changes = vertex[a].is_some_and(|v| boxes[v].0 == fate);
@@ -320,12 +323,12 @@ impl Studio<'_> {
         k: usize,
         vertex: &[Option<usize>],
         fates: &[Fate],
-        handed: &[(u32, Arc<str>, Arc<str>)],
+        handed: &[(u32, Arc<str>, Arc<str>, EntryId)],
     ) -> Vec<(Talk, Fate)> {
         let source = self.sheet.source;
         let mut all = Vec::new();
         for (phase, fate) in [(k - 1, Fate::Ended), (k, Fate::Began)] {
-            let range = cells_of(&source.mission.activity, source.phases[phase].span);
+            let range = source.phases[phase].span;
             for mut talk in self.talks.between(vertex, range, true) {
                 let ends = [fates[talk.from], fates[talk.to]];
                 if ends.contains(&fate) {
@@ -341,7 +344,7 @@ impl Studio<'_> {
                 // Of a partner only what it hands over, or takes over.
                 talk.topics.retain(|(topic, _)| {
                     let moved = handed.iter().find(|(t, ..)| t == topic);
-                    moved.is_some_and(|(_, from, to)| {
+                    moved.is_some_and(|(_, from, to, _)| {
                         let sender = if fate == Fate::Ended { from } else { to };
                         self.track(sender).and_then(|at| vertex[at]) == Some(talk.from)
                     })
@@ -399,6 +402,7 @@ impl Studio<'_> {
             fate,
             space: space.to_owned(),
             lines,
+            entries: Vec::new(),
         }
     }
 
@@ -438,7 +442,7 @@ impl Studio<'_> {
         let heights: Vec<f64> = panels.iter().map(|p| p.height).collect();
         let mut ends = vec![0.1_f64; columns];
         for (at, (panel, column)) in panels.iter().zip(in_columns(&heights, columns)).enumerate() {
-            canvas.begin(&format!("step-{}", at + 1));
+            canvas.begin_step(at + 1, &panel.entries);
             let x = (wide + BETWEEN) * column as f64;
             let rect = Rect::new(x + 0.1, ends[column], wide - 0.2, panel.height);
             paint(&mut canvas, panel, rect);

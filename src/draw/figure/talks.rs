@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::source::FigureSource;
-use super::tracks::Track;
+use super::tracks::{Steps, Track, mean};
 use crate::base::name::last_part;
+use crate::base::time::Span;
 use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::{Element, TopicId};
@@ -53,20 +54,20 @@ impl Talk {
 /// The longest name on an arrow, in characters.
 const LONGEST: usize = 22;
 
-/// The presence of an edge, cell by cell.
+/// The presence of an edge.
 struct EdgePresence {
     track: usize,
     topic: TopicId,
-    cells: Vec<bool>,
+    lives: Vec<Span>,
     degree: Degree,
     hz: f64,
 }
 
-/// Every edge of the tracks, so that talks of any stretch can be told.
+/// Every edge of the tracks, so that the talks of any time are at hand.
 pub(crate) struct Talks<'a> {
     source: &'a FigureSource<'a>,
     sends: Vec<EdgePresence>,
-    hears: Vec<EdgePresence>,
+    receives: Vec<EdgePresence>,
 }
 
 impl<'a> Talks<'a> {
@@ -80,59 +81,56 @@ impl<'a> Talks<'a> {
                 }
             }
         }
-        let activity = &source.mission.activity;
-        let heard = |edges: &[crate::graph::Edge], what: fn(u32) -> Element, sent: bool| {
-            let heard = (0..).zip(edges).filter_map(|(id, edge)| {
-                let shown = source.shows(edge.topic) && !source.is_hub(edge.topic);
-                let track = track_of.get(edge.node as usize).copied().flatten();
-                let degrees = || activity.graphs.rows(what(id)).map(|(_, row)| row.degree);
-                track.filter(|_| shown).map(|track| EdgePresence {
-                    track,
-                    topic: edge.topic,
-                    cells: activity.presence(what(id), |_| true),
-                    degree: degrees().min().unwrap_or(Degree::Declared),
-                    hz: if sent { rate(source, id) } else { 0.0 },
-                })
-            });
-            heard.collect::<Vec<EdgePresence>>()
+        let steps = Steps::new(source);
+        let presence = |what: Element| {
+            let (node, topic) = elements.ends(what);
+            let (node, topic) = (node?, topic?);
+            let track = track_of.get(node as usize).copied().flatten()?;
+            let shown = source.shows(topic) && !source.is_hub(topic);
+            let sender = match what {
+                Element::Publish(id) => source.senders(&[id]).into_iter().next(),
+                _ => None,
+            };
+            let hz = sender.and_then(|s| mean(&steps.pieces(s, source.span())));
+            shown.then(|| EdgePresence {
+                track,
+                topic,
+                lives: source.lives(what).collect(),
+                degree: source.degree(what),
+                hz: hz.unwrap_or(0.0),
+            })
         };
+        let edges = |is: fn(&Element) -> bool| elements.all().filter(is).filter_map(presence);
         Self {
             source,
-            sends: heard(&elements.publishes, Element::Publish, true),
-            hears: heard(&elements.subscribes, Element::Subscribe, false),
+            sends: edges(|what| matches!(what, Element::Publish(_))).collect(),
+            receives: edges(|what| matches!(what, Element::Subscribe(_))).collect(),
         }
     }
 
-    /// The talks between boxes, `vertex` being the box of each track, that hold in at least one cell of `range`, or in
-    /// half of them.
+    /// The talks between boxes, `vertex` being the box of each track, that hold at any moment of `time`, or in half of
+    /// it.
     pub(crate) fn between(
         &self,
         vertex: &[Option<usize>],
-        range: (usize, usize),
+        time: Span,
         is_majority: bool,
     ) -> Vec<Talk> {
-        let least = if is_majority {
-            (range.1 - range.0).div_ceil(2).max(1)
-        } else {
-            1
-        };
+        let least = if is_majority { time.nanos() / 2 } else { 0 };
         let mut all: BTreeMap<(usize, usize), (BTreeMap<TopicId, f64>, bool)> = BTreeMap::new();
         for send in &self.sends {
-            for hear in self.hears.iter().filter(|h| h.topic == send.topic) {
+            for other in self.receives.iter().filter(|r| r.topic == send.topic) {
                 let ends = (
                     vertex.get(send.track).copied().flatten(),
-                    vertex.get(hear.track).copied().flatten(),
+                    vertex.get(other.track).copied().flatten(),
                 );
                 let (Some(from), Some(to)) = ends else {
                     continue;
                 };
-                let both = send.cells[range.0..range.1]
-                    .iter()
-                    .zip(&hear.cells[range.0..range.1]);
-                if from == to || both.filter(|(a, b)| **a && **b).count() < least {
+                if from == to || shared(&send.lives, &other.lives, time) <= least {
                     continue;
                 }
-                let inferred = send.degree.max(hear.degree) >= Degree::Inferred;
+                let inferred = send.degree.max(other.degree) >= Degree::Inferred;
                 let (topics, all_inferred) =
                     all.entry((from, to)).or_insert((BTreeMap::new(), true));
                 let hz = topics.entry(send.topic).or_insert(0.0);
@@ -158,13 +156,12 @@ impl<'a> Talks<'a> {
     }
 }
 
-/// Messages per second of a publication while it sends; 0 where that is not known.
-fn rate(source: &FigureSource<'_>, edge: u32) -> f64 {
-    let count: f64 = source.sent(edge).iter().sum();
-    let seconds = source
-        .sending(edge)
-        .iter()
-        .map(|s| s.nanos() as f64 / 1e9)
-        .sum::<f64>();
-    if seconds > 1e-3 { count / seconds } else { 0.0 }
+/// The time that both lists of lives have in common inside `time`, in nanoseconds.
+fn shared(a: &[Span], b: &[Span], time: Span) -> i64 {
+    let both = a.iter().flat_map(|a| b.iter().map(move |b| (a, b)));
+    let inside = both.map(|(a, b)| Span {
+        start: a.start.max(b.start).max(time.start),
+        end: a.end.min(b.end).min(time.end),
+    });
+    inside.map(|span| span.nanos().max(0)).sum()
 }

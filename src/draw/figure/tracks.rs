@@ -1,44 +1,35 @@
-//! The rows of a figure of lives: the times at which each node or topic was there and sent, and how busily.
+//! The rows of a figure of lives: the times at which each node or topic was there and sent, and how busily. Lives and
+//! rates are those of the mission's history; a bar has another height only where the log has another rate.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::levels::levels;
-use super::source::{FigureSource, merged};
+use super::source::FigureSource;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
+use crate::graph::history::{Sender, Stretch};
 use crate::graph::{Element, NodeId, TopicId};
+use crate::mission::ledger::Kind;
 
-/// The length from which on a silence interrupts a bar: in nanoseconds, and as one in so many parts of the mission.
-const SILENCE: (i64, i64) = (4_000_000_000, 83);
-/// The price of a step of a rate: as much as an octave held for one in this many parts of the mission.
-const STEP: f64 = 20.0;
-/// The least time that a step holds: one in this many parts of the mission.
-const SHORTEST_STEP: usize = 25;
-/// The time from the start within which a node first seen counts as there before: in nanoseconds, and as one in so many
+/// The length from which on a silence interrupts a bar, so that it can be seen: in nanoseconds, and as one in so many
 /// parts of the mission.
-const PRESENT: (i64, i64) = (1_000_000_000, 330);
-/// The last part of the mission, one in this many: a node that ends in it was cut off by the end of the recording.
-const CUT: i64 = 50;
-/// The number of messages that make a rate; cells are put together until they hold as many.
-const ENOUGH: f64 = 6.0;
+const SILENCE: (i64, i64) = (4_000_000_000, 83);
+/// The shortest piece of a bar that can be seen: one in so many parts of the mission. Shorter ones join the one before.
+const SEEN: i64 = 400;
 
 /// One life of a row: a time in which it was there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackLife {
     pub(crate) span: Span,
-    /// Whether it began during the recording.
-    pub(crate) begins: bool,
-    /// Whether it ended during the recording.
-    pub(crate) ends: bool,
     /// Whether it is known by inference only.
     pub(crate) is_inferred: bool,
 }
 
-/// A stretch of sending at one rate.
+/// A time of sending at one rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SendingBar {
     pub(crate) span: Span,
-    /// Its share of the row's highest rate, above 0 to 1.
+    /// Its share of the row's highest rate, 0 to 1.
     pub(crate) share: f64,
 }
 
@@ -67,194 +58,249 @@ impl Track {
 
 /// A row per role.
 pub(crate) fn of_nodes(source: &FigureSource<'_>) -> Vec<Track> {
-    let roles = source.roles.iter();
-    let tracks = roles.map(|(role, nodes)| node(source, role, nodes));
+    let steps = Steps::new(source);
+    let track = |(role, nodes): (&Arc<str>, &Vec<NodeId>)| {
+        let senders = source.senders(&source.publications(nodes));
+        let elements: Vec<Element> = nodes.iter().map(|id| Element::Node(*id)).collect();
+        Track {
+            name: Arc::clone(role),
+            nodes: nodes.clone(),
+            topic: None,
+            ..row(source, &steps, &elements, &senders)
+        }
+    };
+    let tracks = source.roles.iter().map(track);
     tracks.filter(|t| !t.lives.is_empty()).collect()
 }
 
 /// A row per topic that carried a message.
 pub(crate) fn of_topics(source: &FigureSource<'_>) -> Vec<Track> {
-    let tracks = source.shown_topics().map(|t| topic(source, t));
-    tracks.filter(|t| !t.lives.is_empty()).collect()
+    let steps = Steps::new(source);
+    let track = |id: TopicId| {
+        let senders: Vec<&Sender> = source.mission.sending.of_topic(id).iter().collect();
+        Track {
+            name: source.topic(id).into(),
+            topic: Some(id),
+            ..row(source, &steps, &[Element::Topic(id)], &senders)
+        }
+    };
+    let tracks = source.shown_topics().map(track);
+    tracks
+        .filter(|t| !t.lives.is_empty() && !t.bars.is_empty())
+        .collect()
 }
 
-fn node(source: &FigureSource<'_>, role: &Arc<str>, nodes: &[NodeId]) -> Track {
-    let edges = source.publications(nodes);
+/// The row of some elements drawn as one, without its name.
+fn row(
+    source: &FigureSource<'_>,
+    steps: &Steps,
+    elements: &[Element],
+    senders: &[&Sender],
+) -> Track {
     let whole = source.span();
-    let mut spans = Vec::new();
-    let mut sent = vec![0.0; source.mission.activity.cells().len()];
-    let mut rates = Vec::new();
-    for edge in edges {
-        let sending = source.sending(edge);
-        if sending.is_empty() {
-            continue;
-        }
-        let own = source.sent(edge);
-        for (sum, count) in sent.iter_mut().zip(&own) {
-            *sum += count;
-        }
-        rates.extend(rate(&own, &sending));
-        spans.extend(sending);
-    }
-    let sends = merged(spans, silence(whole));
-    let lives = lives(source, nodes, &sends);
-    let mut bars = bars(source, &sends, &sent);
+    let lives = elements.iter().flat_map(|what| source.lives(*what));
+    let degree = elements.iter().map(|what| source.degree(*what)).min();
+    let is_inferred = senders.is_empty() && degree.is_some_and(|d| d >= Degree::Inferred);
+    let life = |span| TrackLife { span, is_inferred };
+    let lives: Vec<TrackLife> = Span::joined(lives.collect(), 0)
+        .into_iter()
+        .map(life)
+        .collect();
+    let rates: Vec<Vec<Piece>> = senders.iter().map(|s| steps.pieces(s, whole)).collect();
+    let hz = rates.iter().filter_map(|pieces| mean(pieces));
+    let hz = hz.reduce(|a, b| a + b);
+    let mut bars = bars(&rates, whole);
     if let (Some(life), Some(bar)) = (lives.last(), bars.last_mut())
-        && !life.ends
         && life.span.end.since(bar.span.end) <= silence(whole)
+        && life.span.end == whole.end
     {
         // The recording ended between two messages.
         bar.span.end = life.span.end;
     }
     Track {
-        name: Arc::clone(role),
-        nodes: nodes.to_vec(),
+        name: Arc::from(""),
+        nodes: Vec::new(),
         topic: None,
         lives,
         bars,
-        hz: rates.into_iter().reduce(|a, b| a + b),
+        hz,
     }
 }
 
-fn topic(source: &FigureSource<'_>, id: TopicId) -> Track {
-    let whole = source.span();
-    let sends = merged(source.topic_sending(id), silence(whole));
-    let sent = source.topic_sent(id);
-    let kept = source.topic_kept(id);
-    let all = sends.first().zip(sends.last()).map(|(first, last)| Span {
-        start: first.start,
-        end: kept.map_or(last.end, |kept| kept.max(last.end)),
-    });
-    let life = |span: Span| capped(span, whole, false);
-    Track {
-        name: source.topic(id).into(),
-        nodes: Vec::new(),
-        topic: Some(id),
-        lives: all.into_iter().map(life).collect(),
-        hz: rate(&sent, &sends),
-        bars: bars(source, &sends, &sent),
-    }
-}
-
-pub(crate) fn silence(whole: Span) -> i64 {
+fn silence(whole: Span) -> i64 {
     SILENCE.0.max(whole.nanos() / SILENCE.1)
 }
 
-/// Messages per second while they came; `None` where there are fewer than two or no time passes.
-fn rate(sent: &[f64], spans: &[Span]) -> Option<f64> {
-    let seconds: f64 = spans.iter().map(|s| s.nanos() as f64 / 1e9).sum();
-    let count: f64 = sent.iter().sum();
-    (count >= 2.0 && seconds > 1e-3).then(|| count / seconds)
+/// A time at one rate, in messages per second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) span: Span,
+    pub(crate) hz: f64,
 }
 
-fn capped(span: Span, whole: Span, is_inferred: bool) -> TrackLife {
-    let present = PRESENT.0.max(whole.nanos() / PRESENT.1);
-    TrackLife {
-        span,
-        begins: span.start.since(whole.start) > present,
-        ends: whole.end.since(span.end) > whole.nanos() / CUT,
-        is_inferred,
-    }
-}
+/// The times at which the log has steps of rates, by topic and node.
+pub(crate) struct Steps(BTreeSet<(TopicId, Option<NodeId>, Stamp)>);
 
-/// The lives of some nodes that are one role: runs of cells, their ends sharpened by exact signs.
-fn lives(source: &FigureSource<'_>, nodes: &[NodeId], sends: &[Span]) -> Vec<TrackLife> {
-    let activity = &source.mission.activity;
-    let cells = activity.cells();
-    let mut known: Vec<Option<Degree>> = vec![None; cells.len()];
-    for (at, row) in nodes
-        .iter()
-        .flat_map(|id| activity.graphs.rows(Element::Node(*id)))
-    {
-        known[at] = known[at].into_iter().chain([row.degree]).min();
-    }
-    let elements = &source.mission.elements;
-    let of = |id: &NodeId| elements.nodes.get(*id as usize);
-    let firsts = nodes.iter().filter_map(of).filter_map(|n| n.first);
-    let lasts = nodes.iter().filter_map(of).filter_map(|n| n.last);
-    let starts: Vec<Stamp> = firsts.chain(sends.iter().map(|s| s.start)).collect();
-    let ends: Vec<Stamp> = lasts.chain(sends.iter().map(|s| s.end)).collect();
-    let step = activity.step();
-    let whole = source.span();
-    let runs = source.runs(known.iter().map(Option::is_some));
-    let sharpened = runs.into_iter().map(|run| {
-        let near = |at: &&Stamp| at.since(run.start) >= 0 && at.since(run.start) <= step;
-        let start = starts.iter().filter(near).min().copied();
-        let near = |at: &&Stamp| run.end.since(**at) >= 0 && run.end.since(**at) <= step;
-        let end = ends.iter().filter(near).max().copied();
-        let span = Span {
-            start: start.unwrap_or(run.start),
-            end: end.unwrap_or(run.end),
-        };
-        let inside = cells
-            .iter()
-            .zip(&known)
-            .filter(|(cell, _)| run.contains(cell.start));
-        let (mut all, mut inferred) = (0, 0);
-        for (_, degree) in inside {
-            all += 1;
-            inferred += usize::from(degree.is_some_and(|d| d >= Degree::Inferred));
-        }
-        capped(span, whole, inferred * 2 > all && sends.is_empty())
-    });
-    sharpened.filter(|l| l.span.nanos() > 0).collect()
-}
-
-/// The bars of a row: its stretches of sending, cut where the rate makes a step.
-fn bars(source: &FigureSource<'_>, sends: &[Span], sent: &[f64]) -> Vec<SendingBar> {
-    let mut all: Vec<SendingBar> = Vec::new();
-    for stretch in sends {
-        all.extend(steps(source, *stretch, sent));
-    }
-    let most = all.iter().map(|b| b.share).fold(0.0, f64::max);
-    for bar in &mut all {
-        bar.share = if most > 0.0 { bar.share / most } else { 1.0 };
-    }
-    all
-}
-
-/// One stretch of sending as pieces of one rate each; their `share` is that rate.
-pub(crate) fn steps(source: &FigureSource<'_>, stretch: Span, sent: &[f64]) -> Vec<SendingBar> {
-    let cells = source.mission.activity.cells();
-    let from = cells.partition_point(|cell| cell.end <= stretch.start);
-    let to = cells.partition_point(|cell| cell.start < stretch.end);
-    let cells = &cells[from.min(to)..to];
-    let sent = &sent[from.min(to)..to];
-    let seconds = |k: usize| overlap(cells[k], stretch).max(1) as f64 / 1e9;
-    let count: f64 = sent.iter().sum();
-    let reach = libm::ceil(ENOUGH / (count / cells.len().max(1) as f64).max(1e-6));
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "at most the cells"
-    )]
-    let reach = (reach.clamp(1.0, cells.len().max(1) as f64) as usize - 1) / 2;
-    let rates: Vec<f64> = (0..cells.len())
-        .map(|k| {
-            let around = k.saturating_sub(reach)..(k + reach + 1).min(cells.len());
-            let time: f64 = around.clone().map(seconds).sum();
-            (sent[around].iter().sum::<f64>() / time).max(1e-3)
-        })
-        .collect();
-    let all = source.mission.activity.cells().len();
-    let level = levels(&rates, all as f64 / STEP, (all / SHORTEST_STEP).max(1));
-    let mut at = 0;
-    let mut bars = Vec::new();
-    for run in level.chunk_by(|a, b| a.total_cmp(b).is_eq()) {
-        let end = at + run.len();
-        let time: f64 = (at..end).map(seconds).sum();
-        bars.push(SendingBar {
-            span: Span {
-                start: cells[at].start.max(stretch.start),
-                end: cells[end - 1].end.min(stretch.end),
-            },
-            share: sent[at..end].iter().sum::<f64>() / time,
+impl Steps {
+    pub(crate) fn new(source: &FigureSource<'_>) -> Self {
+        let entries = source.mission.ledger.entries.iter();
+        let steps = entries.filter(|e| e.kind == Kind::Rate).filter_map(|e| {
+            let (node, topic) = source.mission.elements.ends(e.what);
+            Some((topic?, node, e.time))
         });
-        at = end;
+        Self(steps.collect())
     }
-    bars
+
+    fn has(&self, sender: &Sender, at: Stamp) -> bool {
+        let is = |node| self.0.contains(&(sender.topic, node, at));
+        is(sender.node) || is(None)
+    }
+
+    /// The rates of a sender: its stretches, of which those are joined that no step of the log and no long silence
+    /// parts.
+    pub(crate) fn pieces(&self, sender: &Sender, whole: Span) -> Vec<Piece> {
+        let least = silence(whole);
+        let parts =
+            |a: &Stretch, b: &Stretch| !self.has(sender, b.first) && b.first.since(a.last) < least;
+        let runs = sender.stretches.chunk_by(parts);
+        let piece = |run: &[Stretch]| {
+            let (first, last) = (run.first()?, run.last()?);
+            let nanos = last.last.since(first.first);
+            let count: u64 = run.iter().fold(0, |n, s| n.saturating_add(s.count));
+            let mean = count.saturating_sub(1) as f64 * 1e9 / nanos.max(1) as f64;
+            Some(Piece {
+                span: Span {
+                    start: first.first,
+                    end: last.last.plus(1),
+                },
+                hz: match run {
+                    [one] => one.hz(),
+                    _ if nanos > 0 => mean,
+                    _ => 0.0,
+                },
+            })
+        };
+        runs.filter_map(piece).collect()
+    }
 }
 
-fn overlap(a: Span, b: Span) -> i64 {
-    a.end.min(b.end).since(a.start.max(b.start))
+/// The mean rate while there is any; `None` where no time passes.
+pub(crate) fn mean(pieces: &[Piece]) -> Option<f64> {
+    let seconds = |p: &Piece| (p.span.nanos() - 1) as f64 / 1e9;
+    let time: f64 = pieces.iter().map(seconds).sum();
+    let count: f64 = pieces.iter().map(|p| p.hz * seconds(p)).sum();
+    (time > 1e-3).then(|| count / time)
+}
+
+/// The bars of several senders together.
+fn bars(rates: &[Vec<Piece>], whole: Span) -> Vec<SendingBar> {
+    let pieces = summed(rates, whole);
+    let most = pieces.iter().map(|p| p.hz).fold(0.0, f64::max);
+    let bar = |piece: Piece| SendingBar {
+        span: piece.span,
+        share: if most > 0.0 { piece.hz / most } else { 1.0 },
+    };
+    pieces.into_iter().map(bar).collect()
+}
+
+/// The sum of several rates over time; pieces too short to be seen belong to their neighbours.
+fn summed(rates: &[Vec<Piece>], whole: Span) -> Vec<Piece> {
+    let all = || rates.iter().flatten();
+    let mut turns: Vec<(Stamp, f64, i64)> = all().map(|p| (p.span.start, p.hz, 1)).collect();
+    turns.extend(all().map(|p| (p.span.end, -p.hz, -1)));
+    turns.sort_by(|a, b| a.0.cmp(&b.0).then(b.2.cmp(&a.2)).then(a.1.total_cmp(&b.1)));
+    let mut found: Vec<Piece> = Vec::new();
+    let (mut hz, mut many) = (0.0, 0);
+    for (pair, next) in turns.iter().zip(turns.iter().skip(1)) {
+        hz += pair.1;
+        many += pair.2;
+        let span = Span {
+            start: pair.0,
+            end: next.0,
+        };
+        if many == 0 || span.start >= span.end {
+            continue;
+        }
+        let short = span.nanos() < whole.nanos() / SEEN;
+        match found.last_mut() {
+            Some(last) if last.span.end == span.start && (short || same(last.hz, hz)) => {
+                last.span.end = span.end;
+            }
+            Some(last)
+                if last.span.end == span.start && last.span.nanos() < whole.nanos() / SEEN =>
+            {
+                (last.span.end, last.hz) = (span.end, f64::max(hz, 0.0));
+            }
+            _ => found.push(Piece {
+                span,
+                hz: f64::max(hz, 0.0),
+            }),
+        }
+    }
+    // Bars that follow one another within a silence too short to be seen are drawn without it.
+    let mut joined: Vec<Piece> = Vec::new();
+    for piece in found {
+        match joined.last_mut() {
+            Some(last) if piece.span.start.since(last.span.end) < silence(whole) => {
+                last.span.end = piece.span.start;
+                if same(last.hz, piece.hz) {
+                    last.span.end = piece.span.end;
+                } else {
+                    joined.push(piece);
+                }
+            }
+            _ => joined.push(piece),
+        }
+    }
+    joined
+}
+
+/// Whether two rates cannot be told apart as heights of bars.
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 0.01 * a.max(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn span(from: i64, to: i64) -> Span {
+        Span {
+            start: Stamp(from * SECOND),
+            end: Stamp(to * SECOND),
+        }
+    }
+
+    fn told(rates: &[&[(i64, i64, f64)]]) -> Vec<(i64, i64, f64)> {
+        let pieces = |all: &&[(i64, i64, f64)]| {
+            let piece = |(from, to, hz): &(i64, i64, f64)| Piece {
+                span: span(*from, *to),
+                hz: *hz,
+            };
+            all.iter().map(piece).collect::<Vec<Piece>>()
+        };
+        let rates: Vec<Vec<Piece>> = rates.iter().map(pieces).collect();
+        let second = |at: Stamp| at.0 / SECOND;
+        let all = summed(&rates, span(0, 800)).into_iter();
+        all.map(|p| (second(p.span.start), second(p.span.end), libm::round(p.hz)))
+            .collect()
+    }
+
+    #[test]
+    fn rates_add_up_while_they_overlap() {
+        let found = told(&[&[(0, 100, 10.0)], &[(50, 200, 5.0)]]);
+        assert_eq!(found, [(0, 50, 10.0), (50, 100, 15.0), (100, 200, 5.0)]);
+    }
+
+    #[test]
+    fn what_is_too_short_to_be_seen_is_no_step() {
+        let found = told(&[&[(0, 100, 10.0)], &[(1, 100, 5.0)]]);
+        assert_eq!(found, [(0, 100, 15.0)]);
+        let found = told(&[&[(0, 100, 10.0), (103, 200, 10.0)]]);
+        assert_eq!(found, [(0, 200, 10.0)]);
+        let found = told(&[&[(0, 100, 10.0), (150, 200, 10.0)]]);
+        assert_eq!(found, [(0, 100, 10.0), (150, 200, 10.0)]);
+    }
 }

@@ -75,14 +75,7 @@ impl<'a> DotView<'a> {
 
     /// The words of the evidence for an item or arrow.
     fn evidence(&self, members: &[Element]) -> String {
-        let all = self.elements;
-        let of = |element: &Element| match element {
-            Element::Node(id) => all.nodes.get(*id as usize).map(|n| n.evidence),
-            Element::Topic(id) => all.topics.get(*id as usize).map(|t| t.evidence),
-            Element::Publish(id) => all.publishes.get(*id as usize).map(|e| e.evidence),
-            Element::Subscribe(id) => all.subscribes.get(*id as usize).map(|e| e.evidence),
-        };
-        let known = members.iter().filter_map(of);
+        let known = members.iter().map(|what| self.elements.evidence(*what));
         let words: Vec<&str> = known.fold(Evidence::NONE, Evidence::and).words().collect();
         words.join(" ")
     }

@@ -1,11 +1,14 @@
 //! The life lines in the strip below the graph, with phases, starts, stops and hand-overs at their true places.
 
-use crate::base::geometry::{Point, Rect};
+use crate::base::geometry::{Point, Rect, Size};
 use crate::base::time::{Span, Stamp};
+use crate::draw::figure::canvas::entry_data;
 use crate::draw::figure::course::Course;
+use crate::draw::figure::marks::Sign;
 use crate::draw::figure::tracks::SendingBar;
 use crate::draw::scene::{Form, Group, Shape, Step, Stroke, line};
 use crate::draw::style::{Color, Style};
+use crate::mission::EntryId;
 
 /// The strip in which the course is drawn, with the place of each moment.
 pub(crate) struct CourseStrip<'a> {
@@ -63,38 +66,63 @@ impl CourseStrip<'_> {
         Shape::filled(Form::Path(steps), color)
     }
 
-    /// Lives as thin lines, with their starts and ends, and hand-overs.
+    /// Lives as thin lines.
     pub(crate) fn lives(&self, course: &Course) -> Group {
         let mut group = Group::named("lives");
         let pitch = self.pitch(course);
-        let y = |k: usize| self.plot.y + (k as f64 + 0.5) * pitch;
         let thin = Stroke::solid(self.style.timeline.axis, (pitch * 0.12).clamp(0.4, 1.0));
-        let tick = |color| Stroke::solid(color, TICK * self.unit);
         for (k, row) in course.rows.iter().enumerate() {
             for life in &row.lives {
                 let ends = [life.span.start, life.span.end].map(|at| self.x(at));
-                let along = line(Point::new(ends[0], y(k)), Point::new(ends[1], y(k)));
+                let y = self.y(course, k);
+                let along = line(Point::new(ends[0], y), Point::new(ends[1], y));
                 group.shape(Shape::line(along, thin.clone()));
-                let across = |x: f64| {
-                    line(
-                        Point::new(x, y(k) - pitch * 0.45),
-                        Point::new(x, y(k) + pitch * 0.45),
-                    )
-                };
-                if life.begins {
-                    group.shape(Shape::line(across(ends[0]), tick(self.style.added.color)));
-                }
-                if life.ends {
-                    group.shape(Shape::line(across(ends[1]), tick(self.style.removed.color)));
-                }
             }
         }
-        for (at, from, to) in &course.handovers {
-            let x = self.x(*at);
-            let hand = line(Point::new(x, y(*from)), Point::new(x, y(*to)));
-            group.shape(Shape::line(hand, tick(self.style.changed.color)));
-        }
         group
+    }
+
+    /// The events of the log on their rows, a group each: starts, ends, small circles for others, and hand-overs.
+    pub(crate) fn events(&self, course: &Course) -> Vec<Group> {
+        let pitch = self.pitch(course);
+        let group = |class: &str, at: usize, entry: EntryId, shape: Shape| {
+            let mut group = Group::named(&format!("{class}-{at}"));
+            class.clone_into(&mut group.class);
+            group.data = entry_data(&[entry]);
+            group.shape(shape);
+            group
+        };
+        let tick = |color| Stroke::solid(color, TICK * self.unit);
+        let across = |x: f64, y: f64, color| {
+            let ends = [y - pitch * 0.45, y + pitch * 0.45].map(|y| Point::new(x, y));
+            Shape::line(line(ends[0], ends[1]), tick(color))
+        };
+        let marks = course.marks.iter().enumerate().map(|(at, mark)| {
+            let (x, y) = (self.x(mark.at), self.y(course, mark.track));
+            let (class, shape) = match mark.sign {
+                Sign::Start => ("start", across(x, y, self.style.added.color)),
+                Sign::End => ("end", across(x, y, self.style.removed.color)),
+                Sign::Dot => {
+                    let wide = (pitch * 0.5).min(4.0 * self.unit);
+                    let round = Rect::around(Point::new(x, y), Size::new(wide, wide));
+                    let form = Form::Ellipse(round);
+                    ("event", Shape::filled(form, self.style.changed.color))
+                }
+            };
+            group(class, at, mark.entry, shape)
+        });
+        let hands = course.handovers.iter().enumerate().map(|(at, hand)| {
+            let x = self.x(hand.at);
+            let ends = [hand.from, hand.to].map(|k| Point::new(x, self.y(course, k)));
+            let shape = Shape::line(line(ends[0], ends[1]), tick(self.style.changed.color));
+            group("handover", at, hand.entry, shape)
+        });
+        marks.chain(hands).collect()
+    }
+
+    /// The middle of a row.
+    fn y(&self, course: &Course, row: usize) -> f64 {
+        self.plot.y + (row as f64 + 0.5) * self.pitch(course)
     }
 
     fn pitch(&self, course: &Course) -> f64 {

@@ -8,9 +8,11 @@ use crate::base::geometry::{Point, Rect};
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::draw::figure::Course;
+use crate::draw::figure::canvas::entry_data;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Step, Stroke, Text, line, polygon};
 use crate::draw::style::Style;
 use crate::draw::text::{Fonts, Weight};
+use crate::mission::EntryId;
 use crate::mission::ledger::Kind;
 use crate::view::{Frame, View};
 
@@ -116,7 +118,10 @@ impl<'a> Timeline<'a> {
         let axis = line(Point::new(self.plot.x, y), Point::new(self.plot.right(), y));
         bars.shape(Shape::line(axis, Stroke::solid(style.axis, self.page.unit)));
         let mut groups = vec![bars, self.axis()];
-        groups.extend(self.course.iter().map(|course| self.strip().lives(course)));
+        if let Some(course) = &self.course {
+            groups.push(self.strip().lives(course));
+            groups.extend(self.strip().events(course));
+        }
         groups.extend(self.marks(view));
         groups
     }
@@ -187,19 +192,21 @@ impl<'a> Timeline<'a> {
     }
 
     /// Signs at the times at which something came, changed or went: three lanes, one for each. Signs that would cover
-    /// each other are one, as far as they belong to one window; each knows its window and the number of headlines it
-    /// stands for.
+    /// each other are one, as far as they belong to one window; each knows its window and the headlines it stands
+    /// for.
     fn marks(&self, view: &View) -> Vec<Group> {
         let mut groups = Vec::new();
         let radius = LANE * 0.42 * self.page.unit;
         for (window, frame) in view.frames.iter().enumerate() {
             for lane in 0..3 {
                 let of_lane = frame.headlines.iter().filter(|h| lane_of(h.kind) == lane);
-                let mut times: Vec<f64> = of_lane.map(|h| self.x(h.time)).collect();
-                times.sort_by(f64::total_cmp);
-                for (at, some) in times.chunk_by(|a, b| b - a < 2.0 * radius).enumerate() {
-                    let x = f64::midpoint(some[0], some[some.len() - 1]);
-                    groups.push(self.mark((window, lane, at), x, radius, some.len()));
+                let mut times: Vec<(f64, EntryId)> =
+                    of_lane.map(|h| (self.x(h.time), h.entry)).collect();
+                times.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                for (at, some) in times.chunk_by(|a, b| b.0 - a.0 < 2.0 * radius).enumerate() {
+                    let x = f64::midpoint(some[0].0, some[some.len() - 1].0);
+                    let entries: Vec<EntryId> = some.iter().map(|(_, entry)| *entry).collect();
+                    groups.push(self.mark((window, lane, at), x, radius, &entries));
                 }
             }
         }
@@ -211,14 +218,12 @@ impl<'a> Timeline<'a> {
         (window, lane, at): (usize, usize, usize),
         x: f64,
         radius: f64,
-        entries: usize,
+        entries: &[EntryId],
     ) -> Group {
         let mut group = Group::named(&format!("mark-{window}-{lane}-{at}"));
         "mark".clone_into(&mut group.class);
-        group.data = vec![
-            ("window", window.to_string()),
-            ("entries", entries.to_string()),
-        ];
+        group.data = vec![("window", window.to_string())];
+        group.data.extend(entry_data(entries));
         let paint = [
             self.style.added.color,
             self.style.changed.color,

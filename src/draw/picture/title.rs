@@ -213,7 +213,7 @@ impl<'a> Title<'a> {
         let mut group = Group::named("chips");
         let chip = &self.style.chip;
         let texts = chips::chips(&frame.counts);
-        group.data = vec![("entries", frame.counts.total().to_string())];
+        group.data = vec![("entries", entries(frame))];
         let paint = [
             (chip.added, chip.added_text),
             (chip.removed, chip.removed_text),
@@ -272,6 +272,8 @@ impl<'a> Title<'a> {
     /// The line below the bar: the mission's phase, and the changes in words.
     pub(crate) fn caption(&self, frame: &Frame, phase: &str) -> Group {
         let mut group = Group::named("caption");
+        "caption headline".clone_into(&mut group.class);
+        group.data = vec![("entries", entries(frame))];
         let (style, place) = (&self.style.caption, self.page.caption);
         let size = style.size * self.page.unit;
         if style.fill != self.style.page.background {
@@ -327,6 +329,12 @@ impl<'a> Title<'a> {
                 .into_owned()
         })
     }
+}
+
+/// The places in the log of a window's headlines, separated by blanks.
+fn entries(frame: &Frame) -> String {
+    let ids = frame.headlines.iter().map(|h| h.entry.to_string());
+    ids.collect::<Vec<_>>().join(" ")
 }
 
 /// The titles of the windows of a comparison.

@@ -9,22 +9,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::NamedTopics;
+use crate::base::rhythm::{BREAK_NS, FEWEST, RECENT, UNUSUAL, broken_after};
 use crate::base::time::Stamp;
 use crate::evidence::SOURCES;
 use crate::evidence::claim::{Claim, Claims, Degree, Name, Statement};
 use crate::evidence::proof::{Reliability, Stream};
 use crate::evidence::times::{SeriesId, Stamps};
-
-/// The fewest signs of a node, and the fewest messages of a topic, that show a habit.
-const FEWEST: usize = 5;
-/// A silence as a multiple of the longest pause before it that is the end of a habit.
-const UNUSUAL: i64 = 3;
-/// The same for the messages of a topic, of which one or two are lost now and then.
-const BREAK: i64 = 5;
-/// The shortest silence that ends a habit, in nanoseconds: a recorder writes its topics up to a second apart.
-const BREAK_NS: i64 = 2_000_000_000;
-/// The number of intervals between messages before a silence that show the usual one.
-const RECENT: usize = 20;
 
 /// Finds the nodes of a rewritten bag that ended before their topics did; `of_bag` are the places of its streams. Each
 /// gets a claim of its end; what is left of a topic whose header names it becomes a stream of its own.
@@ -258,7 +248,7 @@ impl Habit {
     /// The habit in sorted signs; `None` for too few.
     fn of(signs: &[Stamp]) -> Option<Self> {
         let pauses = signs.windows(2).map(|pair| pair[1].since(pair[0]));
-        (signs.len() >= FEWEST).then_some(Self {
+        (signs.len() as u64 >= FEWEST).then_some(Self {
             last: *signs.last()?,
             pause: pauses.max()?,
         })
@@ -275,8 +265,8 @@ fn silence(times: &[Stamp], habit: Habit, end: Stamp) -> Option<(Stamp, Option<S
     let last = (from..to).max_by_key(|at| (length(at), std::cmp::Reverse(*at)))?;
     let recent = &times[last.saturating_sub(RECENT)..=last];
     let usual = recent.windows(2).map(|pair| pair[1].since(pair[0])).max()?;
-    let long = usual.saturating_mul(BREAK).max(BREAK_NS);
-    (recent.len() >= FEWEST && length(&last) > long).then_some((times[last], next(last)))
+    (recent.len() as u64 >= FEWEST && length(&last) > broken_after(usual))
+        .then_some((times[last], next(last)))
 }
 
 #[cfg(test)]

@@ -135,7 +135,7 @@ fn words(known: &Conclusions<'_>, node: Name, contract: &Contract) -> String {
     let verb = if contract.publishes {
         "publishes"
     } else {
-        "subscribes"
+        "subscribes to"
     };
     format!(
         "{} is taken for the one of package {}, which {verb} {} (contracts.csv line {}: {})",

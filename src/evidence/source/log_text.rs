@@ -111,7 +111,11 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             degree: Degree::Stated,
             when: Validity::Signs { signs, ends },
         };
-        let verb = if publishes { "publishes" } else { "subscribes" };
+        let verb = if publishes {
+            "publishes"
+        } else {
+            "subscribes to"
+        };
         known.because(proof, first, |known| {
             format!("{} logs that it {verb} {full}", known.text(logger))
         });

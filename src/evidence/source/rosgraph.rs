@@ -135,7 +135,7 @@ pub(crate) fn read(
         for end in node.list("subscriptions") {
             let (of, kind) = endpoint(heard, end);
             heard.say(now(Claim::Subscribe(id, of)), || {
-                format!("{name} subscribes {}", end.text("name"))
+                format!("{name} subscribes to {}", end.text("name"))
             });
             heard.say(now(Claim::Type(of, kind)), String::new);
         }

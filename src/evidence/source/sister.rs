@@ -85,7 +85,7 @@ fn copy(source: SourceId, known: &mut Conclusions<'_>, from: &Twin, to: &Twin) {
             let what = ElementKey::Subscribe(twin, to.node);
             known.infer(source, what, ElementKey::Node(to.node), |known| {
                 format!(
-                    "{} publishes the same topics in its namespace and subscribes {}",
+                    "{} publishes the same topics in its namespace and subscribes to {}",
                     known.text(from.node),
                     known.text(topic)
                 )

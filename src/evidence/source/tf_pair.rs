@@ -20,7 +20,7 @@ pub(crate) fn conclude(source: SourceId, known: &mut Conclusions<'_>) {
             let basis = ElementKey::Subscribe(topic, node);
             known.infer(source, ElementKey::Subscribe(twin, node), basis, |known| {
                 format!(
-                    "{} subscribes {text}, and tf2 always subscribes both",
+                    "{} subscribes to {text}, and tf2 always subscribes to both",
                     known.text(node)
                 )
             });

@@ -14,13 +14,14 @@ use crate::base::time::Stamp;
 use crate::base::words;
 use crate::base::words::visible;
 use crate::draw::figure::course::{LifeLine, LifeLines};
+use crate::draw::figure::marks::Sign;
 use crate::draw::picture::chips;
 use crate::draw::picture::title::SIDES;
 use crate::evidence::Evidence;
 use crate::graph::{Element, Elements};
-use crate::mission::Mission;
 use crate::mission::events::sentence_with;
 use crate::mission::ledger::Kind;
+use crate::mission::{EntryId, Mission};
 use crate::view::runs::ElementRuns;
 use crate::view::{Arrow, ArrowKind, Frame, Item};
 
@@ -50,8 +51,8 @@ struct PageData<'a> {
     phases: Vec<(f64, f64, String)>,
     /// The life lines, from top to bottom.
     rows: Vec<RowData>,
-    /// Hand-overs: the time, the row before and the row after.
-    hands: Vec<(f64, usize, usize)>,
+    /// Hand-overs: the time, the row before, the row after, and the event's place in the log.
+    hands: Vec<(f64, usize, usize, EntryId)>,
     /// Font sizes: of rates, topics' names, nodes' names, namespaces' titles.
     sizes: [f64; 4],
     /// The titles of the two windows where two missions are compared; absent otherwise.
@@ -89,15 +90,20 @@ struct GraphData<'a> {
 
 /// The headlines of a window: its place, the number of headlines, the words of the three chips, and for each of the
 /// first [`MOST_TOLD`] headlines its time, its sign (0 came, 1 went, 2 changed), its element (-1 for one that is not
-/// drawn), its words.
+/// drawn), its words, its place in the log.
 #[derive(Serialize)]
-struct ToldData(usize, usize, [String; 3], Vec<(f64, u8, i64, String)>);
+struct ToldData(
+    usize,
+    usize,
+    [String; 3],
+    Vec<(f64, u8, i64, String, EntryId)>,
+);
 
-/// A life line: its element (-1 for a namespace's title), its name, 1 below such a title, its lives as `[start, end,
-/// flags, …]` (1 it began, 2 it ended, 4 by inference only), and its times of sending as `[start, end, ninths of its
-/// highest rate, …]`.
+/// A life line: its element (-1 for a namespace's title), its name, 1 below such a title, its lives as `[start, end, 1 by
+/// inference only, …]`, its times of sending as `[start, end, ninths of its highest rate, …]`, and its events as their
+/// times, signs and places in the log.
 #[derive(Serialize)]
-struct RowData(i64, String, u8, Vec<f64>, Vec<f64>);
+struct RowData(i64, String, u8, Vec<f64>, Vec<f64>, Vec<(f64, u8, EntryId)>);
 
 /// The largest number of headlines of one window that are written out.
 const MOST_TOLD: usize = 200;
@@ -130,7 +136,9 @@ pub(super) fn json(page: &HtmlPage<'_>, still: usize) -> String {
         rows: lives.map_or_else(Vec::new, |lives| rows(lives, &places, clock)),
         hands: lives.map_or_else(Vec::new, |lives| {
             let hands = lives.handovers.iter();
-            hands.map(|(at, a, b)| (clock.secs(*at), *a, *b)).collect()
+            hands
+                .map(|h| (clock.secs(h.at), h.from, h.to, h.entry))
+                .collect()
         }),
         sizes: [
             style.edge.size.min(style.topic.small).min(style.node.small),
@@ -242,7 +250,8 @@ fn told(page: &HtmlPage<'_>, places: &BTreeMap<Element, u32>, clock: PageClock) 
                 let own = parts.get(&headline.entry).map_or(&[][..], |p| &p[..]);
                 let what = places.get(&headline.what).map_or(-1, |at| i64::from(*at));
                 let sentence = sentence_with(mission, own, entry);
-                Some((clock.secs(entry.time), sign(entry.kind), what, sentence))
+                let time = clock.secs(entry.time);
+                Some((time, sign(entry.kind), what, sentence, headline.entry))
             });
         ToldData(at, frame.counts.total(), chips, lines.collect())
     };
@@ -270,21 +279,24 @@ fn phases(mission: &Mission, clock: PageClock) -> Vec<(f64, f64, String)> {
     }
 }
 
-fn rows(lives: &LifeLines, places: &BTreeMap<Element, u32>, clock: PageClock) -> Vec<RowData> {
-    let row = |line: &LifeLine| {
+fn rows(lives_of: &LifeLines, places: &BTreeMap<Element, u32>, clock: PageClock) -> Vec<RowData> {
+    let row = |(at, line): (usize, &LifeLine)| {
         let place = line.what.and_then(|what| places.get(&what));
         let lives = line.lives.iter().flat_map(|life| {
-            let flags = [
-                (life.begins, 1.0),
-                (life.ends, 2.0),
-                (life.is_inferred, 4.0),
-            ];
-            let flags = flags.iter().filter(|(is, _)| *is).map(|(_, n)| n).sum();
             [
                 clock.secs(life.span.start),
                 clock.secs(life.span.end),
-                flags,
+                f64::from(u8::from(life.is_inferred)),
             ]
+        });
+        let marks = lives_of.marks.iter().filter(|mark| mark.track == at);
+        let marks = marks.map(|mark| {
+            let sign = match mark.sign {
+                Sign::Start => 0,
+                Sign::End => 1,
+                Sign::Dot => 2,
+            };
+            (clock.secs(mark.at), sign, mark.entry)
         });
         let bars = line.bars.iter().flat_map(|bar| {
             let ninths = libm::round(bar.share * 9.0).max(1.0);
@@ -298,9 +310,10 @@ fn rows(lives: &LifeLines, places: &BTreeMap<Element, u32>, clock: PageClock) ->
             u8::from(line.is_inside),
             lives.collect(),
             bars.collect(),
+            marks.collect(),
         )
     };
-    lives.rows.iter().map(row).collect()
+    lives_of.rows.iter().enumerate().map(row).collect()
 }
 
 /// The text for the page and its type.
@@ -412,9 +425,8 @@ fn topic(elements: &Elements, element: Element) -> Option<&crate::graph::Topic> 
 }
 
 fn name(elements: &Elements, element: Element) -> Option<&str> {
-    match element {
-        Element::Node(id) => elements.nodes.get(id as usize).map(|n| n.name.as_str()),
-        Element::Topic(id) => elements.topics.get(id as usize).map(|t| t.name.as_str()),
-        Element::Publish(_) | Element::Subscribe(_) => None,
+    match elements.names(element) {
+        (Some(_), Some(_)) => None,
+        (node, topic) => node.or(topic),
     }
 }

@@ -38,7 +38,14 @@ pub(super) fn rows(view: &View) -> String {
     for frame in view.frames.iter().filter(|f| is_told(f)).take(MOST_ROWS) {
         let millis = frame.span.start.since(start) / 1_000_000;
         let secs = millis as f64 / 1e3;
-        xml.open("tr").open("th").open("a");
+        let entries: Vec<String> = frame
+            .headlines
+            .iter()
+            .map(|h| h.entry.to_string())
+            .collect();
+        xml.open("tr");
+        xml.attribute("data-entries", entries.join(" "));
+        xml.open("th").open("a");
         xml.attribute("href", format_args!("#t={secs}"));
         if view.compares {
             xml.text(SIDES[frame.index.min(1)]);

@@ -412,16 +412,8 @@ fn names(mission: &Mission, nodes: &[NodeId]) -> String {
 
 /// The node and the topic of an element; unknown for the one it does not have.
 fn ends(mission: &Mission, what: Element) -> [TableCell<'_>; 2] {
-    let elements = &mission.elements;
-    let node = |id: u32| TableCell::text(elements.nodes[id as usize].name.as_str());
-    let topic = |id: u32| TableCell::text(elements.topics[id as usize].name.as_str());
-    let both = |edge: &Edge| [node(edge.node), topic(edge.topic)];
-    match what {
-        Element::Node(id) => [node(id), TableCell::Null],
-        Element::Topic(id) => [TableCell::Null, topic(id)],
-        Element::Publish(id) => both(&elements.publishes[id as usize]),
-        Element::Subscribe(id) => both(&elements.subscribes[id as usize]),
-    }
+    let (node, topic) = mission.elements.names(what);
+    [node, topic].map(|name| TableCell::known(name, TableCell::text))
 }
 
 /// `win start_ns end_ns length_ns` of a window.

@@ -164,11 +164,7 @@ pub(super) fn topics(mission: &Mission, row: RowTaker<'_>) {
 pub(super) fn edges(mission: &Mission, row: RowTaker<'_>) {
     let turns = turns(mission);
     let all = &mission.elements;
-    let publishes = (0..).zip(&all.publishes);
-    let publishes = publishes.map(|(id, edge)| (Element::Publish(id), edge));
-    let subscribes = (0..).zip(&all.subscribes);
-    let subscribes = subscribes.map(|(id, edge)| (Element::Subscribe(id), edge));
-    for (what, edge) in publishes.chain(subscribes) {
+    for (what, edge) in all.edges() {
         edge_rows(mission, &turns, (what, edge), row);
     }
 }

@@ -3,16 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{list, mapping, scalar};
+use crate::base::rhythm::{CLOSING_NS, FEWEST};
 use crate::evidence::Degree;
-use crate::gate::facts::{Facts, Rate, SHUTDOWN_NS};
+use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::Range;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::ledger::Kind;
 
-/// The least number of messages of a topic with a rate.
-const FEWEST: u64 = 5;
 /// The share by which a rate may differ from run to run.
 const SHARE: f64 = 0.1;
 /// The number of times the spread between windows by which a rate may differ besides.
@@ -133,7 +132,7 @@ fn node(facts: &Facts<'_>, nodes: &[NodeId]) -> NodeLine {
     let whole = facts.mission.span.end;
     NodeLine {
         optional: false,
-        may_end: end.is_some_and(|end| whole.since(end) > SHUTDOWN_NS),
+        may_end: end.is_some_and(|end| whole.since(end) > CLOSING_NS),
         restarts: facts.entries(nodes, Kind::Restarted).len(),
         lifecycle: facts.lifecycle(nodes).map(str::to_owned),
     }
@@ -195,7 +194,7 @@ fn topic(seen: &[TopicInRun<'_>]) -> TopicLine {
 impl TopicInRun<'_> {
     fn ends(&self) -> bool {
         let heard = self.facts.heard(self.id);
-        heard.is_some_and(|h| self.facts.mission.span.end.since(h.end) > SHUTDOWN_NS)
+        heard.is_some_and(|h| self.facts.mission.span.end.since(h.end) > CLOSING_NS)
     }
 
     fn kinds(&self) -> BTreeSet<String> {

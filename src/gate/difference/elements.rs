@@ -3,15 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Difference, Where};
+use crate::base::rhythm::{CLOSING_NS, FEWEST};
 use crate::base::words;
 use crate::evidence::Degree;
-use crate::gate::facts::{Facts, Rate, SHUTDOWN_NS};
+use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
 use crate::graph::{NodeId, TopicId};
 use crate::mission::ledger::Kind;
 
-/// The least number of messages that tell a rate.
-const FEWEST: u64 = 5;
 /// The number of standard deviations beyond which rates differ by more than chance.
 const SIGMAS: f64 = 3.0;
 
@@ -116,7 +115,7 @@ fn node(
 /// The time at which nodes ended in words, if they did not stay.
 fn end(facts: &Facts<'_>, nodes: &[NodeId]) -> Option<String> {
     let end = facts.lives(nodes).last()?.end;
-    let is_over = facts.mission.span.end.since(end) > SHUTDOWN_NS;
+    let is_over = facts.mission.span.end.since(end) > CLOSING_NS;
     is_over.then(|| format!("ends at {}", facts.clock(end)))
 }
 

@@ -8,11 +8,12 @@ use crate::base::words;
 use crate::evidence::{Degree, Evidence};
 use crate::gate::facts::Facts;
 use crate::gate::pattern::Pattern;
+use crate::graph::history::Sending;
 use crate::graph::{
     Edge, EdgeState, Element, Elements, Graph, Node, NodeState, State, Topic, TopicState,
 };
 use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger, sorted};
-use crate::mission::{Activity, Mission, Window};
+use crate::mission::{Mission, Window};
 
 use super::{Difference, Where};
 
@@ -164,7 +165,7 @@ pub(crate) fn union(
         elements,
         windows,
         graphs,
-        activity: Activity::default(),
+        sending: Sending::default(),
         undrawn: Vec::new(),
         layout: None,
         notices: Notices::new(),
@@ -355,30 +356,14 @@ impl UnionLedger<'_> {
     /// Adds the entries of edges, which come and go with their nodes, or by themselves.
     fn edges(&mut self, wholes: &BTreeMap<u32, EntryId>) {
         let elements = self.elements;
-        let name = |edge: &Edge| {
+        for (what, edge) in elements.edges() {
             let node = elements.nodes[edge.node as usize].name.as_str();
-            (node, elements.topics[edge.topic as usize].name.as_str())
-        };
-        let sent = (0..).zip(&elements.publishes).map(|(id, edge)| {
-            let (node, topic) = name(edge);
-            (
-                Element::Publish(id),
-                edge.node,
-                "publishes",
-                format!("{node} → {topic}"),
-            )
-        });
-        let heard = (0..).zip(&elements.subscribes).map(|(id, edge)| {
-            let (node, topic) = name(edge);
-            (
-                Element::Subscribe(id),
-                edge.node,
-                "subscribes",
-                format!("{topic} → {node}"),
-            )
-        });
-        for (what, node, kind, label) in sent.chain(heard) {
-            if let Some(whole) = wholes.get(&node).copied() {
+            let topic = elements.topics[edge.topic as usize].name.as_str();
+            let (kind, label) = match what {
+                Element::Publish(_) => ("publishes", format!("{node} → {topic}")),
+                _ => ("subscribes", format!("{topic} → {node}")),
+            };
+            if let Some(whole) = wholes.get(&edge.node).copied() {
                 let came = self
                     .entries
                     .get(whole as usize)

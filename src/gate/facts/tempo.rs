@@ -1,12 +1,10 @@
 //! The rates of topics, window by window, and their silences.
 
-use super::{Facts, SHUTDOWN_NS};
+use super::Facts;
+use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::{Span, Stamp};
 use crate::graph::{Element, Row, TopicId};
 use crate::mission::Window;
-
-/// The time in nanoseconds after which a recorder has found all topics that are there when it starts.
-const FOUND_NS: i64 = 2_500_000_000;
 
 /// The rate of a topic in a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,21 +49,13 @@ impl Rate {
 impl<'a> Facts<'a> {
     /// The first and the last message of a topic, the latter 1 ns before the end; `None` if it has none.
     pub(crate) fn heard(&self, topic: TopicId) -> Option<Span> {
-        let sending = &self.mission.activity.sending.topics;
-        if let Some(stretches) = sending.get(topic as usize)
-            && let (Some(first), Some(last)) = (stretches.first(), stretches.last())
-        {
-            return Some(Span {
-                start: first.start,
-                end: last.end,
-            });
-        }
-        let mut rows = self.rows(topic).filter(|(_, row)| count(row) > 0);
-        let first = rows.next()?.0.span;
-        let last = rows.last().map_or(first, |(window, _)| window.span);
+        let of = self.mission.sending.of_topic(topic).iter();
+        let stretches = of.flat_map(|sender| &sender.stretches);
+        let first = stretches.clone().map(|s| s.first).min()?;
+        let last = stretches.map(|s| s.last).max()?;
         Some(Span {
-            start: first.start,
-            end: last.end,
+            start: first,
+            end: last.plus(1),
         })
     }
 
@@ -127,11 +117,11 @@ impl<'a> Facts<'a> {
         let mut span = window;
         if heard.start > span.start {
             // What is there when the recorder starts is heard a moment later; all else is not whole.
-            let found = span.start == whole.start && heard.start.since(whole.start) <= FOUND_NS;
+            let found = span.start == whole.start && heard.start.since(whole.start) <= DISCOVERY_NS;
             span.start = found.then_some(heard.start)?;
         }
         if heard.end < span.end {
-            let is_over = whole.end.since(heard.end) <= SHUTDOWN_NS;
+            let is_over = whole.end.since(heard.end) <= CLOSING_NS;
             match (is_over, may_end) {
                 (true, _) => span.end = heard.end,
                 (false, true) => return None,
@@ -168,27 +158,17 @@ impl<'a> Facts<'a> {
                 end: whole.end,
             };
             // Where it does not end with the robot.
-            if span.nanos() > SHUTDOWN_NS {
+            if span.nanos() > CLOSING_NS {
                 all.extend(clipped(span, during));
             }
         }
         all
     }
 
-    /// The longest times between two messages; of a mission in JSON only those that end a stretch of sending.
+    /// The longest times between two messages, where single messages are known.
     fn pauses(&self, topic: TopicId) -> impl Iterator<Item = Span> + use<'a> {
-        let sending = &self.mission.activity.sending;
-        let exact = sending.pauses.get(topic as usize);
-        let stretches = sending
-            .topics
-            .get(topic as usize)
-            .filter(|_| exact.is_none());
-        let between = stretches.map_or(&[][..], Vec::as_slice).windows(2);
-        let between = between.map(|pair| Span {
-            start: pair[0].end.plus(-1),
-            end: pair[1].start,
-        });
-        exact.into_iter().flatten().copied().chain(between)
+        let pauses = self.mission.sending.pauses.get(topic as usize);
+        pauses.into_iter().flatten().copied()
     }
 }
 

@@ -1,10 +1,10 @@
 //! The judgement of nodes: to be there, to stay, to come in time, not to restart, to end in a state.
 
 use super::{Judge, absence};
+use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{Named, NodeFacts, YamlPlace};
-use crate::gate::facts::SHUTDOWN_NS;
 use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::graph::NodeId;
@@ -160,7 +160,7 @@ impl Judge<'_> {
     fn gone(&self, role: &str, nodes: &[NodeId], at: YamlPlace) -> Option<Finding> {
         let whole = self.facts.mission.span;
         let end = self.facts.lives(nodes).last()?.end;
-        if whole.end.since(end) <= SHUTDOWN_NS {
+        if whole.end.since(end) <= CLOSING_NS {
             return None;
         }
         let clock = self.facts.clock(end);
@@ -181,8 +181,8 @@ impl Judge<'_> {
                 words::duration(whole.end.since(end))
             ));
         let around = Span {
-            start: end.plus(-SHUTDOWN_NS),
-            end: end.plus(SHUTDOWN_NS),
+            start: end.plus(-CLOSING_NS),
+            end: end.plus(CLOSING_NS),
         };
         finding.cause = self.facts.cause(&nodes.iter().copied().collect(), around);
         Some(finding)

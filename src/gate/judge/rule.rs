@@ -9,7 +9,7 @@ use crate::gate::expectation::{
 use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
 use crate::gate::range::{During, Range};
-use crate::graph::lives::Bound;
+use crate::graph::history::Bound;
 use crate::mission::events::sentence;
 use crate::mission::ledger::Entry;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io;
 
-use super::history::History;
+use super::history::{History, Record};
 use super::rates::{Sums, rates};
 use super::senders::sender;
 use super::windows::SortedWindows;
@@ -14,8 +14,8 @@ use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::graph::{
-    Column, ColumnCursor, ColumnWriter, EdgeId, EdgeState, Graphs, GraphsWriter, NodeState, Row,
-    State, TopicState, per_second,
+    Column, ColumnCursor, ColumnWriter, EdgeId, EdgeState, Element, Graphs, GraphsWriter,
+    NodeState, Row, State, TopicState, per_second,
 };
 
 /// The graphs of the windows of one division of time.
@@ -123,20 +123,21 @@ impl GraphAssembly<'_> {
     }
 
     fn topic(&mut self, id: u32, sums: Option<&[Sums]>) {
-        let course = &self.history.topics[id as usize];
-        let runs = &self.history.elements.topics[id as usize].runs;
+        let Some(record) = self.history.records.of(Element::Topic(id)) else {
+            return;
+        };
         let mut list = sums.unwrap_or_default().iter().peekable();
         let mut states = ColumnWriter::default();
         for (at, window) in self.windows.0.iter().enumerate() {
             let sum = list.next_if(|sum| sum.window == at);
-            if !self.sees(runs, *window) {
+            if !self.sees(record, *window) {
                 continue;
             }
             let count = sum.map_or(0, |sum| sum.count);
             let state = TopicState {
                 id,
-                state: course.state(*window, sum.is_some()),
-                degree: course.degree,
+                state: record.state(*window, sum.is_some()),
+                degree: record.degree,
                 count,
                 bytes: bytes(sum, sums.is_some()),
                 hz: per_second(count, *window),
@@ -151,17 +152,18 @@ impl GraphAssembly<'_> {
 
     fn nodes(&mut self) {
         for (name, id) in &self.history.node_ids {
-            let course = &self.history.nodes[*id as usize];
-            let runs = &self.history.elements.nodes[*id as usize].runs;
+            let Some(record) = self.history.records.of(Element::Node(*id)) else {
+                continue;
+            };
             let sent = self.sent.get(name);
             for (at, window) in self.windows.0.iter().enumerate() {
-                if !self.sees(runs, *window) {
+                if !self.sees(record, *window) {
                     continue;
                 }
                 let state = NodeState {
                     id: *id,
-                    state: course.state(*window, false),
-                    degree: course.degree,
+                    state: record.state(*window, false),
+                    degree: record.degree,
                     hz: sent.and_then(|of| per_second(of[at], *window)),
                     lifecycle: self.findings.values.lifecycle(*name, *window),
                 };
@@ -177,7 +179,10 @@ impl GraphAssembly<'_> {
         let nodes = names(&self.history.node_ids);
         let topics = names(&self.history.topic_ids);
         let edges = self.history.elements.publishes.iter();
-        for ((id, edge), course) in (0..).zip(edges).zip(&self.history.publishes) {
+        for (id, edge) in (0..).zip(edges) {
+            let Some(record) = self.history.records.of(Element::Publish(id)) else {
+                continue;
+            };
             let ends = nodes.get(&edge.node).zip(topics.get(&edge.topic));
             let sent = ends.and_then(|(node, topic)| self.published.get(&(*node, *topic)));
             let mut sent = sent.map(Column::cursor);
@@ -186,9 +191,9 @@ impl GraphAssembly<'_> {
                     let row = counts.next();
                     row.and_then(|row| row.count).unwrap_or(0)
                 });
-                if self.sees(&edge.runs, *window) {
-                    let state = course.state(*window, count.is_some_and(|n| n > 0));
-                    let state = edge_state(id, course.degree, state, *window, count);
+                if self.sees(record, *window) {
+                    let state = record.state(*window, count.is_some_and(|n| n > 0));
+                    let state = edge_state(id, record.degree, state, *window, count);
                     self.graphs.publish(at, &state);
                 }
             }
@@ -198,28 +203,31 @@ impl GraphAssembly<'_> {
     /// Adds the subscriptions: each has the state of its topic.
     fn subscribes(&mut self) {
         let edges = self.history.elements.subscribes.iter();
-        for ((id, edge), course) in (0..).zip(edges).zip(&self.history.subscribes) {
+        for (id, edge) in (0..).zip(edges) {
+            let Some(record) = self.history.records.of(Element::Subscribe(id)) else {
+                continue;
+            };
             let mut topic = self.topics.get(&edge.topic).map(Column::cursor);
             for (at, window) in self.windows.0.iter().enumerate() {
                 let topic = topic.as_mut().and_then(ColumnCursor::next);
-                if !self.sees(&edge.runs, *window) {
+                if !self.sees(record, *window) {
                     continue;
                 }
                 let state = match topic {
-                    _ if course.is_declared() => State::Declared,
+                    _ if record.is_declared() => State::Declared,
                     Some(row) => row.state,
                     None => State::Silent,
                 };
-                let state = edge_state(id, course.degree, state, *window, None);
+                let state = edge_state(id, record.degree, state, *window, None);
                 self.graphs.subscribe(at, &state);
             }
         }
     }
 
-    /// Whether an element with these runs exists in a window.
-    fn sees(&self, runs: &[Span], window: Span) -> bool {
-        let last = runs.len().saturating_sub(1);
-        runs.iter().enumerate().any(|(at, run)| {
+    /// Whether an element with this record exists in a window.
+    fn sees(&self, record: &Record, window: Span) -> bool {
+        let last = record.lives.len().saturating_sub(1);
+        record.spans().enumerate().any(|(at, run)| {
             let end = if at == last && self.grace > 0 {
                 self.windows
                     .last_moment(run.end.plus(-1), self.grace)

@@ -17,39 +17,35 @@ use crate::evidence::claim::Name;
 use crate::evidence::collector::{Recorded, spool_error};
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::ElementKey;
-use crate::graph::lives::{
-    Bound, Known, Life, Lives, Stretch, Transition, Voice, all_silent, silences,
+use crate::graph::history::{
+    Bound, Life, Sender, Sending, Stretch, Transition, all_silent, silences,
 };
-use crate::graph::sending::Sending;
-use crate::graph::{Edge, Elements, Node, NodeId, State, Topic, TopicId};
+use crate::graph::{Edge, Element, Elements, Node, NodeId, PerElement, State, Topic, TopicId};
 
-/// The elements of a mission, with everything that does not depend on windows.
+/// The history of a mission: its elements, each with its lives, and all sending, in continuous time.
 #[derive(Debug, Default)]
 pub(crate) struct History {
     /// All nodes, topics and edges of the mission.
-    pub elements: Elements,
-    /// The lives of all elements, and the sending of each publisher.
-    pub lives: Lives,
-    /// The times of messages, as figures show them.
-    pub sending: Sending,
-    /// The history of each node, in order.
-    pub(crate) nodes: Vec<ElementHistory>,
-    /// The history of each topic.
-    pub(crate) topics: Vec<ElementHistory>,
-    /// The history of each publication.
-    pub(crate) publishes: Vec<ElementHistory>,
-    /// The history of each subscription.
-    pub(crate) subscribes: Vec<ElementHistory>,
+    pub(crate) elements: Elements,
+    /// What is known of each of them.
+    pub(crate) records: PerElement<Record>,
+    /// The messages of every sender.
+    pub(crate) sending: Sending,
+    /// Transitions of lifecycle states, sorted by time.
+    pub(crate) transitions: Vec<Transition>,
     pub(crate) node_ids: BTreeMap<Name, NodeId>,
     pub(crate) topic_ids: BTreeMap<Name, TopicId>,
     /// The places of each topic's streams.
     pub(crate) streams: BTreeMap<Name, Vec<usize>>,
 }
 
-/// The history of one element over the mission, without its messages.
+/// The record of one element over the mission.
 #[derive(Clone, Debug)]
-pub(crate) struct ElementHistory {
+pub(crate) struct Record {
+    /// The strongest degree of evidence for it.
     pub(crate) degree: Degree,
+    /// Its lives, in order, none overlapping.
+    pub(crate) lives: Vec<Life>,
     /// The state that it always has while it lives: declared or latched.
     fixed: Option<State>,
     /// Whether it is silent without a message in the window.
@@ -58,8 +54,12 @@ pub(crate) struct ElementHistory {
     silences: Vec<(Stamp, Option<Stamp>)>,
 }
 
-impl ElementHistory {
-    fn new(track: &Liveness, silences: Vec<(Stamp, Option<Stamp>)>) -> Self {
+impl Record {
+    fn new(
+        track: &Liveness,
+        mission: (Stamp, Stamp),
+        silences: Vec<(Stamp, Option<Stamp>)>,
+    ) -> Self {
         let fixed = match () {
             () if track.is_declared() => Some(State::Declared),
             () if track.is_latched() => Some(State::Latched),
@@ -67,10 +67,16 @@ impl ElementHistory {
         };
         Self {
             degree: track.degree,
+            lives: known(track, mission),
             fixed,
             needs_messages: track.senders.0 == 0,
             silences,
         }
+    }
+
+    /// The intervals in which it exists, half-open.
+    pub(crate) fn spans(&self) -> impl Iterator<Item = Span> + '_ {
+        self.lives.iter().map(|life| life.span)
     }
 
     /// The state in a window where it lives, with messages of its own or without.
@@ -92,15 +98,15 @@ impl ElementHistory {
     }
 }
 
-/// Computes the lives of all elements, and the sending of each publisher.
+/// Makes the history from everything recorded and concluded.
 ///
 /// # Errors
 /// If the temporary file of times cannot be read.
-pub(crate) fn history(recorded: &Recorded, findings: &Findings) -> Result<History> {
-    told(recorded, findings).map_err(spool_error)
+pub(crate) fn made(recorded: &Recorded, findings: &Findings) -> Result<History> {
+    of_elements(recorded, findings).map_err(spool_error)
 }
 
-fn told(recorded: &Recorded, findings: &Findings) -> io::Result<History> {
+fn of_elements(recorded: &Recorded, findings: &Findings) -> io::Result<History> {
     let traffic = traffic(recorded, findings)?;
     let mut tracks = tracks(recorded, findings, &traffic)?;
     fall_silent(&mut tracks, &traffic, findings);
@@ -137,7 +143,7 @@ fn assembled(tracks: Tracks, traffic: &Traffic, findings: &Findings) -> History 
             ElementKey::Subscribe(topic, node) => all.subscribe(topic, node, &track),
         }
     }
-    all.voices();
+    all.senders();
     all.transitions();
     all.history
 }
@@ -159,14 +165,7 @@ fn roomy(tracks: &Tracks) -> History {
     all.elements.topics.reserve_exact(topics);
     all.elements.publishes.reserve_exact(publishes);
     all.elements.subscribes.reserve_exact(subscribes);
-    all.lives.nodes.reserve_exact(nodes);
-    all.lives.topics.reserve_exact(topics);
-    all.lives.publishes.reserve_exact(publishes);
-    all.lives.subscribes.reserve_exact(subscribes);
-    all.nodes.reserve_exact(nodes);
-    all.topics.reserve_exact(topics);
-    all.publishes.reserve_exact(publishes);
-    all.subscribes.reserve_exact(subscribes);
+    all.records.reserve_exact(many);
     all
 }
 
@@ -194,14 +193,14 @@ struct Assembly<'a> {
 
 impl Assembly<'_> {
     /// Adds the messages of every sender.
-    fn voices(&mut self) {
+    fn senders(&mut self) {
         for (topic, of) in self.traffic {
             let Some(id) = self.history.topic_ids.get(topic) else {
                 continue;
             };
             for sender in of.list.iter().filter(|s| !s.stretches.is_empty()) {
                 let node = sender.node.and_then(|n| self.history.node_ids.get(&n));
-                self.history.lives.voices.push(Voice {
+                self.history.sending.senders.push(Sender {
                     topic: *id,
                     node: node.copied(),
                     is_latched: sender.latched,
@@ -220,10 +219,10 @@ impl Assembly<'_> {
                 time: *time,
                 state: Arc::clone(state),
             });
-            self.history.lives.transitions.extend(states);
+            self.history.transitions.extend(states);
         }
         let order = |t: &Transition| (t.time, t.node);
-        self.history.lives.transitions.sort_by_key(order);
+        self.history.transitions.sort_by_key(order);
     }
 
     fn node(&mut self, name: Name, track: &Liveness) {
@@ -240,14 +239,13 @@ impl Assembly<'_> {
             last,
             runs: spans(track),
         });
-        all.lives.nodes.push(known(track, self.findings.mission));
-        let mut course = ElementHistory::new(track, silent);
+        let mut record = Record::new(track, self.findings.mission, silent);
         // A node lives by more than messages.
-        course.needs_messages = false;
-        if track.speaks && !course.is_declared() {
-            course.fixed = None;
+        record.needs_messages = false;
+        if track.speaks && !record.is_declared() {
+            record.fixed = None;
         }
-        all.nodes.push(course);
+        all.records.push(Element::Node(0), record);
     }
 
     fn topic(&mut self, name: Name, track: &Liveness) {
@@ -276,12 +274,10 @@ impl Assembly<'_> {
             runs: spans(track),
             unknown_publishers,
         });
-        let sending = traffic.map(|of| (of.sending.clone(), of.pauses.clone()));
-        let (sending, pauses) = sending.unwrap_or_default();
-        all.sending.topics.push(sending);
-        all.sending.pauses.push(pauses);
-        all.lives.topics.push(known(track, self.findings.mission));
-        all.topics.push(ElementHistory::new(track, silent));
+        let pauses = traffic.map(|of| of.pauses.clone());
+        all.sending.pauses.push(pauses.unwrap_or_default());
+        let record = Record::new(track, self.findings.mission, silent);
+        all.records.push(Element::Topic(0), record);
     }
 
     /// The number of publishers of a topic that the bag counts beyond the known ones.
@@ -298,23 +294,17 @@ impl Assembly<'_> {
         let stretches = sender.map_or(&[][..], |s| &s.stretches);
         let all = &mut self.history;
         all.elements.publishes.push(edge);
-        let sending = sender.map(|s| s.sending.clone());
-        all.sending.publishes.push(sending.unwrap_or_default());
         let silent = silences(stretches, &spans(track));
-        all.lives
-            .publishes
-            .push(known(track, self.findings.mission));
-        all.publishes.push(ElementHistory::new(track, silent));
+        let record = Record::new(track, self.findings.mission, silent);
+        all.records.push(Element::Publish(0), record);
     }
 
     fn subscribe(&mut self, topic: Name, node: Name, track: &Liveness) {
         let edge = self.edge(node, topic, track);
         let all = &mut self.history;
         all.elements.subscribes.push(edge);
-        all.lives
-            .subscribes
-            .push(known(track, self.findings.mission));
-        all.subscribes.push(ElementHistory::new(track, Vec::new()));
+        let record = Record::new(track, self.findings.mission, Vec::new());
+        all.records.push(Element::Subscribe(0), record);
     }
 
     fn edge(&self, node: Name, topic: Name, track: &Liveness) -> Edge {
@@ -356,7 +346,7 @@ fn spans(track: &Liveness) -> Vec<Span> {
 }
 
 /// The known lives of an element, inside the mission.
-fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Known {
+fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Vec<Life> {
     let within = |bound: Bound| Bound {
         earliest: bound.earliest.max(mission.0),
         latest: bound.latest.min(mission.1),
@@ -368,10 +358,7 @@ fn known(track: &Liveness, mission: (Stamp, Stamp)) -> Known {
         began: life.began.map(within),
         ended: life.ended.map(within),
     };
-    Known {
-        degree: track.degree,
-        lives: lives.map(life).collect(),
-    }
+    lives.map(life).collect()
 }
 
 fn next(len: usize) -> u32 {

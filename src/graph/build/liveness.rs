@@ -1,31 +1,13 @@
 //! The lives of elements: from the first sign to the last, extended by latched messages, ended by proofs of an end.
 
+use crate::base::rhythm::{
+    ADVERTISED_NS, BREAK, BREAK_NS, DISCOVERY_NS, FEWEST, FOUND_NS, REGISTRATION_NS, SHUTDOWN_NS,
+    UNUSUAL,
+};
 use crate::base::time::Stamp;
 use crate::evidence::restarts::Restart;
 use crate::evidence::{Degree, Evidence};
-use crate::graph::lives::{Bound, Stretch};
-
-/// The time after its first sign in which a node has registered its topics, in nanoseconds.
-const REGISTRATION_NS: i64 = 1_000_000_000;
-/// The longest time from a node's start to the first of its messages in the bag, in nanoseconds: a recorder looks for
-/// new topics once a second, and a node needs as long to come up. Measured on real missions: 0.8 to 1.3 s, at most 2.4
-/// s.
-const DISCOVERY_NS: i64 = 2_500_000_000;
-/// The time in which a recorder has found the topics that exist when it starts, in nanoseconds; their messages come a
-/// period later at the latest.
-const FOUND_NS: i64 = 2_000_000_000;
-/// The longest time from a node's start to its first message on a topic that counts as advertised at the start, in
-/// nanoseconds.
-const ADVERTISED_NS: i64 = 5_000_000_000;
-/// The number of periods of silence that break a rhythm; one or two messages are lost now and then.
-const BREAK: i64 = 5;
-/// The shortest silence that breaks a rhythm, in nanoseconds: a recorder that is stopped writes its topics up to a
-/// second apart.
-const BREAK_NS: i64 = 2_000_000_000;
-/// The fewest messages of a rhythm.
-const FEWEST: u64 = 5;
-/// The silence that breaks a rhythm with pauses, as a multiple of the longest of them.
-const UNUSUAL: i64 = 3;
+use crate::graph::history::{Bound, Stretch};
 
 /// The extent of a life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -349,9 +331,6 @@ impl Liveness {
         (all().min(), all().max())
     }
 }
-
-/// The longest time for which a node that is told to end may still send, in nanoseconds.
-const SHUTDOWN_NS: i64 = 500_000_000;
 
 /// A life for the whole mission.
 pub(crate) fn whole(mission: (Stamp, Stamp)) -> Lifetime {

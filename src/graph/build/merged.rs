@@ -11,7 +11,7 @@ use crate::base::time::Stamp;
 use crate::evidence::claim::Name;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{ElementKey, Reliability};
-use crate::graph::lives::Stretch;
+use crate::graph::history::Stretch;
 
 /// Adds the rhythms that broke off for good to the tracks of their only publishers. A rhythm that goes on proves
 /// nothing: another node may have taken the topic over.

@@ -9,8 +9,7 @@ use crate::evidence::claim::Name;
 use crate::evidence::collector::Recorded;
 use crate::evidence::conclude::Findings;
 use crate::evidence::proof::{Reliability, Stream};
-use crate::graph::lives::Stretch;
-use crate::graph::sending::{LongestPauses, SendingRuns, shortest_silence};
+use crate::graph::history::{LongestPauses, Stretch};
 
 /// The senders of each topic.
 pub(crate) type Traffic = BTreeMap<Name, Senders>;
@@ -26,8 +25,6 @@ pub(crate) struct Senders {
     pub(crate) list: Vec<Sender>,
     /// The place of each stream's sender in `list`.
     pub(crate) of: Vec<usize>,
-    /// The intervals in which there were messages.
-    pub(crate) sending: Vec<Span>,
     /// The longest pauses of all senders together.
     pub(crate) pauses: Vec<Span>,
 }
@@ -39,8 +36,6 @@ pub(crate) struct Sender {
     pub(crate) node: Option<Name>,
     pub(crate) latched: bool,
     pub(crate) stretches: Vec<Stretch>,
-    /// The intervals of sending, as figures show them.
-    pub(crate) sending: Vec<Span>,
 }
 
 /// The node that sent the messages of a stream, if its name is reliable enough.
@@ -64,26 +59,23 @@ pub(crate) fn traffic(recorded: &Recorded, findings: &Findings) -> io::Result<Tr
 fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io::Result<Senders> {
     let of_topic: Vec<&Stream> = streams.iter().map(|at| &findings.streams[*at]).collect();
     let ids: Vec<_> = of_topic.iter().map(|stream| stream.times).collect();
-    let least = shortest_silence(recorded.span.map_or(0, |span| span.nanos()));
     let mut traces: Vec<Option<(Stamp, Stamp)>> = vec![None; streams.len()];
     let (of, mut heard) = places(&of_topic);
-    let (mut all, mut pauses) = (SendingRuns::default(), LongestPauses::default());
+    let mut pauses = LongestPauses::default();
     recorded.messages.merge(&ids, |timed| {
         if !recorded.believes(timed.time) {
             return;
         }
         let trace = &mut traces[timed.series];
         *trace = Some((trace.map_or(timed.time, |t| t.0), timed.time));
-        all.hear(timed.time, least);
-        pauses.hear(timed.time);
-        heard[of[timed.series]].hear(timed.time, least);
+        pauses.add(timed.time);
+        heard[of[timed.series]].add(timed.time);
     })?;
     Ok(Senders {
         streams,
         traces,
         list: heard.into_iter().map(SenderTimes::into_sender).collect(),
         of,
-        sending: all.stretches(),
         pauses: pauses.spans(),
     })
 }
@@ -92,7 +84,6 @@ fn senders(recorded: &Recorded, findings: &Findings, streams: Vec<usize>) -> io:
 struct SenderTimes {
     node: Option<Name>,
     latched: bool,
-    runs: SendingRuns,
     times: Vec<Stamp>,
     /// The number of messages of which one is kept, unless it comes late.
     every: usize,
@@ -105,8 +96,7 @@ const MOST_TIMES: usize = 1 << 22;
 const LATE_NS: i64 = 500_000_000;
 
 impl SenderTimes {
-    fn hear(&mut self, time: Stamp, least: i64) {
-        self.runs.hear(time, least);
+    fn add(&mut self, time: Stamp) {
         let late = self
             .times
             .last()
@@ -137,7 +127,6 @@ impl SenderTimes {
             node: self.node,
             latched: self.latched,
             stretches,
-            sending: self.runs.stretches(),
         }
     }
 }
@@ -153,7 +142,6 @@ fn places(streams: &[&Stream]) -> (Vec<usize>, Vec<SenderTimes>) {
     let heard = latched.iter().map(|(node, latched)| SenderTimes {
         node: *node,
         latched: *latched,
-        runs: SendingRuns::default(),
         times: Vec::new(),
         every: 1,
         passed: 0,

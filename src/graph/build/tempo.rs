@@ -1,15 +1,9 @@
 //! Stretches of even sending, from the times of one sender's messages: gaps end them, and so do changes of rate.
 
+use crate::base::rhythm::{EVEN, FEWEST_INTERVALS, GAP, GAP_NS, SAME_RATE};
 use crate::base::time::Stamp;
-use crate::graph::lives::Stretch;
+use crate::graph::history::Stretch;
 
-/// The fewest intervals that show a rate.
-pub(crate) const FEWEST: usize = 5;
-/// The length of a gap as a multiple of the usual interval on both of its sides; one or two lost messages are not a
-/// gap.
-const GAP: i64 = 5;
-/// The shortest gap, in nanoseconds: shorter pauses are the scheduler's.
-const GAP_NS: i64 = 1_000_000_000;
 /// The number of intervals on each side of a gap that show the usual one.
 const AROUND: usize = 9;
 /// The most pieces of a run that are searched for changes of rate; intervals of longer ones are summed up first.
@@ -19,10 +13,6 @@ const DEPTH: usize = 8;
 /// The least gain in log likelihood of a change of rate over chance: 3 standard deviations of a normal distribution are
 /// half a squared 3 in log likelihood; positions that could be chosen double that.
 const GAIN: f64 = 9.0;
-/// The ratio of medians below which rates are the same (the least that `--rate-change` can usefully show).
-const SAME: f64 = 1.1;
-/// The largest ratio of the quartiles of even intervals.
-const EVEN: f64 = 1.8;
 /// The most gaps of a sender with a rhythm; after more, the rest of its messages is one stretch.
 const MOST: usize = 4096;
 
@@ -81,20 +71,24 @@ fn split(times: &[Stamp], depth: usize, is_joined: bool, all: &mut Vec<Stretch>)
 /// The message at which the rate changes most; `None` if it does not.
 fn cut(times: &[Stamp]) -> Option<usize> {
     let intervals = times.len().checked_sub(1)?;
-    if intervals < 2 * FEWEST {
+    if intervals < 2 * FEWEST_INTERVALS {
         return None;
     }
     let step = intervals.div_ceil(PIECES);
-    let coarse = best(times, step, FEWEST.div_ceil(step) * step..=intervals)?;
+    let coarse = best(
+        times,
+        step,
+        FEWEST_INTERVALS.div_ceil(step) * step..=intervals,
+    )?;
     if step == 1 {
         return Some(coarse);
     }
     let (from, to) = (
         coarse.saturating_sub(step),
-        (coarse + step).min(intervals - FEWEST),
+        (coarse + step).min(intervals - FEWEST_INTERVALS),
     );
     // Around the coarse place the exact one: where the sum of both sides' deviations turns.
-    best(times, 1, from.max(FEWEST)..=to).or(Some(coarse))
+    best(times, 1, from.max(FEWEST_INTERVALS)..=to).or(Some(coarse))
 }
 
 /// The best of the places in `range`, every `step` messages, by the likelihood of intervals that have one mean each
@@ -106,7 +100,7 @@ fn best(times: &[Stamp], step: usize, range: std::ops::RangeInclusive<usize>) ->
     let cost = |count: f64, nanos: f64| count * libm::log(nanos.max(1.0) / count);
     let (mut found, mut most) = (None, GAIN * scatter);
     for at in range.step_by(step) {
-        if at < FEWEST || n - at < FEWEST {
+        if at < FEWEST_INTERVALS || n - at < FEWEST_INTERVALS {
             continue;
         }
         let left = times[at].since(times[0]) as f64;
@@ -158,7 +152,7 @@ fn stretch(times: &[Stamp], is_joined: bool) -> Option<Stretch> {
         last,
         count: times.len() as u64,
         period,
-        is_even: n >= FEWEST && upper as f64 <= EVEN * lower.max(1) as f64,
+        is_even: n >= FEWEST_INTERVALS && upper as f64 <= EVEN * lower.max(1) as f64,
         is_joined,
     })
 }
@@ -183,7 +177,7 @@ fn merged(all: Vec<Stretch>, times: &[Stamp]) -> Vec<Stretch> {
 
 fn is_same(a: &Stretch, b: &Stretch) -> bool {
     let ratio = a.period.max(1) as f64 / b.period.max(1) as f64;
-    (1.0 / SAME..=SAME).contains(&ratio)
+    (1.0 / SAME_RATE..=SAME_RATE).contains(&ratio)
 }
 
 #[cfg(test)]

@@ -75,36 +75,23 @@ impl<'a> Changes<'a> {
 
     /// Whether none of the evidence for an added or removed element has times.
     fn is_timeless(&self, change: &Change) -> bool {
-        let all = self.elements;
         match change {
-            Change::Added { what, .. } | Change::Removed { what, .. } => match *what {
-                Element::Node(id) => all.nodes[id as usize].evidence,
-                Element::Topic(id) => all.topics[id as usize].evidence,
-                Element::Publish(id) => all.publishes[id as usize].evidence,
-                Element::Subscribe(id) => all.subscribes[id as usize].evidence,
+            Change::Added { what, .. } | Change::Removed { what, .. } => {
+                self.elements.evidence(*what).is_timeless()
             }
-            .is_timeless(),
             _ => false,
         }
     }
 
     fn appeared(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
-        let all = ids(&diff.nodes.added, |s| Element::Node(s.id))
-            .chain(ids(&diff.topics.added, |s| Element::Topic(s.id)))
-            .chain(ids(&diff.publishes.added, |s| Element::Publish(s.id)))
-            .chain(ids(&diff.subscribes.added, |s| Element::Subscribe(s.id)));
-        changes.extend(all.map(|what| {
+        changes.extend(diff.added().map(|what| {
             let time = self.elements.life(what).0.filter(|t| span.contains(*t));
             Change::Added { what, time }
         }));
     }
 
     fn vanished(&self, diff: &Diff, span: Span, changes: &mut Vec<Change>) {
-        let all = ids(&diff.nodes.removed, |id| Element::Node(*id))
-            .chain(ids(&diff.topics.removed, |id| Element::Topic(*id)))
-            .chain(ids(&diff.publishes.removed, |id| Element::Publish(*id)))
-            .chain(ids(&diff.subscribes.removed, |id| Element::Subscribe(*id)));
-        changes.extend(all.map(|what| {
+        changes.extend(diff.removed().map(|what| {
             let time = self.elements.life(what).1.filter(|t| *t < span.end);
             Change::Removed { what, time }
         }));
@@ -212,13 +199,6 @@ impl<'a> Changes<'a> {
             .iter()
             .any(|t| SHARED.contains(&t.rsplit('/').next().unwrap_or(t)))
     }
-}
-
-fn ids<'s, T>(
-    list: &'s [T],
-    element: impl Fn(&T) -> Element + 's,
-) -> impl Iterator<Item = Element> + 's {
-    list.iter().map(element)
 }
 
 /// The fewest messages in the busier of two windows with which a rate means something.

@@ -136,18 +136,6 @@ impl Column {
         self.bytes.len()
     }
 
-    /// The column of this many windows with every row changed.
-    pub(super) fn map(&self, windows: usize, change: impl Fn(Row) -> Row) -> Self {
-        let mut cursor = self.cursor();
-        let mut changed = ColumnWriter::default();
-        for at in 0..windows {
-            if let Some(row) = cursor.next() {
-                changed.push(at, change(row));
-            }
-        }
-        changed.finish()
-    }
-
     /// A cursor at the first window.
     pub(crate) fn cursor(&self) -> ColumnCursor<'_> {
         ColumnCursor {

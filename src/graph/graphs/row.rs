@@ -79,24 +79,6 @@ impl Row {
         }
     }
 
-    /// The same row without sizes and the spacing of messages.
-    pub(super) fn without_spacing(self) -> Self {
-        Self {
-            bytes: None,
-            median: Number::Unknown,
-            gap: Number::Unknown,
-            ..self
-        }
-    }
-
-    /// The same row without the state of a lifecycle.
-    pub(super) fn without_lifecycle(self) -> Self {
-        Self {
-            lifecycle: 0,
-            ..self
-        }
-    }
-
     fn with_rate(self, hz: Option<f64>, span: Span) -> Self {
         let follows = self.hz(span).map(f64::to_bits) == hz.map(f64::to_bits);
         Self {

@@ -22,22 +22,25 @@ pub(crate) fn sentence(mission: &Mission, id: EntryId, entry: &Entry) -> String 
 
 /// The sentence by the parts of the entry, for callers that know them.
 pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
+    let name = name(&mission.elements, entry);
+    format!("{name} {}", predicate(mission, parts, entry))
+}
+
+/// The sentence without the name of the element: `30 → 5 Hz`, `restarted, away for 6.8 s`.
+pub(crate) fn predicate(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let elements = &mission.elements;
-    let name = name(elements, entry);
     let lasted = entry
         .until
         .map(|until| words::duration(until.since(entry.time).max(0)));
     match (&entry.detail, entry.kind) {
-        (Detail::Rates { from_hz, to_hz }, _) => {
-            format!("{name} {}", words::rate_change(*from_hz, *to_hz))
-        }
+        (Detail::Rates { from_hz, to_hz }, _) => words::rate_change(*from_hz, *to_hz),
         (Detail::Senders { from, to }, _) => {
             let names = |nodes: &[u32]| {
                 let name =
                     |id: &u32| visible(elements.nodes[*id as usize].name.as_str()).into_owned();
                 nodes.iter().map(name).collect::<Vec<_>>().join(", ")
             };
-            format!("{name} handed over: {} → {}", names(from), names(to))
+            format!("handed over: {} → {}", names(from), names(to))
         }
         (Detail::Values { from, to }, kind) => {
             let or = |text: &str| {
@@ -50,45 +53,37 @@ pub(crate) fn sentence_with(mission: &Mission, parts: &[EntryId], entry: &Entry)
             };
             let change = format!("{} → {}", or(from), or(to));
             if mission.ledger.compares {
-                format!("{name} {change}")
+                change
             } else {
-                format!("{name} {}: {change}", kind.word())
+                format!("{}: {change}", kind.word())
             }
         }
         (Detail::None, Kind::Restarted) => match lasted {
-            Some(lasted) => format!("{name} restarted, away for {lasted}"),
-            None => format!("{name} restarted"),
+            Some(lasted) => format!("restarted, away for {lasted}"),
+            None => "restarted".to_owned(),
         },
         (Detail::None, Kind::Silent) => match lasted {
-            Some(lasted) => format!("{name} silent for {lasted}"),
-            None => format!("{name} silent to the end"),
+            Some(lasted) => format!("silent for {lasted}"),
+            None => "silent to the end".to_owned(),
         },
         (Detail::None, kind @ (Kind::Started | Kind::Stopped)) => {
             let word = mission.ledger.word(kind);
-            format!("{name} {word}{}", with(mission, parts, entry))
+            format!("{word}{}", with(mission, parts, entry))
         }
-        (Detail::None, kind) => format!("{name} {}", mission.ledger.word(kind)),
+        (Detail::None, kind) => mission.ledger.word(kind).to_owned(),
     }
 }
 
 /// The name of the element of an entry: a role where a role restarted.
 fn name(elements: &Elements, entry: &Entry) -> String {
-    let node = |id: u32| visible(elements.nodes[id as usize].name.as_str());
-    let topic = |id: u32| visible(elements.topics[id as usize].name.as_str());
-    match entry.what {
-        Element::Node(id) if entry.kind == Kind::Restarted => {
+    let (node, topic) = elements.names(entry.what);
+    match (entry.what, node.map(visible), topic.map(visible)) {
+        (Element::Node(id), ..) if entry.kind == Kind::Restarted => {
             visible(&elements.nodes[id as usize].role).into_owned()
         }
-        Element::Node(id) => node(id).into_owned(),
-        Element::Topic(id) => topic(id).into_owned(),
-        Element::Publish(id) => {
-            let edge = &elements.publishes[id as usize];
-            format!("{} → {}", node(edge.node), topic(edge.topic))
-        }
-        Element::Subscribe(id) => {
-            let edge = &elements.subscribes[id as usize];
-            format!("{} → {}", topic(edge.topic), node(edge.node))
-        }
+        (Element::Subscribe(_), Some(node), Some(topic)) => format!("{topic} → {node}"),
+        (_, Some(node), Some(topic)) => format!("{node} → {topic}"),
+        (_, node, topic) => node.or(topic).unwrap_or_default().into_owned(),
     }
 }
 
@@ -108,7 +103,7 @@ fn with(mission: &Mission, parts: &[EntryId], entry: &Entry) -> String {
     let space = node.map_or("", |id| {
         crate::base::name::namespace(elements.nodes[id as usize].name.as_str())
     });
-    let said = [("publishes", sends), ("subscribes", takes)].map(|(verb, topics)| {
+    let said = [("publishes", sends), ("subscribes to", takes)].map(|(verb, topics)| {
         let names = topics_as_said(elements, &topics, space);
         (!names.is_empty()).then(|| format!("{verb} {}", words::some_of(&names, NAMED)))
     });

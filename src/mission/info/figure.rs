@@ -7,7 +7,6 @@ use serde::Serialize;
 use crate::base::name::is_quiet;
 use crate::base::words;
 use crate::mission::Mission;
-use crate::mission::activity::is_hidden_node;
 use crate::mission::phases::knows_publishers;
 
 /// A figure that fits a mission.
@@ -32,11 +31,11 @@ pub(super) fn figures(mission: &Mission) -> Vec<FigureInfo> {
 
 fn lives(mission: &Mission) -> Option<FigureInfo> {
     let elements = &mission.elements;
-    let shown = elements.nodes.iter().filter(|n| !is_hidden_node(n));
+    let shown = elements.nodes.iter().filter(|n| !n.is_tool());
     let roles: BTreeSet<&str> = shown.map(|n| &*n.role).collect();
     let topics = elements.topics.iter();
     let topics = topics.filter(|t| !is_quiet(t.name.as_str())).count();
-    let lives = if knows_publishers(elements, &mission.activity) && !roles.is_empty() {
+    let lives = if knows_publishers(elements, &mission.sending) && !roles.is_empty() {
         format!("what was alive when: {}", words::count(roles.len(), "node"))
     } else {
         let topics = words::count(topics, "topic");
@@ -54,7 +53,7 @@ fn map(mission: &Mission) -> Option<FigureInfo> {
     let elements = &mission.elements;
     let is_shown = |node: u32| {
         let node = elements.nodes.get(node as usize);
-        node.is_some_and(|n| !is_hidden_node(n))
+        node.is_some_and(|n| !n.is_tool())
     };
     let sent: BTreeSet<u32> = ends(&elements.publishes, &is_shown);
     let heard: BTreeSet<u32> = ends(&elements.subscribes, &is_shown);

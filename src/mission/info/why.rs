@@ -94,19 +94,13 @@ fn elements(mission: &Mission, names: &[String]) -> Vec<(Element, String)> {
         return found;
     }
     let is_asked = |edge: &&Edge| names.iter().all(|n| n == node(edge) || n == topic(edge));
-    let publishes = (0..).zip(&all.publishes).filter(|(_, e)| is_asked(e));
-    found.extend(publishes.map(|(id, e)| {
-        (
-            Element::Publish(id),
-            format!("{} publishes {}", node(e), topic(e)),
-        )
-    }));
-    let subscribes = (0..).zip(&all.subscribes).filter(|(_, e)| is_asked(e));
-    found.extend(subscribes.map(|(id, e)| {
-        (
-            Element::Subscribe(id),
-            format!("{} subscribes {}", node(e), topic(e)),
-        )
+    let edges = all.edges().filter(|(_, e)| is_asked(e));
+    found.extend(edges.map(|(what, e)| {
+        let verb = match what {
+            Element::Publish(_) => "publishes",
+            _ => "subscribes to",
+        };
+        (what, format!("{} {verb} {}", node(e), topic(e)))
     }));
     found
 }
@@ -118,12 +112,7 @@ fn describe(
     title: &str,
 ) -> std::fmt::Result {
     let all = &mission.elements;
-    let evidence = match element {
-        Element::Node(id) => all.nodes[id as usize].evidence,
-        Element::Topic(id) => all.topics[id as usize].evidence,
-        Element::Publish(id) => all.publishes[id as usize].evidence,
-        Element::Subscribe(id) => all.subscribes[id as usize].evidence,
-    };
+    let evidence = all.evidence(element);
     let at = |time: Option<Stamp>| {
         time.map_or_else(
             || "?".to_owned(),
@@ -142,22 +131,12 @@ fn describe(
         visible(title),
         words.join(", ")
     )?;
-    let graphs = mission.graphs.iter();
-    let windows = graphs.filter(|graph| shows(graph, element)).count();
+    let windows = mission.graphs.rows(element).count();
     writeln!(
         out,
         "  there in {windows} of {} parts of the mission",
         mission.windows.len()
     )
-}
-
-fn shows(graph: &crate::graph::Graph, element: Element) -> bool {
-    match element {
-        Element::Node(id) => graph.nodes.iter().any(|s| s.id == id),
-        Element::Topic(id) => graph.topics.iter().any(|s| s.id == id),
-        Element::Publish(id) => graph.publishes.iter().any(|s| s.id == id),
-        Element::Subscribe(id) => graph.subscribes.iter().any(|s| s.id == id),
-    }
 }
 
 /// The most similar names that are offered.

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::rows::{ends, nanos};
+use super::rows::nanos;
 use crate::base::time::Stamp;
 use crate::graph::diff::Change;
-use crate::graph::{Edge, Element, Elements};
+use crate::graph::{Element, Elements};
 use crate::mission::EntryId;
 
 /// An element by its name, or an edge by its two names.
@@ -22,26 +22,13 @@ pub(crate) struct RawElementName<'a> {
 
 impl<'a> RawElementName<'a> {
     pub(crate) fn new(what: Element, elements: &'a Elements) -> Self {
-        let alone = |name: &'a str| Self {
+        let (node, topic) = elements.names(what);
+        let is_edge = node.is_some() && topic.is_some();
+        Self {
             what: what.word(),
-            name: Some(name),
-            node: None,
-            topic: None,
-        };
-        let between = |edge: &Edge| {
-            let (node, topic) = ends(edge, elements);
-            Self {
-                what: what.word(),
-                name: None,
-                node: Some(node),
-                topic: Some(topic),
-            }
-        };
-        match what {
-            Element::Node(id) => alone(elements.nodes[id as usize].name.as_str()),
-            Element::Topic(id) => alone(elements.topics[id as usize].name.as_str()),
-            Element::Publish(id) => between(&elements.publishes[id as usize]),
-            Element::Subscribe(id) => between(&elements.subscribes[id as usize]),
+            name: node.or(topic).filter(|_| !is_edge),
+            node: node.filter(|_| is_edge),
+            topic: topic.filter(|_| is_edge),
         }
     }
 }

@@ -220,9 +220,14 @@ impl Ids {
         self.topics.len()
     }
 
-    /// The number of publications.
-    pub(crate) fn publishes(&self) -> usize {
-        self.publishes.len()
+    /// The place of a node, if there is one of this name.
+    pub(crate) fn node(&self, name: &str) -> Option<u32> {
+        self.nodes.get(name).copied()
+    }
+
+    /// The place of a topic, if there is one of this name.
+    pub(crate) fn topic(&self, name: &str) -> Option<u32> {
+        self.topics.get(name).copied()
     }
 
     /// The graph of a window; an element listed twice counts once, and the ends of an edge are always included.
@@ -239,10 +244,10 @@ impl Ids {
         let edges = || window.publishes.iter().chain(&window.subscribes);
         let nodes = edges()
             .map(|raw| self.bare_node(raw))
-            .chain(window.nodes.iter().map(|raw| self.node(raw)));
+            .chain(window.nodes.iter().map(|raw| self.node_state(raw)));
         let topics = edges()
             .map(|raw| self.bare_topic(raw))
-            .chain(window.topics.iter().map(|raw| self.topic(raw)));
+            .chain(window.topics.iter().map(|raw| self.topic_state(raw)));
         Graph {
             nodes: by_id(nodes),
             topics: by_id(topics),
@@ -251,7 +256,7 @@ impl Ids {
         }
     }
 
-    fn node(&self, raw: &RawNode) -> (u32, NodeState) {
+    fn node_state(&self, raw: &RawNode) -> (u32, NodeState) {
         let state = NodeState {
             id: self.nodes[raw.name.as_str()],
             state: raw.rest.state(),
@@ -262,7 +267,7 @@ impl Ids {
         (state.id, state)
     }
 
-    fn topic(&self, raw: &RawTopic) -> (u32, TopicState) {
+    fn topic_state(&self, raw: &RawTopic) -> (u32, TopicState) {
         let state = TopicState {
             id: self.topics[raw.name.as_str()],
             state: raw.rest.state(),

@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::entries::{PhaseRow, RawEntry};
 use super::runs::RawWhole;
+use super::sending::RawSending;
 use crate::base::time::{Span, Stamp};
 use crate::evidence::{Degree, Evidence};
 use crate::graph::{EdgeState, State};
@@ -27,7 +28,7 @@ pub(crate) struct Raw {
     pub(crate) publishes: Vec<RawWhole<RawEdge>>,
     #[serde(default)]
     pub(crate) subscribes: Vec<RawWhole<RawEdge>>,
-    pub(crate) activity: Option<RawActivity>,
+    pub(crate) sending: Option<RawSending>,
     pub(crate) form: Option<String>,
     pub(crate) ledger: Option<Vec<RawEntry>>,
     #[serde(default)]
@@ -35,19 +36,6 @@ pub(crate) struct Raw {
     pub(crate) layout: Option<RawLayout>,
     #[serde(default)]
     pub(crate) notices: Vec<RawNotice>,
-}
-
-#[derive(Deserialize)]
-pub(crate) struct RawActivity {
-    pub(crate) bounds_ns: Vec<i64>,
-    #[serde(default)]
-    pub(crate) nodes: Vec<RawWhole<RawNode>>,
-    #[serde(default)]
-    pub(crate) topics: Vec<RawWhole<RawTopic>>,
-    #[serde(default)]
-    pub(crate) publishes: Vec<RawWhole<RawEdge>>,
-    #[serde(default)]
-    pub(crate) subscribes: Vec<RawWhole<RawEdge>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -124,8 +112,6 @@ pub(crate) struct RawState {
     pub(crate) last_ns: Option<i64>,
     #[serde(default)]
     pub(crate) runs: Vec<[i64; 2]>,
-    pub(crate) sending: Option<Vec<[i64; 2]>>,
-    pub(crate) pauses: Option<Vec<[i64; 2]>>,
     pub(crate) count: Option<u64>,
     pub(crate) hz: Option<f64>,
 }
@@ -182,14 +168,6 @@ impl RawState {
 
     pub(crate) fn runs(&self) -> Vec<Span> {
         spans(&self.runs)
-    }
-
-    pub(crate) fn sending(&self) -> Option<Vec<Span>> {
-        self.sending.as_deref().map(spans)
-    }
-
-    pub(crate) fn pauses(&self) -> Option<Vec<Span>> {
-        self.pauses.as_deref().map(spans)
     }
 
     pub(crate) fn edge(&self, id: u32) -> EdgeState {

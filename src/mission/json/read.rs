@@ -5,9 +5,8 @@
 
 use std::path::Path;
 
-use super::activity;
 use super::names::Names;
-use super::raw::{Raw, RawActivity, RawBag, RawBox, RawLayout, RawNotice, RawWindow};
+use super::raw::{Raw, RawBag, RawBox, RawLayout, RawNotice, RawWindow};
 use super::runs::RawElements;
 use super::write::{OLD_SCHEMA, RUNS, SCHEMA};
 use crate::bag::{Report, Tier};
@@ -99,8 +98,6 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
         subscribes: raw.subscribes,
     };
     names.whole(&runs);
-    let (bounds, cells) = raw.activity.map(parts).unwrap_or_default();
-    names.whole(&cells);
     let (elements, places) = names.elements();
     let start = spans.iter().map(|s| s.start).min().unwrap_or_default();
     let end = spans.iter().map(|s| s.end).max().unwrap_or_default();
@@ -161,22 +158,11 @@ fn build(raw: Raw, spans: &[Span]) -> Result<Mission, String> {
         elements,
         windows,
         ledger: crate::mission::Ledger::default(),
-        activity: activity::read(&bounds, &cells, &places)?,
+        sending: raw.sending.unwrap_or_default().sending(&places)?,
         undrawn: Vec::new(),
         layout: raw.layout.map(layout),
         notices: notices(raw.notices),
     })
-}
-
-/// The bounds of the cells, and their contents.
-fn parts(raw: RawActivity) -> (Vec<i64>, RawElements) {
-    let elements = RawElements {
-        nodes: raw.nodes,
-        topics: raw.topics,
-        publishes: raw.publishes,
-        subscribes: raw.subscribes,
-    };
-    (raw.bounds_ns, elements)
 }
 
 const ONE: Period = match Period::from_nanos(1) {
@@ -290,29 +276,20 @@ mod tests {
             r#"{"schema": "bagreel.evolution/1", "windows": [{"start_ns": 5, "end_ns": 5}]}"#;
         assert!(said(back).contains("window 0 ends before it starts"));
     }
+
     #[test]
-    fn an_activity_that_cannot_be_is_refused() {
-        let said = |activity: &str| {
-            let text = SMALL.replace("\"future\": 1", &format!("\"activity\": {activity}"));
+    fn sending_that_cannot_be_is_refused() {
+        let said = |sending: &str| {
+            let text = SMALL.replace("\"future\": 1", &format!("\"sending\": {sending}"));
             read(&text).map_err(|e| e.to_string())
         };
-        let good =
-            r#"{"bounds_ns": [0, 5, 15], "topics": [{"name": "/t", "sending": [[1, 3], [4, 9]]}]}"#;
-        let activity = said(good).unwrap().activity;
-        assert_eq!(activity.cells().len(), 2);
-        assert_eq!(activity.sending.topics[0].len(), 2);
-        assert!(
-            said(&good.replace("5, 15", "5, 5"))
-                .unwrap_err()
-                .contains("ascend")
-        );
-        assert!(
-            said(&good.replace("[4, 9]", "[2, 9]"))
-                .unwrap_err()
-                .contains("overlap")
-        );
-        let many: Vec<String> = (0..300).map(|k| k.to_string()).collect();
-        let many = good.replace("0, 5, 15", &many.join(", "));
-        assert!(said(&many).unwrap_err().contains("299 cells"));
+        let good = r#"{"senders": [{"topic": "/t", "node": "/b", "stretches": [[1, 3, 2, 2, 0], [4, 9, 6, 1, 3]]},
+            {"topic": "/other", "node": null, "stretches": []}]}"#;
+        let sending = said(good).unwrap().sending;
+        assert_eq!(sending.senders.len(), 1);
+        assert!(sending.senders[0].stretches[1].is_joined);
+        let back = said(&good.replace("[4, 9", "[2, 9")).unwrap_err();
+        assert!(back.contains("`/t` do not ascend"), "{back}");
+        assert!(said(&good.replace("[1, 3, 2", "[1, 3, 0")).is_err());
     }
 }

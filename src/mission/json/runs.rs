@@ -21,4 +21,4 @@ mod write;
 mod tests;
 
 pub(crate) use read::{RawElements, RawWhole, graphs};
-pub(crate) use write::{In, WithColumns, elements};
+pub(crate) use write::elements;

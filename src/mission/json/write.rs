@@ -5,12 +5,12 @@ use std::io::{BufWriter, Write};
 use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeSeq as _, Serializer};
 
-use super::activity::ActivityOf;
 use super::changes::ChangeRow;
 use super::entries::{PhaseRow, entries};
 use super::lines::LineFormatter;
 use super::rows::{NodeRow, PublishRow, SubscribeRow, TopicRow};
 use super::runs;
+use super::sending::SendingOf;
 use crate::bag::Report;
 use crate::evidence::Evidence;
 use crate::graph::{Elements, Graph};
@@ -121,9 +121,8 @@ impl Serialize for Json<'_> {
             });
             map.serialize_entry("windows", &List(windows))?;
         }
-        if !mission.activity.graphs.is_empty() {
-            map.serialize_entry("activity", &ActivityOf::new(&mission.activity, elements))?;
-        }
+        let sending = &mission.sending;
+        map.serialize_entry("sending", &SendingOf { sending, elements })?;
         if let Some(places) = places {
             map.serialize_entry("layout", &LayoutRow::new(places))?;
         }

@@ -105,34 +105,19 @@ fn structure(
     list: &mut Vec<(Change, EntryId)>,
 ) {
     let diff = diff(old, new);
-    let added = ids(&diff.nodes.added, |s| Element::Node(s.id))
-        .chain(ids(&diff.topics.added, |s| Element::Topic(s.id)))
-        .chain(ids(&diff.publishes.added, |s| Element::Publish(s.id)))
-        .chain(ids(&diff.subscribes.added, |s| Element::Subscribe(s.id)));
-    for what in added {
+    for what in diff.added() {
         let time = elements.life(what).0.filter(|t| span.contains(*t));
         if let Some((at, id)) = turns.find(&turns.begins, what, span.end) {
             let time = time.or(Some(at).filter(|at| span.contains(*at)));
             list.push((Change::Added { what, time }, id));
         }
     }
-    let removed = ids(&diff.nodes.removed, |id| Element::Node(*id))
-        .chain(ids(&diff.topics.removed, |id| Element::Topic(*id)))
-        .chain(ids(&diff.publishes.removed, |id| Element::Publish(*id)))
-        .chain(ids(&diff.subscribes.removed, |id| Element::Subscribe(*id)));
-    for what in removed {
+    for what in diff.removed() {
         if let Some((at, id)) = turns.find(&turns.ends, what, span.end) {
             let time = Some(at).filter(|at| *at < span.end);
             list.push((Change::Removed { what, time }, id));
         }
     }
-}
-
-fn ids<'s, T>(
-    list: &'s [T],
-    element: impl Fn(&T) -> Element + 's,
-) -> impl Iterator<Item = Element> + 's {
-    list.iter().map(element)
 }
 
 /// The changes of a window in entries that are not about existence: rates, hand-overs, restarts, values.

@@ -101,21 +101,18 @@ impl<'a> WindowTurns<'a> {
                 Change::Rate { .. } | Change::Value { .. } => None,
             };
             if let Change::Added { what, .. } | Change::Removed { what, .. } = change
-                && let (Element::Publish(_), Some(edge)) = (what, owners.edge(*what))
+                && let (Element::Publish(_), Some((node, topic))) = (what, owners.edge(*what))
             {
-                let all = owners.senders.entry(edge.topic).or_default();
-                all.push((*what, edge.node));
+                let all = owners.senders.entry(topic).or_default();
+                all.push((*what, node));
             }
         }
         owners
     }
 
-    fn edge(&self, what: Element) -> Option<&'a Edge> {
-        match what {
-            Element::Publish(edge) => self.elements.publishes.get(edge as usize),
-            Element::Subscribe(edge) => self.elements.subscribes.get(edge as usize),
-            Element::Node(_) | Element::Topic(_) => None,
-        }
+    fn edge(&self, what: Element) -> Option<(NodeId, TopicId)> {
+        let (node, topic) = self.elements.ends(what);
+        node.zip(topic)
     }
 
     fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
@@ -161,17 +158,16 @@ impl<'a> WindowTurns<'a> {
         match what {
             Element::Node(_) => None,
             Element::Publish(_) | Element::Subscribe(_) => {
-                let edge = self.edge(what)?;
-                let node = moved.get(&Element::Node(edge.node)).copied();
-                let topic = || moved.contains_key(&Element::Topic(edge.topic));
-                let handed = || self.handed.get(&edge.topic).copied();
-                let restarted = || self.restarted.get(&edge.node).copied();
+                let (node, topic) = self.edge(what)?;
+                let handed = || self.handed.get(&topic).copied();
+                let restarted = || self.restarted.get(&node).copied();
                 let with_topic = || {
-                    topic()
-                        .then(|| self.topic_mover(edge.topic, moved))
-                        .flatten()
+                    let has_moved = moved.contains_key(&Element::Topic(topic));
+                    has_moved.then(|| self.topic_mover(topic, moved)).flatten()
                 };
-                node.or_else(handed)
+                let with_node = moved.get(&Element::Node(node)).copied();
+                with_node
+                    .or_else(handed)
                     .or_else(restarted)
                     .or_else(|| match what {
                         Element::Subscribe(_) => with_topic(),
@@ -191,10 +187,10 @@ impl<'a> WindowTurns<'a> {
             return node.or_else(|| moved.get(edge)).copied();
         }
         let listeners = moved.keys().filter_map(|what| match what {
-            Element::Subscribe(_) => self.edge(*what).filter(|edge| edge.topic == topic),
+            Element::Subscribe(_) => self.edge(*what).filter(|edge| edge.1 == topic),
             _ => None,
         });
-        let nodes = listeners.filter_map(|edge| moved.get(&Element::Node(edge.node)));
+        let nodes = listeners.filter_map(|edge| moved.get(&Element::Node(edge.0)));
         nodes.copied().next()
     }
 
@@ -203,7 +199,7 @@ impl<'a> WindowTurns<'a> {
     fn sender(&self, what: Element) -> Option<usize> {
         let topic = match what {
             Element::Topic(topic) => topic,
-            _ => self.edge(what)?.topic,
+            _ => self.edge(what)?.1,
         };
         if let Some(at) = self.handed.get(&topic) {
             return Some(*at);

@@ -5,18 +5,10 @@ use std::sync::Arc;
 
 use super::make::{Drafts, LedgerInput};
 use super::{Detail, Kind};
+use crate::base::rhythm::{BACK_NS, FEWEST_OF_SENDER, OVERLAP_NS, SHARE_HOLDS_NS, TAKEN_NS};
 use crate::base::time::Stamp;
-use crate::graph::lives::{Bound, Voice};
+use crate::graph::history::{Bound, Sender};
 use crate::graph::{Element, NodeId, TopicId};
-
-/// The longest time for which the new sender may begin before the old one stops, in nanoseconds.
-const BEFORE_NS: i64 = 5_000_000_000;
-/// The longest time for which it may begin after, in nanoseconds; any time later if the old one never sends again.
-const AFTER_NS: i64 = 60_000_000_000;
-/// The shortest time before the old one comes back, in nanoseconds.
-const BACK_NS: i64 = 5_000_000_000;
-/// The fewest messages of a sender: one that sends less takes over nothing.
-const FEWEST: u64 = 3;
 
 /// An interval of sending of one role, without a gap.
 #[derive(Clone, Debug)]
@@ -30,32 +22,32 @@ struct RoleSending {
 
 /// Adds all hand-overs.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let mut of: BTreeMap<TopicId, Vec<&Voice>> = BTreeMap::new();
-    for voice in &told.lives.voices {
-        of.entry(voice.topic).or_default().push(voice);
+    let mut of: BTreeMap<TopicId, Vec<&Sender>> = BTreeMap::new();
+    for sender in &told.history.sending.senders {
+        of.entry(sender.topic).or_default().push(sender);
     }
-    for (topic, voices) in of {
-        if told.is_by_the_way(topic) || voices.iter().any(|v| v.node.is_none() || v.is_latched) {
+    for (topic, senders) in of {
+        if told.is_by_the_way(topic) || senders.iter().any(|v| v.node.is_none() || v.is_latched) {
             continue;
         }
-        let all = sendings(told, &voices);
+        let all = sendings(told, &senders);
         let roles: BTreeSet<&Arc<str>> = all.iter().map(|s| &s.role).collect();
         if roles.len() > 1 {
             for (old, new) in replaced(&all) {
                 hand(told, drafts, topic, &old, &new);
             }
-            shares(told, drafts, topic, &voices);
+            shares(told, drafts, topic, &senders);
         }
     }
 }
 
 /// The intervals of sending of each role, sorted by first message.
-fn sendings(told: &LedgerInput<'_>, voices: &[&Voice]) -> Vec<RoleSending> {
+fn sendings(told: &LedgerInput<'_>, senders: &[&Sender]) -> Vec<RoleSending> {
     let mut all: Vec<RoleSending> = Vec::new();
-    for voice in voices {
-        let Some(node) = voice.node else { continue };
+    for sender in senders {
+        let Some(node) = sender.node else { continue };
         let mut own: Vec<RoleSending> = Vec::new();
-        for stretch in &voice.stretches {
+        for stretch in &sender.stretches {
             match own.last_mut() {
                 Some(last) if stretch.is_joined => {
                     (last.last, last.count) = (stretch.last, last.count + stretch.count);
@@ -78,7 +70,7 @@ fn sendings(told: &LedgerInput<'_>, voices: &[&Voice]) -> Vec<RoleSending> {
 /// Every end of sending that the beginning of another role compensates.
 fn replaced(all: &[RoleSending]) -> Vec<(RoleSending, RoleSending)> {
     let mut found = Vec::new();
-    for old in all.iter().filter(|s| s.count >= FEWEST) {
+    for old in all.iter().filter(|s| s.count >= FEWEST_OF_SENDER) {
         let own = || {
             all.iter()
                 .filter(|s| s.role == old.role && s.last > old.last)
@@ -90,23 +82,23 @@ fn replaced(all: &[RoleSending]) -> Vec<(RoleSending, RoleSending)> {
         let others = || all.iter().filter(|s| s.role != old.role);
         let begins = others().find(|s| {
             let late = s.first.since(old.last);
-            let soon = late <= AFTER_NS || back.is_none();
-            late >= -BEFORE_NS
+            let soon = late <= TAKEN_NS || back.is_none();
+            late >= -OVERLAP_NS
                 && soon
                 && s.first > old.first
                 && s.last > old.last
-                && s.count >= FEWEST
+                && s.count >= FEWEST_OF_SENDER
         });
         let Some(new) = begins.filter(|new| back.is_none_or(|back| new.first < back)) else {
             continue;
         };
         // A role that sent before and goes on takes nothing over, and leaves nothing to be taken.
         let carried = others().any(|s| {
-            s.role != new.role && s.last > old.last && s.first < old.last.plus(-BEFORE_NS)
+            s.role != new.role && s.last > old.last && s.first < old.last.plus(-OVERLAP_NS)
         });
         let went_on = others().any(|s| {
             s.role == new.role
-                && s.first < old.last.plus(-BEFORE_NS)
+                && s.first < old.last.plus(-OVERLAP_NS)
                 && s.last.plus(BACK_NS) > old.last
         });
         if !carried && !went_on {
@@ -136,9 +128,6 @@ fn hand(
     drafts.add(entry);
 }
 
-/// The shortest time for which a larger share must hold, in nanoseconds.
-const HOLDS_NS: i64 = 5_000_000_000;
-
 /// The rate of a sender in an interval.
 struct Pace {
     node: NodeId,
@@ -148,8 +137,8 @@ struct Pace {
 }
 
 /// Adds the times at which most messages of a topic begin to come from another sender, while both go on.
-fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, voices: &[&Voice]) {
-    let paces: Vec<Pace> = voices
+fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, senders: &[&Sender]) {
+    let paces: Vec<Pace> = senders
         .iter()
         .filter_map(|v| Some((v.node?, v)))
         .flat_map(|(node, v)| {
@@ -172,7 +161,7 @@ fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, voices: &
         let senders: Vec<&Pace> = inside.collect();
         let whole: f64 = senders.iter().map(|p| p.hz).sum();
         let main = senders.iter().find(|p| p.hz > whole / 2.0);
-        let Some(main) = main.filter(|_| pair[1].since(pair[0]) >= HOLDS_NS) else {
+        let Some(main) = main.filter(|_| pair[1].since(pair[0]) >= SHARE_HOLDS_NS) else {
             continue;
         };
         let nodes: BTreeSet<NodeId> = senders.iter().map(|p| p.node).collect();
@@ -180,7 +169,7 @@ fn shares(told: &LedgerInput<'_>, drafts: &mut Drafts, topic: TopicId, voices: &
             && *old != main.node
             && nodes.contains(old)
             && then.contains(&main.node)
-            && pair[0].since(*until) <= HOLDS_NS
+            && pair[0].since(*until) <= SHARE_HOLDS_NS
         {
             let at = Bound {
                 time: pair[0],

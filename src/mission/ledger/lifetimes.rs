@@ -4,12 +4,10 @@ use std::collections::BTreeMap;
 
 use super::make::{Drafts, LedgerInput};
 use super::{EntryId, Kind};
+use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::Stamp;
-use crate::graph::lives::{Bound, Known};
-use crate::graph::{Edge, Element, NodeId, TopicId};
-
-/// The longest time between the turn of a node and that of an edge caused by it, in nanoseconds.
-const WITH_ITS_NODE_NS: i64 = 5_000_000_000;
+use crate::graph::history::{Bound, Life};
+use crate::graph::{Element, NodeId, TopicId};
 
 /// The kind of a turn: a beginning or an end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,37 +29,16 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     for turns in turns_by_role(told).values() {
         tell_role(told, drafts, &mut wholes, turns);
     }
-    let edges = told.elements.publishes.iter().zip(&told.lives.publishes);
-    let recorded = |what: Element| !told.is_timeless(what);
-    for (id, (edge, known)) in (0..)
-        .zip(edges)
-        .filter(|(id, _)| recorded(Element::Publish(*id)))
-    {
-        tell_edge(
-            told,
-            drafts,
-            &mut wholes,
-            Element::Publish(id),
-            (edge, known),
-        );
+    let recorded = || told.elements.all().filter(|what| !told.is_timeless(*what));
+    for what in recorded() {
+        if let (Some(node), Some(topic)) = told.elements.ends(what) {
+            tell_edge(told, drafts, &mut wholes, what, (node, topic));
+        }
     }
-    let edges = told.elements.subscribes.iter().zip(&told.lives.subscribes);
-    for (id, (edge, known)) in (0..)
-        .zip(edges)
-        .filter(|(id, _)| recorded(Element::Subscribe(*id)))
-    {
-        tell_edge(
-            told,
-            drafts,
-            &mut wholes,
-            Element::Subscribe(id),
-            (edge, known),
-        );
-    }
-    let topics = (0..).zip(&told.lives.topics);
-    for (id, known) in topics.filter(|(id, _)| recorded(Element::Topic(*id))) {
-        for (turn, at) in turns(known) {
-            let mut entry = told.entry(kind(turn), Element::Topic(id), at);
+    for what in recorded() {
+        let Element::Topic(id) = what else { continue };
+        for (turn, at) in turns(told.lives(what)) {
+            let mut entry = told.entry(kind(turn), what, at);
             entry.part_of = wholes.topics.get(&(id, turn, at.time)).copied();
             drafts.add(entry);
         }
@@ -69,8 +46,8 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
 }
 
 /// The beginnings and ends of an element, in order.
-fn turns(known: &Known) -> impl Iterator<Item = (Turn, Bound)> + '_ {
-    known.lives.iter().flat_map(|life| {
+fn turns(lives: &[Life]) -> impl Iterator<Item = (Turn, Bound)> + '_ {
+    lives.iter().flat_map(|life| {
         let began = life.began.map(|at| (Turn::Begins, at));
         let ended = life.ended.map(|at| (Turn::Ends, at));
         began.into_iter().chain(ended)
@@ -90,10 +67,10 @@ type RoleTurns = Vec<(Stamp, Turn, NodeId, Bound)>;
 /// The turns of all nodes: of each anonymous role together; any other node is its own role.
 fn turns_by_role<'a>(told: &LedgerInput<'a>) -> BTreeMap<&'a str, RoleTurns> {
     let mut all: BTreeMap<&str, RoleTurns> = BTreeMap::new();
-    let nodes = (0..).zip(told.elements.nodes.iter().zip(&told.lives.nodes));
-    for (id, (node, known)) in nodes.filter(|(id, _)| !told.is_timeless(Element::Node(*id))) {
+    let nodes = (0..).zip(&told.elements.nodes);
+    for (id, node) in nodes.filter(|(id, _)| !told.is_timeless(Element::Node(*id))) {
         let of = all.entry(&*node.role).or_default();
-        of.extend(turns(known).map(|(turn, at)| (at.time, turn, id, at)));
+        of.extend(turns(told.lives(Element::Node(id))).map(|(turn, at)| (at.time, turn, id, at)));
     }
     for turns in all.values_mut() {
         turns.sort_by_key(|(time, turn, node, _)| (*time, std::cmp::Reverse(*turn), *node));
@@ -148,27 +125,24 @@ fn tell_edge(
     drafts: &mut Drafts,
     wholes: &mut Wholes,
     what: Element,
-    (edge, known): (&Edge, &Known),
+    (node, topic): (NodeId, TopicId),
 ) {
-    for (turn, at) in turns(known) {
-        let of_node = wholes.nodes.get(&(edge.node, turn)).into_iter().flatten();
+    for (turn, at) in turns(told.lives(what)) {
+        let of_node = wholes.nodes.get(&(node, turn)).into_iter().flatten();
         // Near its node's turn; or it may have been, for all that is known.
         let may = |node: &Bound| {
-            let since = node.time.plus(WITH_ITS_NODE_NS);
+            let since = node.time.plus(TOGETHER_NS);
             turn == Turn::Begins && at.earliest <= since && node.time <= at.time
         };
         let near = of_node
             .map(|(node, id)| (at.time.since(node.time).abs(), node, *id))
-            .filter(|(far, node, _)| *far <= WITH_ITS_NODE_NS || may(node))
+            .filter(|(far, node, _)| *far <= TOGETHER_NS || may(node))
             .min_by_key(|(far, _, _)| *far)
             .map(|(_, _, id)| id);
         let mut entry = told.entry(kind(turn), what, at);
         entry.part_of = near;
         let id = drafts.add(entry);
         let whole = near.unwrap_or(id);
-        wholes
-            .topics
-            .entry((edge.topic, turn, at.time))
-            .or_insert(whole);
+        wholes.topics.entry((topic, turn, at.time)).or_insert(whole);
     }
 }

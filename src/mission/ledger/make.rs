@@ -1,17 +1,17 @@
 //! The making of a mission's entries from its lives: each kind in a file of its own, then sorted and joined.
 
 use super::{Detail, Entry, EntryId, Kind, hands, lifetimes, rates, silence};
-use crate::base::name::{is_player, is_quiet, is_recorder};
+use crate::base::name::is_quiet;
 use crate::base::time::Stamp;
 use crate::evidence::{Degree, Evidence};
-use crate::graph::lives::{Bound, Known, Lives};
-use crate::graph::{Element, Elements, Node};
+use crate::graph::history::{Bound, Life};
+use crate::graph::{Element, Elements, History};
 
 /// The data from which entries are made.
 #[derive(Clone, Copy)]
 pub(crate) struct LedgerInput<'a> {
     pub(crate) elements: &'a Elements,
-    pub(crate) lives: &'a Lives,
+    pub(crate) history: &'a History,
     /// The share by which a rate must change, ≥ 0.
     pub(crate) rate_change: f64,
 }
@@ -74,7 +74,7 @@ pub(crate) fn sorted(mut list: Vec<Entry>, elements: &Elements) -> (Vec<Entry>, 
     (list, new)
 }
 
-impl LedgerInput<'_> {
+impl<'a> LedgerInput<'a> {
     /// An entry about an element at a moment.
     pub(crate) fn entry(&self, kind: Kind, what: Element, at: Bound) -> Entry {
         Entry {
@@ -85,7 +85,11 @@ impl LedgerInput<'_> {
             latest: at.latest.max(at.time),
             until: None,
             detail: Detail::None,
-            degree: self.known(what).map_or(Degree::Declared, |k| k.degree),
+            degree: self
+                .history
+                .records
+                .of(what)
+                .map_or(Degree::Declared, |record| record.degree),
             evidence: self.elements.evidence(what),
             part_of: None,
             quiet: self.is_quiet(what),
@@ -93,14 +97,10 @@ impl LedgerInput<'_> {
         }
     }
 
-    /// The lives of an element.
-    pub(crate) fn known(&self, what: Element) -> Option<&Known> {
-        match what {
-            Element::Node(id) => self.lives.nodes.get(id as usize),
-            Element::Topic(id) => self.lives.topics.get(id as usize),
-            Element::Publish(id) => self.lives.publishes.get(id as usize),
-            Element::Subscribe(id) => self.lives.subscribes.get(id as usize),
-        }
+    /// The lives of an element, in order.
+    pub(crate) fn lives(&self, what: Element) -> &'a [Life] {
+        let record = self.history.records.of(what);
+        record.map_or(&[], |record| &record.lives)
     }
 
     /// Whether none of the evidence for an element has times.
@@ -140,22 +140,15 @@ const SHARED: [&str; 8] = [
 /// Whether an element is housekeeping or the recorder's.
 pub(crate) fn is_housekeeping(elements: &Elements, what: Element) -> bool {
     let (node, topic) = elements.ends(what);
-    node.is_some_and(|id| is_tool(&elements.nodes[id as usize]))
+    node.is_some_and(|id| elements.nodes[id as usize].is_tool())
         || topic.is_some_and(|id| is_quiet(elements.topics[id as usize].name.as_str()))
-}
-
-/// Whether a node records or plays bags, by its name or its log records, or is the log's own.
-fn is_tool(node: &Node) -> bool {
-    let name = node.name.as_str();
-    let records = node.evidence.words().any(|word| word == "recorder");
-    records || is_recorder(name) || is_player(name) || is_quiet(name)
 }
 
 /// Adds the changes of nodes' lifecycle states.
 fn lifecycles(told: &LedgerInput<'_>, drafts: &mut Drafts) {
     let mut states: std::collections::BTreeMap<u32, std::sync::Arc<str>> =
         std::collections::BTreeMap::new();
-    for change in &told.lives.transitions {
+    for change in &told.history.transitions {
         let before = states.insert(change.node, change.state.clone());
         let from = before.unwrap_or_default();
         if from == change.state {

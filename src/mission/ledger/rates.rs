@@ -2,24 +2,18 @@
 
 use super::make::{Drafts, LedgerInput};
 use super::{Detail, Kind};
+use crate::base::rhythm::{FEWEST_OF_RATE, RATE_HOLDS_NS, RATE_PAUSE_NS};
 use crate::graph::Element;
-use crate::graph::lives::{Bound, Stretch, Voice};
-
-/// The fewest messages (5 intervals) of a rate that counts.
-const FEWEST: u64 = 6;
-/// The shortest time for which a rate must hold, in nanoseconds.
-const HOLDS_NS: i64 = 3_000_000_000;
-/// The longest pause of a sender while it takes another rate, in nanoseconds.
-const PAUSE_NS: i64 = 5_000_000_000;
+use crate::graph::history::{Bound, Sender, Stretch};
 
 /// Adds all changes of rates.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let voices = told.lives.voices.iter();
-    for voice in voices.filter(|v| !v.is_latched && !told.is_by_the_way(v.topic)) {
-        for pair in voice.stretches.windows(2) {
+    let senders = told.history.sending.senders.iter();
+    for sender in senders.filter(|v| !v.is_latched && !told.is_by_the_way(v.topic)) {
+        for pair in sender.stretches.windows(2) {
             let [before, after] = pair else { continue };
-            if changes(before, after, told.rate_change) && !is_away(told, voice, before, after) {
-                let what = told.sender(voice);
+            if changes(before, after, told.rate_change) && !is_away(told, sender, before, after) {
+                let what = told.publication(sender);
                 let width = before.period.max(after.period);
                 let mut entry = told.entry(
                     Kind::Rate,
@@ -42,16 +36,17 @@ pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
 
 /// Whether a steady rate becomes another one.
 fn changes(before: &Stretch, after: &Stretch, share: f64) -> bool {
-    let holds = |s: &Stretch| s.is_even && s.count >= FEWEST && s.last.since(s.first) >= HOLDS_NS;
+    let holds = |s: &Stretch| {
+        s.is_even && s.count >= FEWEST_OF_RATE && s.last.since(s.first) >= RATE_HOLDS_NS
+    };
     let differs = (after.hz() - before.hz()).abs() > share * before.hz().min(after.hz());
-    let meets = after.is_joined || after.first.since(before.last) <= PAUSE_NS;
+    let meets = after.is_joined || after.first.since(before.last) <= RATE_PAUSE_NS;
     holds(before) && holds(after) && differs && meets
 }
 
 /// Whether the sender restarted between the two.
-fn is_away(told: &LedgerInput<'_>, voice: &Voice, before: &Stretch, after: &Stretch) -> bool {
-    let known = told.known(told.sender(voice));
-    let lives = known.into_iter().flat_map(|k| &k.lives);
+fn is_away(told: &LedgerInput<'_>, sender: &Sender, before: &Stretch, after: &Stretch) -> bool {
+    let lives = told.lives(told.publication(sender)).iter();
     !after.is_joined
         && lives
             .filter_map(|life| life.ended)
@@ -59,15 +54,11 @@ fn is_away(told: &LedgerInput<'_>, voice: &Voice, before: &Stretch, after: &Stre
 }
 
 impl LedgerInput<'_> {
-    /// The publication of a voice; its topic where the sender is unknown.
-    pub(super) fn sender(&self, voice: &Voice) -> Element {
-        let place = voice.node.and_then(|node| {
-            let key = |e: &crate::graph::Edge| (e.node, e.topic);
-            let edges = &self.elements.publishes;
-            edges.binary_search_by_key(&(node, voice.topic), key).ok()
-        });
-        place
-            .and_then(|at| u32::try_from(at).ok())
-            .map_or(Element::Topic(voice.topic), Element::Publish)
+    /// The publication of a sender; its topic where the sender is unknown.
+    pub(super) fn publication(&self, sender: &Sender) -> Element {
+        let edge = sender
+            .node
+            .and_then(|node| self.elements.publication(node, sender.topic));
+        edge.map_or(Element::Topic(sender.topic), Element::Publish)
     }
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use super::make::{Drafts, LedgerInput};
 use super::{EntryId, Kind};
+use crate::base::rhythm::TOGETHER_NS;
 use crate::base::time::{Span, Stamp};
-use crate::graph::lives::{Bound, Known, Stretch, Voice, all_silent};
+use crate::graph::history::{Bound, Sender, Stretch, all_silent};
 use crate::graph::{Element, NodeId, TopicId};
 
 /// The beginning and end of a silence; `None` if to the end of the mission.
@@ -13,34 +14,30 @@ type Silence = (Stamp, Option<Stamp>);
 
 /// Adds all silences.
 pub(super) fn tell(told: &LedgerInput<'_>, drafts: &mut Drafts) {
-    let pauses = Pauses::new(&told.lives.voices);
+    let pauses = Pauses::new(&told.history.sending.senders);
     let gone = Gone::new(drafts);
     let mut of_nodes: BTreeMap<NodeId, Vec<(Silence, EntryId)>> = BTreeMap::new();
-    for (node, voices) in by(told, |v| v.node.filter(|_| !v.is_latched)) {
+    for (node, senders) in by(told, |v| v.node.filter(|_| !v.is_latched)) {
         let what = Element::Node(node);
-        for silence in silences(told, what, &voices, &pauses) {
-            let id = drafts.add(entry(told, what, silence, &voices));
+        for silence in silences(told, what, &senders, &pauses) {
+            let id = drafts.add(entry(told, what, silence, &senders));
             of_nodes.entry(node).or_default().push((silence, id));
         }
     }
-    for (topic, voices) in by(told, |v| Some(v.topic).filter(|_| !v.is_latched)) {
+    for (topic, senders) in by(told, |v| Some(v.topic).filter(|_| !v.is_latched)) {
         if told.is_by_the_way(topic) {
             continue;
         }
-        for silence in silences(told, Element::Topic(topic), &voices, &pauses) {
-            let mut entry = entry(told, Element::Topic(topic), silence, &voices);
-            let nodes = voices.iter().filter_map(|v| of_nodes.get(&v.node?));
+        for silence in silences(told, Element::Topic(topic), &senders, &pauses) {
+            let mut entry = entry(told, Element::Topic(topic), silence, &senders);
+            let nodes = senders.iter().filter_map(|v| of_nodes.get(&v.node?));
             let whole = nodes.flatten().find(|(of, _)| meet(*of, silence));
             let whole = whole.map(|(_, id)| *id);
-            entry.part_of = whole.or_else(|| gone.at(&voices, silence.0));
+            entry.part_of = whole.or_else(|| gone.at(&senders, silence.0));
             drafts.add(entry);
         }
     }
 }
-
-/// The longest time between the end of a sender and the silence of its topic caused by it, before or after, in
-/// nanoseconds.
-const WITH_ITS_SENDER_NS: i64 = 5_000_000_000;
 
 /// The ends of nodes with their times, and the entries about them.
 struct Gone(BTreeMap<NodeId, Vec<(Stamp, EntryId)>>);
@@ -59,21 +56,21 @@ impl Gone {
     }
 
     /// The entry about the end of one of these senders at that time.
-    fn at(&self, voices: &[&Voice], time: Stamp) -> Option<EntryId> {
-        let of = voices.iter().filter_map(|v| self.0.get(&v.node?));
+    fn at(&self, senders: &[&Sender], time: Stamp) -> Option<EntryId> {
+        let of = senders.iter().filter_map(|v| self.0.get(&v.node?));
         of.flatten()
-            .find(|(end, _)| end.since(time).abs() <= WITH_ITS_SENDER_NS)
+            .find(|(end, _)| end.since(time).abs() <= TOGETHER_NS)
             .map(|(_, id)| *id)
     }
 }
 
-/// The voices of each node, or of each topic.
+/// The senders of each node, or of each topic.
 fn by<'a>(
     told: &LedgerInput<'a>,
-    key: impl Fn(&Voice) -> Option<u32>,
-) -> BTreeMap<TopicId, Vec<&'a Voice>> {
-    let mut of: BTreeMap<u32, Vec<&Voice>> = BTreeMap::new();
-    for voice in &told.lives.voices {
+    key: impl Fn(&Sender) -> Option<u32>,
+) -> BTreeMap<TopicId, Vec<&'a Sender>> {
+    let mut of: BTreeMap<u32, Vec<&Sender>> = BTreeMap::new();
+    for voice in &told.history.sending.senders {
         if let Some(key) = key(voice) {
             of.entry(key).or_default().push(voice);
         }
@@ -84,27 +81,24 @@ fn by<'a>(
 fn silences(
     told: &LedgerInput<'_>,
     what: Element,
-    voices: &[&Voice],
+    senders: &[&Sender],
     pauses: &Pauses,
 ) -> Vec<Silence> {
-    let spans = told.known(what).map(spans).unwrap_or_default();
-    let stretches: Vec<&[Stretch]> = voices.iter().map(|v| &v.stretches[..]).collect();
+    let lives = told.lives(what).iter();
+    let spans: Vec<Span> = lives.map(|life| life.span).collect();
+    let stretches: Vec<&[Stretch]> = senders.iter().map(|v| &v.stretches[..]).collect();
     let mut all = all_silent(&stretches, &spans);
     all.retain(|silence| !pauses.hold(*silence));
     all
-}
-
-fn spans(known: &Known) -> Vec<Span> {
-    known.lives.iter().map(|life| life.span).collect()
 }
 
 fn entry(
     told: &LedgerInput<'_>,
     what: Element,
     (from, to): Silence,
-    voices: &[&Voice],
+    senders: &[&Sender],
 ) -> super::Entry {
-    let last = voices
+    let last = senders
         .iter()
         .flat_map(|v| &v.stretches)
         .filter(|s| s.last == from);
@@ -132,8 +126,8 @@ fn meet(a: Silence, b: Silence) -> bool {
 struct Pauses(Vec<(Stamp, Stamp)>);
 
 impl Pauses {
-    fn new(voices: &[Voice]) -> Self {
-        let sending = voices.iter().flat_map(|v| &v.stretches);
+    fn new(senders: &[Sender]) -> Self {
+        let sending = senders.iter().flat_map(|v| &v.stretches);
         let mut sending: Vec<_> = sending.map(|s| (s.first, s.last)).collect();
         sending.sort_unstable();
         let mut pauses = Vec::new();

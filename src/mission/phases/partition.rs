@@ -3,8 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use super::presence::Presence;
-
 /// The cost of a boundary, in element-nanoseconds: this share (one in so many) of the mission times its usual number of
 /// elements. Chosen on three real missions and tested on three others (precision .98, recall .83 of 44 boundaries).
 const PRICE: i128 = 400;
@@ -13,9 +11,10 @@ const FEWEST: i128 = 10;
 /// The shortest phase, as a part of the mission (one in so many).
 const SHORTEST: i64 = 20;
 
-/// The cells, other than the first, at which pieces begin. `widths` are the cells' lengths in nanoseconds. On a tie the
+/// The cells, other than the first, at which pieces begin. `widths` are the cells' lengths in nanoseconds, `present` says
+/// for each element in which of them it exists. On a tie the
 /// earlier cut is taken.
-pub(crate) fn partition(widths: &[i64], present: &[Presence]) -> Vec<usize> {
+pub(crate) fn partition(widths: &[i64], present: &[Vec<bool>]) -> Vec<usize> {
     let n = widths.len();
     let mut at = vec![0_i64; n + 1];
     for (k, width) in widths.iter().enumerate() {
@@ -65,10 +64,10 @@ pub(crate) fn partition(widths: &[i64], present: &[Presence]) -> Vec<usize> {
 
 /// The time each element is present before every cell, and the number of elements that share that; elements that come
 /// and go together are one row.
-fn rows(widths: &[i64], present: &[Presence]) -> Vec<(Vec<i64>, i128)> {
+fn rows(widths: &[i64], present: &[Vec<bool>]) -> Vec<(Vec<i64>, i128)> {
     let mut many: BTreeMap<&[bool], i128> = BTreeMap::new();
-    for presence in present {
-        *many.entry(&presence.cells).or_default() += 1;
+    for cells in present {
+        *many.entry(cells).or_default() += 1;
     }
     let sums = |cells: &[bool]| {
         let mut sums = vec![0_i64];
@@ -84,21 +83,15 @@ fn rows(widths: &[i64], present: &[Presence]) -> Vec<(Vec<i64>, i128)> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use super::super::presence::PresentThing;
     use super::*;
 
     /// The cuts of a mission in which each text is an element and each character a cell of a second.
     fn cuts(rows: &[(&str, usize)]) -> Vec<usize> {
         let presence = |(text, many): &(&str, usize)| {
-            let row = Presence {
-                subject: PresentThing::Node(Arc::from("/n")),
-                cells: text.chars().map(|c| c == '#').collect(),
-            };
+            let row: Vec<bool> = text.chars().map(|c| c == '#').collect();
             vec![row; *many]
         };
-        let present: Vec<Presence> = rows.iter().flat_map(presence).collect();
+        let present: Vec<Vec<bool>> = rows.iter().flat_map(presence).collect();
         let n = rows[0].0.len();
         partition(&vec![1_000_000_000; n], &present)
     }

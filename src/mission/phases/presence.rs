@@ -1,12 +1,12 @@
-//! The presence of each element of the graph in the cells of the activity, by which phases are cut.
+//! The times in which each element exists, by which phases are cut.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::base::name::is_quiet;
 use crate::base::time::{Span, Stamp};
-use crate::graph::{Edge, Element, Elements, Node, Row, State, Topic};
-use crate::mission::activity::{Activity, is_hidden_node};
+use crate::graph::history::{Sending, Stretch, silences};
+use crate::graph::{Edge, Element, Elements, Node, Topic, TopicId};
 
 /// The longest absence, as a part of the mission (one in so many), that does not count inside an element's life: a slow
 /// topic has no message in some cells.
@@ -32,14 +32,32 @@ impl PresentThing {
     }
 }
 
-/// An element, and the cells in which it exists.
+/// An element, and the times in which it exists.
 #[derive(Clone, Debug)]
 pub(crate) struct Presence {
     pub(crate) subject: PresentThing,
-    pub(crate) cells: Vec<bool>,
+    /// In order, none overlapping.
+    spans: Vec<Span>,
 }
 
 impl Presence {
+    /// Whether it exists in each of these cells.
+    pub(crate) fn cells(&self, cells: &[Span]) -> Vec<bool> {
+        let mut is = vec![false; cells.len()];
+        for span in &self.spans {
+            let from = cells.partition_point(|cell| cell.end <= span.start);
+            let to = cells.partition_point(|cell| cell.start < span.end);
+            is.iter_mut().take(to).skip(from).for_each(|is| *is = true);
+        }
+        is
+    }
+
+    /// Whether it exists for at least half of this time.
+    pub(crate) fn fills(&self, time: Span) -> bool {
+        let there: i64 = self.spans.iter().map(|s| s.shared(time).max(0)).sum();
+        there.saturating_mul(2) >= time.nanos()
+    }
+
     /// Whether it counts for the names of phases: nodes, or topics where there are only topics.
     pub(crate) fn counts(&self, topics: bool) -> bool {
         match self.subject {
@@ -59,36 +77,65 @@ pub(crate) fn is_topics(present: &[Presence]) -> bool {
 
 /// Every element's presence, sorted: nodes by role and their publications that carry messages; topics with messages
 /// where less than half of these have a known publisher. Housekeeping and recorders are left out.
-pub(crate) fn presences(elements: &Elements, activity: &Activity) -> Vec<Presence> {
-    let subjects = Subjects::new(elements, knows_publishers(elements, activity));
-    let all = subjects.sorted();
-    let [nodes, publishes, topics] = subjects.places(&all);
-    let mut cells = vec![vec![false; activity.cells().len()]; all.len()];
-    let mut see = |places: &[Option<usize>], what: fn(u32) -> Element, is: fn(&Row) -> bool| {
-        for (id, place) in (0..).zip(places) {
-            let Some(place) = *place else {
-                continue;
-            };
-            let rows = activity.graphs.rows(what(id));
-            rows.filter(|(_, row)| is(row))
-                .for_each(|(at, _)| cells[place][at] = true);
+pub(crate) fn presences(elements: &Elements, sending: &Sending, whole: Span) -> Vec<Presence> {
+    let mut all: BTreeMap<PresentThing, Vec<Span>> = BTreeMap::new();
+    let subjects = Subjects::new(elements, knows_publishers(elements, sending));
+    for (what, subject) in subjects.iter() {
+        let times = match what {
+            Element::Node(_) => elements.runs(what).to_vec(),
+            _ => sent(elements, sending, what),
+        };
+        all.entry(subject.clone()).or_default().extend(times);
+    }
+    let most = whole.nanos() / FILLED;
+    let presence = |(subject, spans)| Presence {
+        subject,
+        spans: Span::joined(spans, most),
+    };
+    let there = all.into_iter().map(presence);
+    there
+        .filter(|p| p.spans.iter().any(|s| s.shared(whole) > 0))
+        .collect()
+}
+
+/// The times in which a topic carries messages, or a publication that has sent any: while it lives, but for silences.
+fn sent(elements: &Elements, sending: &Sending, what: Element) -> Vec<Span> {
+    let stretch = |s: &Stretch| Span {
+        start: s.first,
+        end: s.last.plus(1),
+    };
+    let Element::Publish(_) = what else {
+        let topic = elements.ends(what).1;
+        let senders = topic.map_or(&[][..], |topic| sending.of_topic(topic));
+        return senders
+            .iter()
+            .flat_map(|s| s.stretches.iter().map(stretch))
+            .collect();
+    };
+    let (Some(node), Some(topic)) = elements.ends(what) else {
+        return Vec::new();
+    };
+    let Some(sender) = sending.of_edge(node, topic) else {
+        return Vec::new();
+    };
+    let mut times = Vec::new();
+    for life in elements.runs(what) {
+        let mut start = life.start;
+        let silent = silences(&sender.stretches, &[*life]);
+        for (from, to) in silent.into_iter().filter(|_| !sender.is_latched) {
+            times.push(Span {
+                start,
+                end: from.plus(1),
+            });
+            start = to.unwrap_or(life.end);
         }
-    };
-    let carries = |row: &Row| matches!(row.state, State::Active | State::Latched);
-    see(&nodes, Element::Node, |_| true);
-    see(&publishes, Element::Publish, carries);
-    see(&topics, Element::Topic, |row| row.count > Some(0));
-    let widths: Vec<i64> = activity.cells().iter().map(Span::nanos).collect();
-    let most = activity.span().nanos() / FILLED;
-    let seen = all
-        .into_iter()
-        .zip(cells)
-        .filter(|(_, cells)| cells.contains(&true));
-    let filled = |(subject, cells): (&PresentThing, _)| Presence {
-        subject: subject.clone(),
-        cells: filled(cells, &widths, most),
-    };
-    seen.map(filled).collect()
+        times.push(Span {
+            start,
+            end: life.end,
+        });
+    }
+    times.retain(|time| time.start < time.end);
+    times
 }
 
 /// The subject of each node, publication and topic in the activity, by id; `None` for those left out.
@@ -103,7 +150,7 @@ impl Subjects {
             let topics = topics.map(|topic| told(topic).map(PresentThing::Topic));
             return Self([Vec::new(), Vec::new(), topics.collect()]);
         }
-        let role = |node: &Node| (!is_hidden_node(node)).then(|| Arc::clone(&node.role));
+        let role = |node: &Node| (!node.is_tool()).then(|| Arc::clone(&node.role));
         let roles: Vec<Option<Arc<str>>> = elements.nodes.iter().map(role).collect();
         let publication = |edge: &Edge| {
             let role = roles.get(edge.node as usize)?.clone()?;
@@ -117,74 +164,51 @@ impl Subjects {
         Self([nodes.collect(), publishes, Vec::new()])
     }
 
-    fn sorted(&self) -> Vec<&PresentThing> {
-        let mut all: Vec<&PresentThing> = self.0.iter().flatten().flatten().collect();
-        all.sort_unstable();
-        all.dedup();
-        all
-    }
-
-    /// The places of all subjects in the sorted list.
-    fn places(&self, all: &[&PresentThing]) -> [Vec<Option<usize>>; 3] {
-        let place = |subject: &PresentThing| all.binary_search(&subject).ok();
-        self.0.each_ref().map(|list| {
-            let places = list.iter().map(|subject| place(subject.as_ref()?));
-            places.collect()
+    /// The subjects with their elements.
+    fn iter(&self) -> impl Iterator<Item = (Element, &PresentThing)> {
+        let [nodes, publishes, topics] = &self.0;
+        let kinds = [
+            (Element::Node as fn(u32) -> Element, nodes),
+            (Element::Publish, publishes),
+            (Element::Topic, topics),
+        ];
+        kinds.into_iter().flat_map(|(kind, list)| {
+            let all = (0..).map(kind).zip(list);
+            all.filter_map(|(what, subject)| Some((what, subject.as_ref()?)))
         })
     }
 }
 
 /// Whether at least half of the messages are on topics of which some publisher is known.
-pub(crate) fn knows_publishers(elements: &Elements, activity: &Activity) -> bool {
-    let graphs = &activity.graphs;
-    // Per topic the cells in which some publisher is known; of most topics of a large mission none.
-    let mut heard = vec![Vec::new(); elements.topics.len()];
-    for (id, edge) in (0..).zip(&elements.publishes) {
-        let Some(heard) = heard.get_mut(edge.topic as usize) else {
-            continue;
-        };
-        if !edge.evidence.is_guess() {
-            heard.resize(graphs.len(), false);
-            let rows = graphs.rows(Element::Publish(id));
-            rows.for_each(|(at, _)| heard[at] = true);
-        }
+pub(crate) fn knows_publishers(elements: &Elements, sending: &Sending) -> bool {
+    let mut known_on: BTreeMap<TopicId, Vec<&Edge>> = BTreeMap::new();
+    for edge in elements.publishes.iter().filter(|e| !e.evidence.is_guess()) {
+        known_on.entry(edge.topic).or_default().push(edge);
     }
     let (mut all, mut known) = (0_u64, 0_u64);
-    for ((id, topic), heard) in (0..).zip(&elements.topics).zip(&heard) {
-        if is_quiet(topic.name.as_str()) {
+    for sender in &sending.senders {
+        let topic = elements.topics.get(sender.topic as usize);
+        if topic.is_none_or(|topic| is_quiet(topic.name.as_str())) {
             continue;
         }
-        for (at, row) in graphs.rows(Element::Topic(id)) {
-            let count = row.count.unwrap_or(0);
-            all = all.saturating_add(count);
-            if heard.get(at) == Some(&true) {
-                known = known.saturating_add(count);
+        let edges = known_on.get(&sender.topic).map_or(&[][..], Vec::as_slice);
+        for stretch in &sender.stretches {
+            let span = Span {
+                start: stretch.first,
+                end: stretch.last.plus(1),
+            };
+            let lives = |edge: &&Edge| edge.runs.iter().any(|life| life.shared(span) > 0);
+            all = all.saturating_add(stretch.count);
+            if edges.iter().any(lives) {
+                known = known.saturating_add(stretch.count);
             }
         }
     }
     known >= all - known
 }
 
-/// The cells with every absence of at most `most` nanoseconds between two presences filled.
-fn filled(mut cells: Vec<bool>, widths: &[i64], most: i64) -> Vec<bool> {
-    let mut last: Option<usize> = None;
-    for at in 0..cells.len() {
-        if !cells[at] {
-            continue;
-        }
-        if let Some(last) = last {
-            let absent: i64 = widths[last + 1..at].iter().sum();
-            if absent <= most {
-                cells[last + 1..at].fill(true);
-            }
-        }
-        last = Some(at);
-    }
-    cells
-}
-
 /// The exact first and last signs of the nodes of a role, or of a topic.
-type Ends = Vec<(Option<Stamp>, Option<Stamp>)>;
+pub(crate) type Ends = Vec<(Option<Stamp>, Option<Stamp>)>;
 
 /// The exact first and last signs by role, or by topic.
 pub(crate) fn ends(elements: &Elements, topics: bool) -> BTreeMap<&str, Ends> {
@@ -209,10 +233,21 @@ mod tests {
 
     #[test]
     fn short_absences_inside_a_life_are_filled() {
-        let cells = |text: &str| text.chars().map(|c| c == '#').collect::<Vec<_>>();
-        let widths = [10; 9];
-        let filled = |text: &str| filled(cells(text), &widths, 20);
-        assert_eq!(filled(".#..#...#"), cells(".####...#"));
-        assert_eq!(filled("..#......"), cells("..#......"));
+        let span = |start: i64, end: i64| Span {
+            start: Stamp(start),
+            end: Stamp(end),
+        };
+        let presence = Presence {
+            subject: PresentThing::Node(Arc::from("/n")),
+            spans: Span::joined(vec![span(10, 20), span(40, 50), span(80, 90)], 20),
+        };
+        let cells: Vec<Span> = (0..9).map(|k| span(10 * k, 10 * k + 10)).collect();
+        let there: String = presence
+            .cells(&cells)
+            .into_iter()
+            .map(|is| if is { '#' } else { '.' })
+            .collect();
+        assert_eq!(there, ".####...#");
+        assert!(presence.fills(span(10, 90)) && !presence.fills(span(50, 90)));
     }
 }

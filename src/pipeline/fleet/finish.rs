@@ -294,8 +294,6 @@ fn state(life: &WindowLife, sum: CountSum, window: Span) -> RawState {
         first_ns: life.first.map(|at| at.0),
         last_ns: life.last.map(|at| at.0),
         runs: Vec::new(),
-        sending: None,
-        pauses: None,
         count: Some(sum.n),
         hz: per_second(sum.n, window),
     }

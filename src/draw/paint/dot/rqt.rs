@@ -220,12 +220,10 @@ impl RqtWriter<'_> {
     /// The quality of service of a single topic.
     fn qos(&self, members: &[Element]) -> Option<String> {
         let all = self.drawing.elements;
-        let edge = match members.first()? {
-            Element::Publish(id) => all.publishes.get(*id as usize)?,
-            Element::Subscribe(id) => all.subscribes.get(*id as usize)?,
-            _ => return None,
+        let (Some(_), Some(topic)) = all.ends(*members.first()?) else {
+            return None;
         };
-        let qos = all.topics.get(edge.topic as usize)?.qos.as_ref()?;
+        let qos = all.topics.get(topic as usize)?.qos.as_ref()?;
         (!qos.is_empty()).then(|| qos.to_string())
     }
 

@@ -31,7 +31,11 @@ function listNews() {
 		const { n = 0, lines = [] } = news.get(now) ?? {};
 		// Nothing, as before.
 		if (!n && $.news.firstChild?.textContent == 'None.') return;
-		fill('news', lines, ([s, sign, i, text]) => entry(i, text, KINDS[sign], data.sides ? '' : clock(Math.floor(s))));
+		fill('news', lines, ([s, sign, i, text, id]) => {
+			const line = entry(i, text, KINDS[sign], data.sides ? '' : clock(Math.floor(s)));
+			line.dataset.entry = id;
+			return line;
+		});
 		if (n > lines.length) $.news.append(make('p', { textContent: `and ${n - lines.length} more` }));
 		if (!n) $.news.append(make('p', { textContent: 'None.' }));
 		return;

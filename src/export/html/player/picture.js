@@ -62,14 +62,14 @@ function seek(w, quiet) {
 	save();
 }
 function header() {
-	const place = `window ${now + 1} of ${W}`, chips = chipsOf(), n = base < 0 ? news.get(now)?.n ?? 0 : marked(whole).length;
+	const place = `window ${now + 1} of ${W}`, chips = chipsOf();
 	say('where', data.sides?.[now] ?? `${place} · ${clock(starts[now])} – ${clock(ends[now])} of ${clock(total)}${base < 0 ? '' : ` · against window ${base + 1}, ${clock(starts[base])} – ${clock(ends[base])}`}`);
 	$.clock.firstChild.textContent = iso(data.epoch / 1e3 + starts[now], 11, 19) + ' ';
 	$.clock.lastChild.textContent = data.date;
 	const p = phases.findLastIndex(([from]) => from < ends[now]);
 	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
-	$.chips.dataset.entries = n;
+	$.chips.dataset.entries = base < 0 ? (news.get(now)?.lines ?? []).map(line => line[4]).join(' ') : '';
 	$.chips.replaceChildren(...chips.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
 	$.seek.value = now;
 	$.seek.ariaValueText = [clock(starts[now]), place, ...chips.filter(Boolean)].join(', ');

@@ -14,31 +14,42 @@ const rowNames = rows.map(([i, label, inside]) => i < 0
 $.rownames.append(...rowNames);
 
 const bit = (x, y, w, h) => `M${x.toFixed(1)} ${y.toFixed(1)}h${w.toFixed(1)}v${h.toFixed(1)}h${(-w).toFixed(1)}z`;
+// A mark that names the events of the log it stands for.
+function markOf([className, ids, d]) {
+	const path = document.createElementNS('http://www.w3.org/2000/svg', 'path');
+	path.setAttribute('class', className);
+	path.setAttribute('d', d);
+	path.setAttribute(String(ids).includes(' ') ? 'data-entries' : 'data-entry', ids);
+	return path;
+}
 // Draws all in the pixels there are.
 function drawTime() {
 	const small = $.deck.classList.contains('small') || innerWidth <= 760, wide = $.axis.clientWidth, x = s => part(s) * wide;
 	pitch = small ? Math.max(2, Math.min(5, 48 / rows.length)) : ROW;
-	const high = pitch * rows.length, d = { life: '', guess: '', bar: '', hand: '', start: '', end: '' };
-	rows.forEach(([, , , lives, bars], r) => {
+	const high = pitch * rows.length, d = { life: '', guess: '', bar: '' }, signs = [];
+	rows.forEach(([, , , lives, bars, events], r) => {
 		const y = (r + .5) * pitch, tall = pitch * .8;
 		for (let k = 0; k < lives.length; k += 3) {
-			const [from, to, flags] = lives.slice(k, k + 3);
-			d[flags & 4 ? 'guess' : 'life'] += `M${x(from).toFixed(1)} ${y}H${x(to).toFixed(1)}`;
-			if (flags & 1) d.start += `M${x(from).toFixed(1)} ${y - tall / 2}v${tall}`;
-			if (flags & 2) d.end += `M${(x(to) - tall / 3).toFixed(1)} ${y - tall / 3}l${tall / 1.5} ${tall / 1.5}m0 ${-tall / 1.5}l${-tall / 1.5} ${tall / 1.5}`;
+			const [from, to, guessed] = lives.slice(k, k + 3);
+			d[guessed ? 'guess' : 'life'] += `M${x(from).toFixed(1)} ${y}H${x(to).toFixed(1)}`;
 		}
 		for (let k = 0; k < bars.length; k += 3) {
 			const h = pitch * (.16 + .06 * bars[k + 2]);
 			d.bar += bit(x(bars[k]), y - h / 2, Math.max(.6, x(bars[k + 1]) - x(bars[k])), h);
 		}
+		for (const [s, sign, id] of events) signs.push([['start', 'end', 'event'][sign], id, [
+			`M${x(s).toFixed(1)} ${y - tall / 2}v${tall}`,
+			`M${(x(s) - tall / 3).toFixed(1)} ${y - tall / 3}l${tall / 1.5} ${tall / 1.5}m0 ${-tall / 1.5}l${-tall / 1.5} ${tall / 1.5}`,
+			`M${(x(s) - tall / 4).toFixed(1)} ${y}l${tall / 4} ${-tall / 4}l${tall / 4} ${tall / 4}l${-tall / 4} ${tall / 4}z`][sign]]);
 	});
-	for (const [s, a, b] of hands) {
+	for (const [s, a, b, id] of hands) {
 		const [from, to] = [a, b].map(r => (r + .5) * pitch), tip = Math.sign(to - from) * 4;
-		d.hand += `M${x(s)} ${from}V${to}m-3 ${-tip}l3 ${tip}l3 ${-tip}M${x(s) - 2} ${from}a2 2 0 1 0 4 0a2 2 0 1 0 -4 0`;
+		signs.push(['hand', id, `M${x(s)} ${from}V${to}m-3 ${-tip}l3 ${tip}l3 ${-tip}M${x(s) - 2} ${from}a2 2 0 1 0 4 0a2 2 0 1 0 -4 0`]);
 	}
 	$.plot.setAttribute('width', wide);
 	$.plot.setAttribute('height', high);
 	for (const key in d) $.plot.querySelector('.' + key).setAttribute('d', d[key]);
+	$.plot.querySelector('.events').replaceChildren(...signs.map(markOf));
 	drawMarks(x);
 	drawTicks(x, wide);
 	drawRow();
@@ -46,14 +57,14 @@ function drawTime() {
 }
 // A plus above, a diamond in the middle, a minus below; those that would cover each other are one.
 function drawMarks(x) {
-	const lanes = ['', '', ''], before = [-9, -9, -9];
-	for (const [, , , lines] of told) for (const [s, sign] of lines) {
+	const all = [], last = [];
+	for (const [, , , lines] of told) for (const [s, sign, , , id] of lines) {
 		const at = x(s);
-		if (at - before[sign] < 6) continue;
-		before[sign] = at;
-		lanes[sign] += [`M${at - 3} 5h6m-3 -3v6`, `M${at - 3} 21h6`, `M${at} 9.5l3.5 3.5l-3.5 3.5l-3.5 -3.5z`][sign];
+		if (last[sign] && at - last[sign].at < 6) last[sign].ids += ' ' + id;
+		else all.push(last[sign] = { at, sign, ids: String(id) });
 	}
-	KINDS.forEach((kind, k) => $.marks.querySelector('.' + kind).setAttribute('d', lanes[k]));
+	$.marks.replaceChildren(...all.map(({ at, sign, ids }) =>
+		markOf([KINDS[sign], ids, [`M${at - 3} 5h6m-3 -3v6`, `M${at - 3} 21h6`, `M${at} 9.5l3.5 3.5l-3.5 3.5l-3.5 -3.5z`][sign]])));
 }
 const STEPS = [.001, .002, .005, .01, .02, .05, .1, .2, .5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200, 86400];
 function drawTicks(x, wide) {

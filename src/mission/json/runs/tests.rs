@@ -7,7 +7,7 @@ use crate::base::time::{Period, Span, Stamp};
 use crate::evidence::Evidence;
 use crate::graph::graphs_for_tests::graph;
 use crate::graph::{Edge, Elements, Graph, Node, Topic};
-use crate::mission::{Activity, Json, JsonForm, Ledger, Mission, Window, read_json};
+use crate::mission::{Json, JsonForm, Ledger, Mission, Sending, Window, read_json};
 
 fn elements() -> Elements {
     let node = |name: &str| Node {
@@ -78,7 +78,7 @@ fn mission(graphs: Vec<(Graph, i64)>) -> Mission {
         windows: list,
         graphs: windows.into_iter().collect(),
         ledger: Ledger::default(),
-        activity: Activity::default(),
+        sending: Sending::default(),
         undrawn: Vec::new(),
         layout: None,
         notices: Notices::new(),

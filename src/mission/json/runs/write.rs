@@ -40,17 +40,17 @@ pub(crate) fn elements<M: SerializeMap>(mission: &Mission, map: &mut M) -> Resul
 
 /// An element, with its states and their windows.
 #[derive(Serialize)]
-pub(crate) struct WithColumns<'a, E> {
+struct WithColumns<'a, E> {
     #[serde(flatten)]
-    pub(crate) element: E,
+    element: E,
     #[serde(rename = "in")]
-    pub(crate) seen: In<'a>,
+    seen: In<'a>,
 }
 
 /// The windows in which an element exists, with its states in them.
-pub(crate) struct In<'a> {
-    pub(crate) what: Element,
-    pub(crate) graphs: &'a Graphs,
+struct In<'a> {
+    what: Element,
+    graphs: &'a Graphs,
 }
 
 impl Serialize for In<'_> {

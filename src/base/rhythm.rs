@@ -1,0 +1,86 @@
+//! Every threshold of time by which lives, silences, rates and hand-overs are found, each with its reason.
+//!
+//! Times are nanoseconds. What decides that something happened stands here; where a drawing needs room, and how long a
+//! window is, does not.
+
+/// A second.
+const SECOND: i64 = 1_000_000_000;
+
+// ---- A rhythm, and its end.
+
+/// The fewest messages, or signs, that show a rhythm: with fewer, one late message is half of what is known.
+pub(crate) const FEWEST: u64 = 5;
+/// The number of usual intervals of silence that break a rhythm; one or two messages are lost now and then.
+pub(crate) const BREAK: i64 = 5;
+/// The shortest silence that breaks a rhythm: a recorder that starts or stops writes its topics up to a second apart.
+pub(crate) const BREAK_NS: i64 = 2 * SECOND;
+/// The silence that breaks a rhythm with pauses, as a multiple of the longest of them.
+pub(crate) const UNUSUAL: i64 = 3;
+/// The most pauses of a regular sender: one that pauses more often, and for more than a fifth of the time, sends only
+/// when needed.
+pub(crate) const OFTEN: usize = 4;
+/// The number of intervals before a silence that show the usual one: enough to hold a pause, few enough to forget an
+/// earlier rate.
+pub(crate) const RECENT: usize = 20;
+
+/// The silence of a sender with this usual interval that is long: it ends the rhythm.
+pub(crate) fn broken_after(usual: i64) -> i64 {
+    usual.saturating_mul(BREAK).max(BREAK_NS)
+}
+
+// ---- The recorder.
+
+/// The time in which a recorder has found the topics that exist when it starts; their messages come a period later at
+/// the latest. It looks once a second, and connects within another.
+pub(crate) const FOUND_NS: i64 = 2 * SECOND;
+/// The longest time from a node's start to the first of its messages in the bag: a recorder looks for new topics once a
+/// second, and a node needs as long to come up. Measured on real missions: 0.8 to 1.3 s, at most 2.4 s.
+pub(crate) const DISCOVERY_NS: i64 = 2 * SECOND + SECOND / 2;
+/// The time after its first sign in which a node has registered its topics.
+pub(crate) const REGISTRATION_NS: i64 = SECOND;
+/// The longest time from a node's start to its first message on a topic that counts as advertised at the start.
+pub(crate) const ADVERTISED_NS: i64 = 5 * SECOND;
+/// The longest time for which a node that was asked to end may still send.
+pub(crate) const SHUTDOWN_NS: i64 = SECOND / 2;
+/// The last part of a mission: what ends in it ended because the robot was switched off, node by node.
+pub(crate) const CLOSING_NS: i64 = 5 * SECOND;
+
+// ---- Gaps, and steps of a rate.
+
+/// The fewest intervals that show a rate.
+pub(crate) const FEWEST_INTERVALS: usize = 5;
+/// The length of a gap as a multiple of the usual interval on both of its sides; one or two lost messages are no gap.
+pub(crate) const GAP: i64 = 5;
+/// The shortest gap: shorter pauses are the scheduler's.
+pub(crate) const GAP_NS: i64 = SECOND;
+/// The ratio of medians below which rates are the same: the least that `--rate-change` can usefully show.
+pub(crate) const SAME_RATE: f64 = 1.1;
+/// The largest ratio of the quartiles of even intervals.
+pub(crate) const EVEN: f64 = 1.8;
+/// The fewest messages of a rate that is an event: five intervals.
+pub(crate) const FEWEST_OF_RATE: u64 = 6;
+/// The shortest time for which a rate holds that is an event.
+pub(crate) const RATE_HOLDS_NS: i64 = 3 * SECOND;
+/// The longest pause of a sender while it takes another rate.
+pub(crate) const RATE_PAUSE_NS: i64 = 5 * SECOND;
+
+// ---- Hand-overs.
+
+/// The fewest messages of a sender: one that sends less takes nothing over.
+pub(crate) const FEWEST_OF_SENDER: u64 = 3;
+/// The longest time for which a new sender begins before the old one stops.
+pub(crate) const OVERLAP_NS: i64 = 5 * SECOND;
+/// The longest time for which it begins after; any time later if the old one never sends again.
+pub(crate) const TAKEN_NS: i64 = 60 * SECOND;
+/// The shortest time before the old one comes back.
+pub(crate) const BACK_NS: i64 = 5 * SECOND;
+/// The shortest time for which a larger share of a topic's messages holds.
+pub(crate) const SHARE_HOLDS_NS: i64 = 5 * SECOND;
+
+// ---- What belongs together.
+
+/// The longest time between the start or end of a node and that of an edge, or the silence of a topic, that it causes.
+pub(crate) const TOGETHER_NS: i64 = 5 * SECOND;
+/// The longest time between headlines of one reconfiguration: a launch file starts its nodes one after the other, each
+/// within this time.
+pub(crate) const CLOSE_NS: i64 = 2 * SECOND;

@@ -1,0 +1,87 @@
+//! The events of the log in a step: what began, what ended, what changed hands.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::StepSource;
+use crate::base::time::Span;
+use crate::draw::figure::marks::Sign;
+use crate::graph::Element;
+use crate::mission::EntryId;
+use crate::mission::ledger::Detail;
+
+impl StepSource<'_> {
+    /// The weight of a boundary, larger for one that changes more.
+    pub(super) fn weight(&self, k: usize) -> usize {
+        let turns = [Sign::Start, Sign::End].map(|sign| self.turned(k, sign).len());
+        (turns[0] + turns[1]) * 4 + self.handed(k).len()
+    }
+
+    /// The time of the step into phase `k`: from the middle of the phase before to its own.
+    fn time(&self, k: usize) -> Span {
+        let middle = |k: usize| {
+            let span = self.sheet.source.phases[k].span;
+            span.start.plus(span.nanos() / 2)
+        };
+        Span {
+            start: middle(k - 1),
+            end: middle(k),
+        }
+    }
+
+    /// The nodes of which phase `k` has more, or fewer, than the one before, with the events by which they began or ended.
+    pub(super) fn turned(&self, k: usize, sign: Sign) -> BTreeMap<usize, Vec<EntryId>> {
+        let (before, after) = (&self.found[k - 1].names, &self.found[k].names);
+        let (old, new) = match sign {
+            Sign::Start => (before, after),
+            Sign::End | Sign::Dot => (after, before),
+        };
+        let around = Span {
+            start: self.sheet.source.phases[k - 1].span.start,
+            end: self.sheet.source.phases[k].span.end,
+        };
+        let events = |track: usize| -> Vec<EntryId> {
+            let own = self.marks.signs.iter().filter(|s| s.track == track);
+            let own = own.filter(|s| s.sign == sign && around.contains(s.at));
+            own.map(|s| s.entry).collect()
+        };
+        let tracks = new.difference(old).filter_map(|name| self.track(name));
+        let tracks = tracks.map(|track| (track, events(track)));
+        tracks.filter(|(_, events)| !events.is_empty()).collect()
+    }
+
+    /// The hand-overs of the log in the step into phase `k`: topic, before, after.
+    pub(super) fn handed(&self, k: usize) -> Vec<(u32, Arc<str>, Arc<str>, EntryId)> {
+        let source = self.sheet.source;
+        let role = |nodes: &[u32]| {
+            let node = source
+                .mission
+                .elements
+                .nodes
+                .get(*nodes.first()? as usize)?;
+            Some(Arc::clone(&node.role))
+        };
+        let headlines = source.mission.ledger.headlines(self.time(k));
+        let handed = headlines.filter_map(|(id, event)| match (&event.detail, event.what) {
+            (Detail::Senders { from, to }, Element::Topic(topic)) => {
+                let shown = source.shows(topic) && !source.is_hub(topic);
+                let (from, to) = (role(from)?, role(to)?);
+                shown.then_some((topic, from, to, id))
+            }
+            _ => None,
+        });
+        handed.collect()
+    }
+
+    /// The events in the step into phase `k` on the rows of a box.
+    pub(super) fn events(&self, k: usize, members: &[usize]) -> BTreeSet<EntryId> {
+        let time = self.time(k);
+        let letters = self.marks.letters.iter().map(|l| &l.mark);
+        let marks = self.marks.signs.iter().chain(letters);
+        let own = marks.filter(|m| members.contains(&m.track) && time.contains(m.at));
+        let hands = self.marks.handovers.iter().filter(|h| {
+            time.contains(h.at) && (members.contains(&h.from) || members.contains(&h.to))
+        });
+        own.map(|m| m.entry).chain(hands.map(|h| h.entry)).collect()
+    }
+}

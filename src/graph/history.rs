@@ -1,0 +1,347 @@
+//! A mission in continuous time: the lives of each element with their uncertainty, and the messages of every sender as
+//! stretches of one rate.
+//!
+//! Made once, from claims and stamps; windows, events, phases and figures are readings of it. Nothing here depends on
+//! windows.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+use std::sync::Arc;
+
+use super::{EdgeId, Element, Elements, Graphs, NodeId, State, TopicId};
+use crate::base::rhythm::{FEWEST, OFTEN, SAME_RATE, broken_after};
+use crate::base::time::{Span, Stamp};
+
+/// A moment with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bound {
+    /// The time of the sign that shows it.
+    pub time: Stamp,
+    /// The earliest possible time.
+    pub earliest: Stamp,
+    /// The latest possible time.
+    pub latest: Stamp,
+}
+
+/// One life of an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Life {
+    /// The interval in which it exists, half-open.
+    pub span: Span,
+    /// The beginning; `None` if it may have existed before the mission began.
+    pub began: Option<Bound>,
+    /// The end; `None` if no end is known.
+    pub ended: Option<Bound>,
+}
+
+/// A run of messages of one sender at one rate, without a gap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stretch {
+    /// The time of the first message.
+    pub first: Stamp,
+    /// The time of the last message.
+    pub last: Stamp,
+    /// The number of messages, ≥ 1.
+    pub count: u64,
+    /// The median time between messages in nanoseconds; 0 with fewer than two.
+    pub period: i64,
+    /// Whether the messages come at even intervals.
+    pub is_even: bool,
+    /// Whether the stretch before it ends where this one begins: a change of rate, not a gap.
+    pub is_joined: bool,
+}
+
+impl Stretch {
+    /// Messages per second; 0 with fewer than two.
+    pub fn hz(&self) -> f64 {
+        let nanos = self.last.since(self.first);
+        if nanos <= 0 {
+            return 0.0;
+        }
+        let mean = nanos as f64 / (self.count - 1).max(1) as f64;
+        let median = self.period as f64;
+        // A few lost messages do not make a rate slower; messages in pairs have no middle.
+        let period = if self.is_even { median } else { mean };
+        1e9 / period.max(1.0)
+    }
+}
+
+/// All messages of one sender on one topic.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Sender {
+    /// The topic.
+    pub topic: TopicId,
+    /// The node that sent; `None` for all unknown senders together.
+    pub node: Option<NodeId>,
+    /// Whether its last message is latched.
+    pub is_latched: bool,
+    /// The stretches of even sending, in order, none overlapping.
+    pub stretches: Vec<Stretch>,
+}
+
+impl Sender {
+    /// The number of messages in an interval, in proportion where it cuts a stretch.
+    pub(crate) fn count_in(&self, span: Span) -> f64 {
+        let inside = |s: &Stretch| {
+            let all = s.last.since(s.first);
+            let shared = s.last.min(span.end.plus(-1)).since(s.first.max(span.start));
+            match (shared, all) {
+                (..0, _) => 0.0,
+                (_, 0) => s.count as f64,
+                _ => s.count as f64 * shared as f64 / all as f64,
+            }
+        };
+        self.stretches.iter().map(inside).sum()
+    }
+}
+
+/// The messages of a mission in continuous time.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Sending {
+    /// The messages of every sender, sorted by topic and node.
+    pub senders: Vec<Sender>,
+    /// The longest pauses per topic, by id, at most 32, in order: each from one message to the next. Empty where single
+    /// messages are not known.
+    pub pauses: Vec<Vec<Span>>,
+}
+
+impl Sending {
+    /// The senders of a topic.
+    pub(crate) fn of_topic(&self, topic: TopicId) -> &[Sender] {
+        let from = self.senders.partition_point(|s| s.topic < topic);
+        let to = self.senders.partition_point(|s| s.topic <= topic);
+        &self.senders[from..to]
+    }
+
+    /// The messages of a publication, if they are known apart from others'.
+    pub(crate) fn of_edge(&self, node: NodeId, topic: TopicId) -> Option<&Sender> {
+        let of = self.of_topic(topic);
+        let at = of.binary_search_by_key(&Some(node), |s| s.node).ok()?;
+        of.get(at)
+    }
+
+    /// The sending of a mission of which only the windows are known: in each window with messages a stretch of its rate.
+    pub(crate) fn of_windows(elements: &Elements, graphs: &Graphs) -> Self {
+        let mut published: BTreeMap<TopicId, Vec<(EdgeId, NodeId)>> = BTreeMap::new();
+        for (id, edge) in (0..).zip(&elements.publishes) {
+            published
+                .entry(edge.topic)
+                .or_default()
+                .push((id, edge.node));
+        }
+        let mut senders = Vec::new();
+        for (topic, _) in (0..).zip(&elements.topics) {
+            let mut rest = vec![0; graphs.len()];
+            for (at, row) in graphs.rows(Element::Topic(topic)) {
+                rest[at] = row.count.unwrap_or(0);
+            }
+            let mut own = Vec::new();
+            for (id, node) in published.get(&topic).into_iter().flatten() {
+                let mut counts = vec![0; graphs.len()];
+                let mut is_latched = false;
+                for (at, row) in graphs.rows(Element::Publish(*id)) {
+                    is_latched |= row.state == State::Latched;
+                    counts[at] = row.count.unwrap_or(0);
+                    rest[at] = rest[at].saturating_sub(counts[at]);
+                }
+                own.push((Some(*node), is_latched, counts));
+            }
+            let all = std::iter::once((None, false, rest)).chain(own);
+            senders.extend(all.filter_map(|(node, is_latched, counts)| {
+                let stretches = stretches_of_windows(&counts, graphs.spans());
+                (!stretches.is_empty()).then_some(Sender {
+                    topic,
+                    node,
+                    is_latched,
+                    stretches,
+                })
+            }));
+        }
+        Self {
+            senders,
+            pauses: Vec::new(),
+        }
+    }
+}
+
+/// The stretches of a sender by the number of its messages in each window: windows in a row with about the same rate
+/// are one.
+fn stretches_of_windows(counts: &[u64], spans: &[Span]) -> Vec<Stretch> {
+    let mut all: Vec<Stretch> = Vec::new();
+    let mut before = 0;
+    for (at, (count, span)) in counts.iter().zip(spans).enumerate() {
+        let next = spans.get(at + 1).map_or(span.end, |next| next.start);
+        let last = span.end.min(next).max(span.start.plus(1)).plus(-1);
+        let period = span.nanos() / i64::try_from(*count).unwrap_or(i64::MAX).max(1);
+        let ratio = |s: &Stretch| s.period.max(1) as f64 / period.max(1) as f64;
+        let is_same = |s: &Stretch| (1.0 / SAME_RATE..=SAME_RATE).contains(&ratio(s));
+        match all.last_mut() {
+            _ if *count == 0 => {}
+            Some(stretch) if before > 0 && is_same(stretch) => {
+                stretch.count = stretch.count.saturating_add(*count);
+                stretch.last = last;
+            }
+            _ => all.push(Stretch {
+                first: span.start,
+                last,
+                count: *count,
+                period,
+                is_even: true,
+                is_joined: before > 0,
+            }),
+        }
+        before = *count;
+    }
+    all
+}
+
+/// A transition of a node to a lifecycle state.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Transition {
+    pub(crate) node: NodeId,
+    pub(crate) time: Stamp,
+    /// The new state.
+    pub(crate) state: Arc<str>,
+}
+
+/// The silences of a sender with a rhythm while it lived (`lives`, half-open): from the last message to the next, or
+/// `None` for no other. A sender of bursts is never silent.
+pub(crate) fn silences(stretches: &[Stretch], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+    let mut found = Vec::new();
+    for life in lives {
+        let inside = |s: &&Stretch| life.start <= s.first && s.first < life.end;
+        let own: Vec<&Stretch> = stretches.iter().filter(inside).collect();
+        for (at, stretch) in own.iter().enumerate() {
+            let next = own.get(at + 1).map(|next| next.first);
+            let silence = next.unwrap_or(life.end).since(stretch.last);
+            let long = silence > broken_after(stretch.period);
+            if stretch.is_even && stretch.count >= FEWEST && long {
+                found.push((stretch.last, next));
+            }
+        }
+    }
+    let sending: i64 = stretches.iter().map(|s| s.last.since(s.first)).sum();
+    let quiet: i64 = found
+        .iter()
+        .filter_map(|(from, to)| Some((*to)?.since(*from)))
+        .sum();
+    if found.len() > OFTEN && quiet > sending / 4 {
+        found.clear();
+    }
+    found
+}
+
+/// The times at which all of several senders are silent, of which at least one has a rhythm that broke.
+pub(crate) fn all_silent(senders: &[&[Stretch]], lives: &[Span]) -> Vec<(Stamp, Option<Stamp>)> {
+    let mut found: Vec<(Stamp, Option<Stamp>)> = Vec::new();
+    for sender in senders {
+        found.extend(silences(sender, lives));
+    }
+    found.sort_unstable();
+    let mut all: Vec<(Stamp, Option<Stamp>)> = Vec::new();
+    for (from, to) in found {
+        // From the last message of any of them to the first of any.
+        let sends = |s: &&Stretch| s.last > from && to.is_none_or(|to| s.first < to);
+        let others = || senders.iter().flat_map(|s| s.iter()).filter(sends);
+        if others().next().is_none()
+            && all
+                .last()
+                .is_none_or(|last| last.1.is_some_and(|end| end <= from))
+        {
+            all.push((from, to));
+        }
+    }
+    all
+}
+
+/// The most pauses that are kept of each topic: any part of the mission contains one of them, or none that is longer
+/// than those within windows.
+const PAUSES: usize = 32;
+
+/// The longest pauses of one sequence of messages, collected message by message.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LongestPauses {
+    last: Option<Stamp>,
+    /// The longest so far, by length; the shortest is replaced first.
+    longest: BinaryHeap<Reverse<(i64, Stamp)>>,
+}
+
+impl LongestPauses {
+    /// Adds the next message.
+    pub(crate) fn add(&mut self, time: Stamp) {
+        let Some(last) = self.last.replace(time) else {
+            return;
+        };
+        let pause = time.since(last);
+        if self.longest.len() < PAUSES {
+            self.longest.push(Reverse((pause, last)));
+        } else if let Some(mut shortest) = self.longest.peek_mut()
+            && shortest.0.0 < pause
+        {
+            *shortest = Reverse((pause, last));
+        }
+    }
+
+    /// All pauses in order.
+    pub(crate) fn spans(self) -> Vec<Span> {
+        let longest = self.longest.into_iter();
+        let span = |Reverse((pause, start)): Reverse<(i64, Stamp)>| Span {
+            start,
+            end: start.plus(pause),
+        };
+        let mut all: Vec<Span> = longest.map(span).collect();
+        all.sort_unstable_by_key(|span| span.start);
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_pauses_are_kept_in_order() {
+        let mut pauses = LongestPauses::default();
+        let mut at = 0;
+        // 1 to 40 ns, the long ones early.
+        for pause in (1..=40).rev() {
+            pauses.add(Stamp(at));
+            at += pause;
+        }
+        pauses.add(Stamp(at));
+        let spans = pauses.spans();
+        let lengths: Vec<i64> = spans.iter().map(Span::nanos).collect();
+        assert_eq!(lengths, (9..=40).rev().collect::<Vec<_>>());
+        assert_eq!((spans[1].start, spans[1].end), (Stamp(40), Stamp(79)));
+    }
+
+    #[test]
+    fn messages_are_counted_in_proportion() {
+        let stretch = |first: i64, last: i64, count| Stretch {
+            first: Stamp(first),
+            last: Stamp(last),
+            count,
+            period: 1,
+            is_even: true,
+            is_joined: false,
+        };
+        let sender = Sender {
+            topic: 0,
+            node: None,
+            is_latched: false,
+            stretches: vec![stretch(0, 100, 50), stretch(200, 200, 3)],
+        };
+        let count = |start: i64, end: i64| {
+            let span = Span {
+                start: Stamp(start),
+                end: Stamp(end),
+            };
+            libm::round(sender.count_in(span))
+        };
+        assert!((count(0, 51) - 25.0).abs() < 0.1);
+        assert!((count(150, 201) - 3.0).abs() < 0.1);
+        assert!(count(110, 190).abs() < 0.1);
+    }
+}
