@@ -307,7 +307,7 @@ fn a_killed_run_leaves_whole_files_and_the_next_one_finishes_it() {
             .filter(|f| !f.file_name().unwrap().to_string_lossy().starts_with('.'))
     };
     for file in visible("counts").chain(visible("bags")) {
-        assert_eq!(parquet_rows(&file).len(), 1, "{file:?}");
+        assert!(!parquet_rows(&file).is_empty(), "{file:?}");
     }
     ends(dir.path(), &args, 0);
     assert_eq!(texts(&table, "bags", "uri").len(), 300);
