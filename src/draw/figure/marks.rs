@@ -134,7 +134,7 @@ impl Marks {
                         let back = event.until.unwrap_or(event.time);
                         marks.signs.push(mark(track, event.time, Sign::End));
                         marks.signs.push(mark(track, back, Sign::Start));
-                        circles.push(mark(track, back, Sign::Dot));
+                        circles.push(mark(track, event.time, Sign::Dot));
                     }
                     _ => circles.push(mark(track, event.time, Sign::Dot)),
                 }
