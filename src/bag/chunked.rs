@@ -349,11 +349,9 @@ impl<G: Grammar> Indexed<G> {
     }
 }
 
-/// The places of the heads of these chunks and of their indexes, of those that are read whole.
+/// The places of the indexes of these chunks, of those that are read whole.
 fn indexes(chunks: &[&Chunk]) -> Vec<Range<u64>> {
-    let head = |chunk: &&Chunk| chunk.start..chunk.start + GLANCE as u64;
-    let index = |chunk: &&Chunk| chunk.index.clone();
-    let ranges = chunks.iter().flat_map(|chunk| [head(chunk), index(chunk)]);
+    let ranges = chunks.iter().map(|chunk| chunk.index.clone());
     let is_held = |r: &Range<u64>| r.end - r.start <= LONGEST_INDEX;
     ranges.filter(is_held).collect()
 }
