@@ -175,6 +175,44 @@ fn nothing_of_the_users_is_overwritten() {
 }
 
 #[test]
+fn tables_in_a_folder_replace_no_bag_that_is_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let first = bagreel(dir.path(), &["tables", COURIER, "-o", "fleet"]);
+    assert_eq!(first.status.code(), Some(0), "{}", errors(&first));
+    let counts = format!("fleet/counts/{}", names(&path("fleet/counts"))[0]);
+    let by_fields = ["extract", "--fields", "--format", "csv", COURIER, "-o", "f"];
+    let first = bagreel(dir.path(), &by_fields);
+    assert!(
+        matches!(first.status.code(), Some(0 | 3)),
+        "{}",
+        errors(&first)
+    );
+    let table = format!("f/{}", names(&path("f"))[0]);
+    for name in [&counts, &table] {
+        fs::copy(COURIER, path(name)).unwrap();
+    }
+    let refused: &[&[&str]] = &[
+        &["tables", COURIER, &counts, "-o", "fleet"],
+        &["tables", COURIER, &counts, "-o", "new/../fleet"],
+        &[
+            "extract", "--fields", "--format", "csv", COURIER, &table, "-o", "f",
+        ],
+        &["extract", COURIER, &table, "-o", &table],
+    ];
+    for args in refused {
+        let output = bagreel(dir.path(), args);
+        let said = errors(&output);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.contains("overwrite"), "{args:?}: {said}");
+    }
+    let bag = fs::read(COURIER).unwrap();
+    assert_eq!(fs::read(path(&counts)).unwrap(), bag);
+    assert_eq!(fs::read(path(&table)).unwrap(), bag);
+    assert_eq!(names(dir.path()), ["f", "fleet"]);
+}
+
+#[test]
 fn tables_without_an_ending_are_called_csv() {
     let dir = tempfile::tempdir().unwrap();
     let output = bagreel(
