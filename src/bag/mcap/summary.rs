@@ -72,6 +72,9 @@ fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
     })
 }
 
+/// The number of bytes of the record that ends the data.
+const DATA_END_RECORD: usize = 9 + 4;
+
 /// The CRC-32 that the record before the summary, or the footer, states of all data before it, 0 for none; `None` if that
 /// is not there.
 pub(super) fn data_crc(source: &FileSource) -> io::Result<Option<u32>> {
@@ -79,8 +82,8 @@ pub(super) fn data_crc(source: &FileSource) -> io::Result<Option<u32>> {
         Ok((start, _)) => start,
         Err(_) => source.len().saturating_sub(END as u64),
     };
-    let mut bytes = [0; (HEAD + DATA_END) as usize];
-    let at = end.saturating_sub(HEAD + DATA_END);
+    let mut bytes = [0; DATA_END_RECORD];
+    let at = end.saturating_sub(DATA_END_RECORD as u64);
     let got = source.read_at(at, &mut bytes)?;
     let mut cursor = FieldCursor(&bytes[..got]);
     let is_end = (cursor.u8(), cursor.u64()) == (Some(op::DATA_END), Some(DATA_END));
