@@ -4,6 +4,7 @@
 //! one file below `bag/` and one row in `FORMATS`.
 
 mod adapters;
+mod checksum;
 mod chunked;
 pub(crate) mod decompress;
 mod deferred;

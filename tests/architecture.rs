@@ -23,7 +23,8 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["csv"],
     ]),
     ("bag", &[
-        &["decompress", "model", "source", "unknown"],
+        &["checksum", "decompress", "model", "unknown"],
+        &["source"],
         &["adapters", "input"],
         &["remote"],
         &["object"],

@@ -175,6 +175,44 @@ fn nothing_of_the_users_is_overwritten() {
 }
 
 #[test]
+fn tables_in_a_folder_replace_no_bag_that_is_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let first = bagreel(dir.path(), &["tables", COURIER, "-o", "fleet"]);
+    assert_eq!(first.status.code(), Some(0), "{}", errors(&first));
+    let counts = format!("fleet/counts/{}", names(&path("fleet/counts"))[0]);
+    let by_fields = ["extract", "--fields", "--format", "csv", COURIER, "-o", "f"];
+    let first = bagreel(dir.path(), &by_fields);
+    assert!(
+        matches!(first.status.code(), Some(0 | 3)),
+        "{}",
+        errors(&first)
+    );
+    let table = format!("f/{}", names(&path("f"))[0]);
+    for name in [&counts, &table] {
+        fs::copy(COURIER, path(name)).unwrap();
+    }
+    let refused: &[&[&str]] = &[
+        &["tables", COURIER, &counts, "-o", "fleet"],
+        &["tables", COURIER, &counts, "-o", "new/../fleet"],
+        &[
+            "extract", "--fields", "--format", "csv", COURIER, &table, "-o", "f",
+        ],
+        &["extract", COURIER, &table, "-o", &table],
+    ];
+    for args in refused {
+        let output = bagreel(dir.path(), args);
+        let said = errors(&output);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.contains("overwrite"), "{args:?}: {said}");
+    }
+    let bag = fs::read(COURIER).unwrap();
+    assert_eq!(fs::read(path(&counts)).unwrap(), bag);
+    assert_eq!(fs::read(path(&table)).unwrap(), bag);
+    assert_eq!(names(dir.path()), ["f", "fleet"]);
+}
+
+#[test]
 fn tables_without_an_ending_are_called_csv() {
     let dir = tempfile::tempdir().unwrap();
     let output = bagreel(
@@ -243,6 +281,62 @@ fn files_that_never_end_are_refused() {
 /// A crafted input of this name.
 fn crafted(name: &str) -> String {
     format!("{}/tests/data/hostile/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The exit code of `info`, and the messages that it counts, if it does.
+fn counted(path: &str) -> (Option<i32>, Option<u64>) {
+    let output = bagreel(Path::new("."), &["info", "--format", "json", path]);
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    (output.status.code(), said["messages"].as_u64())
+}
+
+#[test]
+fn damaged_recordings_come_to_an_end_and_lose_nothing_without_a_word() {
+    // The messages that each had before it was damaged; `None` where it never had any, or none is left.
+    for (name, all) in [
+        ("n0_hang.bag", None),
+        ("n0_slow.bag", None),
+        ("n2_front_op.bag", Some(40)),
+        ("n3_alloc_3g.mcap", None),
+        ("n6_mcap_op04.mcap", Some(30)),
+        ("n13_half_index.mcap", Some(98)),
+    ] {
+        let (code, found) = counted(&crafted(name));
+        let fine: &[_] = if all.is_none() {
+            &[Some(0), Some(1), Some(3)]
+        } else if found == all {
+            &[Some(0), Some(3)]
+        } else {
+            &[Some(3)]
+        };
+        assert!(
+            fine.contains(&code),
+            "{name}: {found:?} of {all:?}, exit {code:?}"
+        );
+    }
+}
+
+#[test]
+fn a_recording_cut_behind_the_head_of_a_chunk_comes_to_an_end() {
+    let whole = fs::read(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/examples/warehouse.bag"
+    ))
+    .unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("cut.bag");
+    let head = whole.windows(4).position(|w| w == b"op=\x05").unwrap();
+    let sizes = whole[head..]
+        .windows(5)
+        .position(|w| w == b"size=")
+        .unwrap()
+        + head
+        + 9;
+    for more in 0..5 {
+        fs::write(&path, &whole[..sizes + more]).unwrap();
+        let (code, _) = counted(&path.to_string_lossy());
+        assert!(matches!(code, Some(1 | 3)), "{more}: {code:?}");
+    }
 }
 
 #[test]

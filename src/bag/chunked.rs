@@ -33,7 +33,6 @@ pub(crate) use index::{ChunkBody, Index, IndexSum, LONGEST_INDEX, hand_over_slic
 use plan::MOST_LOOKED_INTO;
 pub(crate) use plan::{Chunk, ChunkPlan, Fault, MOST_CHUNKS, Unindexed, Used};
 pub(crate) use record::{ChunkHead, Connections, NoRecord, RecordHead, pass, walk};
-pub(crate) use unpack::CrcReader;
 
 /// The parser for one format of chunked bags. A value keeps what one description says about later ones.
 pub(crate) trait Grammar: Default + Send + 'static {
@@ -78,6 +77,11 @@ pub(crate) trait Grammar: Default + Send + 'static {
 
     /// Reads the tail.
     fn plan(source: &FileSource) -> std::io::Result<Result<ChunkPlan, Unindexed>>;
+
+    /// Whether the end of the data may state a checksum of all of it; `None` is a pipe, whose end is not known yet.
+    fn is_summed(_source: Option<&FileSource>) -> bool {
+        false
+    }
 
     /// Stored facts worth showing, from the first bytes.
     fn facts(head: &[u8]) -> Vec<(String, String)>;
@@ -331,6 +335,11 @@ impl<G: Grammar> Indexed<G> {
 
     fn forward(&self, sink: &mut dyn Sink) -> forward::ForwardScan {
         let mut stream = ByteStream::of_file(&self.source, 0, self.source.len(), FAR);
+        // To read what would be passed over is worth it only where nothing is known to be wrong yet.
+        let is_sound = matches!(&self.plan, Err(reason) if reason.fault == Fault::Missing);
+        if is_sound && G::is_summed(Some(&self.source)) {
+            stream.sum_up();
+        }
         G::begin(&mut stream);
         forward::read::<G>(&mut stream, self.source.len(), sink)
     }
@@ -340,11 +349,9 @@ impl<G: Grammar> Indexed<G> {
     }
 }
 
-/// The places of the heads of these chunks and of their indexes, of those that are read whole.
+/// The places of the indexes of these chunks, of those that are read whole.
 fn indexes(chunks: &[&Chunk]) -> Vec<Range<u64>> {
-    let head = |chunk: &&Chunk| chunk.start..chunk.start + GLANCE as u64;
-    let index = |chunk: &&Chunk| chunk.index.clone();
-    let ranges = chunks.iter().flat_map(|chunk| [head(chunk), index(chunk)]);
+    let ranges = chunks.iter().map(|chunk| chunk.index.clone());
     let is_held = |r: &Range<u64>| r.end - r.start <= LONGEST_INDEX;
     ranges.filter(is_held).collect()
 }
@@ -370,6 +377,9 @@ impl<G: Grammar> Reader for Piped<G> {
     }
 
     fn read(&mut self, range: Option<Span>, sink: &mut dyn Sink) -> Result<Report> {
+        if G::is_summed(None) {
+            self.stream.sum_up();
+        }
         G::begin(&mut self.stream);
         let found = forward::read::<G>(&mut self.stream, 0, &mut Clip::new(range, sink));
         Ok(Report {

@@ -117,6 +117,10 @@ impl Grammar for Mcap {
         summary::read(source)
     }
 
+    fn is_summed(source: Option<&FileSource>) -> bool {
+        source.is_none_or(|source| !matches!(summary::data_crc(source), Ok(Some(0))))
+    }
+
     /// The facts in the file's header.
     fn facts(head: &[u8]) -> Vec<(String, String)> {
         let mut cursor = FieldCursor(head.get(MAGIC.len()..).unwrap_or_default());

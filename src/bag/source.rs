@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::bag::checksum::Checksum;
 use crate::base::error::{Error, Result};
 use crate::base::leftovers::Leftover;
 
@@ -180,6 +181,9 @@ pub(crate) struct ByteStream<'a> {
     filled: usize,
     /// The number of bytes read at a time.
     step: usize,
+    /// The CRC-32 of all bytes taken but for those of `buffer[summed..used]`, if it is asked for.
+    sum: Option<Checksum>,
+    summed: usize,
 }
 
 /// The step for reading through.
@@ -209,6 +213,28 @@ impl<'a> ByteStream<'a> {
             used: 0,
             filled: 0,
             step,
+            sum: None,
+            summed: 0,
+        }
+    }
+
+    /// Sums up all bytes that are taken from here on, so that what is passed over in a file is read too.
+    pub(crate) fn sum_up(&mut self) {
+        self.sum = Some(Checksum::default());
+        self.summed = self.used;
+    }
+
+    /// The CRC-32 of all bytes taken since [`ByteStream::sum_up`]; `None` without that.
+    pub(crate) fn sum(&mut self) -> Option<u32> {
+        self.settle_sum();
+        self.sum.as_ref().map(Checksum::crc)
+    }
+
+    /// Adds the bytes taken since the last time, many at once.
+    fn settle_sum(&mut self) {
+        if let Some(sum) = &mut self.sum {
+            sum.add(&self.buffer[self.summed..self.used]);
+            self.summed = self.used;
         }
     }
 
@@ -244,6 +270,8 @@ impl<'a> ByteStream<'a> {
 
     /// Reads on until `n` bytes are ahead or the stream ends.
     fn fill(&mut self, n: usize) -> io::Result<()> {
+        self.settle_sum();
+        self.summed = 0;
         self.buffer.copy_within(self.used..self.filled, 0);
         self.filled = self.ahead();
         self.used = 0;
@@ -294,7 +322,9 @@ impl<'a> ByteStream<'a> {
             if left == 0 {
                 return Ok(n);
             }
-            if let From::File { end, .. } = self.from {
+            if let From::File { end, .. } = self.from
+                && self.sum.is_none()
+            {
                 let step = left.min(end.saturating_sub(self.at));
                 self.at += step;
                 return Ok(n - left + step);
@@ -350,8 +380,12 @@ mod tests {
         let streams = [
             ByteStream::of_file(&source, 0, u64::MAX, 16),
             ByteStream::of_reader(io::Cursor::new(bytes.clone())),
+            ByteStream::of_file(&source, 0, u64::MAX, 16),
         ];
-        for mut stream in streams {
+        for (at, mut stream) in streams.into_iter().enumerate() {
+            if at > 0 {
+                stream.sum_up();
+            }
             assert_eq!(stream.peek(4).unwrap(), &bytes[..4]);
             stream.advance(3);
             assert_eq!(stream.skip(5000).unwrap(), 5000);
@@ -359,6 +393,12 @@ mod tests {
             assert_eq!(stream.peek(300).unwrap(), &bytes[5003..5303]);
             assert_eq!(stream.skip(u64::MAX).unwrap(), 4997);
             assert!(stream.peek(1).unwrap().is_empty());
+            let sum = (at > 0).then(|| {
+                let mut sum = Checksum::default();
+                sum.add(&bytes);
+                sum.crc()
+            });
+            assert_eq!(stream.sum(), sum);
         }
     }
 }

@@ -6,7 +6,6 @@ use crate::base::notice::Notices;
 use crate::base::words::visible;
 use crate::cli::args::ExtractArgs;
 use crate::cli::terminal::Terminal;
-use crate::export::check;
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
 use crate::pipeline::{self, Extract};
@@ -50,17 +49,6 @@ fn job(args: &ExtractArgs, inputs: Vec<Input>) -> Result<Extract, Error> {
             "the fields of all topics are several tables, standard output is one",
             "name a folder: `-o tables/`",
         ));
-    }
-    let paths: Vec<_> = inputs
-        .iter()
-        .filter_map(|input| match input {
-            Input::Path(path) => Some(path.clone()),
-            Input::Url(_) | Input::Stdin => None,
-        })
-        .collect();
-    if !args.fields {
-        check::check(std::slice::from_ref(&target), &paths)?;
-        check::make_folder(&target)?;
     }
     Ok(Extract {
         inputs,

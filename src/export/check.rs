@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::FORMATS;
 use super::sink::probe;
-use super::target::{NUMBER, Target, folder_of, is_special};
+use super::target::{NUMBER, Target, folder_of, is_special, same_file};
 use crate::base::error::{Error, Result};
 
 /// Checks every file to be written before the inputs are read: no two the same, none that the user keeps, every folder
@@ -40,6 +40,26 @@ pub(crate) fn check(targets: &[Target], kept: &[PathBuf]) -> Result<()> {
         check_place(target)?;
     }
     Ok(())
+}
+
+/// Checks a folder whose tables are named after what is read, with this ending, before anything is made in it: no input
+/// in it is named like a table.
+///
+/// # Errors
+/// [`Error::Usage`] where a table might replace an input.
+pub(crate) fn check_folder(folder: &Path, ending: &str, kept: &[PathBuf]) -> Result<()> {
+    let is_like_a_table = |path: &Path| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case(ending))
+            && same_file(folder_of(path), folder)
+    };
+    let clash = kept.iter().find(|path| {
+        is_like_a_table(path) || path.canonicalize().is_ok_and(|path| is_like_a_table(&path))
+    });
+    let Some(path) = clash else { return Ok(()) };
+    let (folder, path) = (folder.display(), path.display());
+    let what = format!("a table in `{folder}` might overwrite `{path}`, which is read");
+    Err(Error::usage(what, "name another folder"))
 }
 
 /// The endings of a database and of the files that `SQLite` puts beside it, which are part of it.

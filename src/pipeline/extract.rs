@@ -4,6 +4,7 @@ mod fields;
 mod messages;
 
 use super::collect::known_span;
+use super::read::files;
 use super::{Stage, Watch};
 use crate::bag::{
     self, Connection, ConnectionId, Input, Message, OpenOptions, Reader, Report, Sink, Want,
@@ -11,6 +12,7 @@ use crate::bag::{
 use crate::base::error::{Error, Result};
 use crate::base::notice::{Notice, Notices};
 use crate::base::time::{Moment, Span, Stamp};
+use crate::export::check::{check, check_folder, make_folder};
 use crate::export::tables::TableFormat;
 use crate::export::target::Target;
 use crate::graph::window::{self, Division};
@@ -55,10 +57,15 @@ pub struct Extracted {
 /// # Errors
 /// Where an input cannot be read at all, an output cannot be written, or times make no sense.
 pub fn extract(job: &Extract, watch: &mut dyn Watch) -> Result<Extracted> {
-    watch.stage(Stage::Read);
+    let kept = files(&job.inputs);
     if job.fields {
+        check_folder(job.target.path(), job.format.word(), &kept)?;
+        watch.stage(Stage::Read);
         fields::extract(job, watch)
     } else {
+        check(std::slice::from_ref(&job.target), &kept)?;
+        make_folder(&job.target)?;
+        watch.stage(Stage::Read);
         messages::extract(job, watch)
     }
 }

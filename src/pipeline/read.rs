@@ -85,17 +85,11 @@ impl Reading {
 
     /// The files and folders of the user's that it reads: never overwritten.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
-        let inputs = self.inputs.iter().filter_map(|input| match input {
-            Input::Path(path) => Some(path),
-            Input::Url(_) | Input::Stdin => None,
-        });
         let source = self.code.iter().map(|code| &code.folder);
         let topology = self.conclude.topology.files.iter();
-        let all = inputs
-            .chain(source)
-            .chain(topology)
-            .chain(self.phases.file());
-        all.filter(|path| path.exists()).cloned().collect()
+        let named = source.chain(topology).chain(self.phases.file());
+        let there = named.filter(|path| path.exists()).cloned();
+        files(&self.inputs).into_iter().chain(there).collect()
     }
 
     /// The same reading with phases from another source.
@@ -105,6 +99,15 @@ impl Reading {
         self.phases = phases;
         self
     }
+}
+
+/// The files and folders among inputs that are there.
+pub(super) fn files(inputs: &[Input]) -> Vec<PathBuf> {
+    let paths = inputs.iter().filter_map(|input| match input {
+        Input::Path(path) => Some(path),
+        Input::Url(_) | Input::Stdin => None,
+    });
+    paths.filter(|path| path.exists()).cloned().collect()
 }
 
 /// Reads the inputs into a mission.

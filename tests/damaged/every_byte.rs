@@ -152,6 +152,32 @@ fn a_bag_cut_behind_any_byte_has_the_messages_before_it() {
     }
 }
 
+#[test]
+fn a_bit_of_any_byte_that_only_the_checksum_of_the_data_knows_is_said() {
+    let (name, bytes) = tiny().pop().unwrap();
+    assert_eq!(name, "front_unchunked.mcap");
+    // Behind the first eight bytes, and before the end of the data, the end of the file and the closing bytes.
+    let (start, end) = (8, bytes.len() - 13 - 29 - 8);
+    assert_eq!(bytes[end..end + 9], [15, 4, 0, 0, 0, 0, 0, 0, 0]);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    let is_complete = |bytes: &[u8], want| {
+        fs::write(&path, bytes).unwrap();
+        read(&path, want).unwrap().0.complete
+    };
+    assert!(is_complete(&bytes, Want::Stamps));
+    for at in start..end {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 1 << (at % 8);
+        assert!(!is_complete(&damaged, Want::Stamps), "byte {at}");
+    }
+    // The last byte before the end is of a payload, of which nobody knows without a checksum.
+    let mut unsummed = bytes.clone();
+    unsummed[end - 1] ^= 1;
+    unsummed[end + 9..end + 13].fill(0);
+    assert!(is_complete(&unsummed, Want::Payload));
+}
+
 /// The places of the values of this field in a ROS 1 bag.
 fn values(bytes: &[u8], field: &[u8]) -> Vec<usize> {
     let starts = bytes.windows(field.len()).enumerate();

@@ -21,6 +21,9 @@ impl<G: Grammar> Query<'_, G> {
         let Some(promised) = &chunk.promised else {
             return;
         };
+        if let Some(index) = self.sufficient(chunk, promised) {
+            return self.tell(&index, None, sink);
+        }
         let found = match self.index(chunk, promised) {
             Ok(found) => found,
             Err(e) => return lost(sink, "a chunk's index cannot be read", &e),
@@ -70,6 +73,19 @@ impl<G: Grammar> Query<'_, G> {
             }
             self.told(&mut stream, Share::Whole, sink);
         }
+    }
+
+    /// The index of a chunk that is far away, if it agrees with all that the tail says and no more is wanted: there the
+    /// head of the chunk would cost a request of its own.
+    fn sufficient(&self, chunk: &Chunk, promised: &IndexSum) -> Option<Index> {
+        let len = chunk.index.end - chunk.index.start;
+        if !self.source.is_far() || len == 0 || len > LONGEST_INDEX {
+            return None;
+        }
+        // What cannot be had now is asked for again, and told then.
+        let index = self.index_at(chunk.index.start, len, promised).ok()??;
+        let is_all = index.spans(chunk.first, chunk.last) && !self.wants_messages(&index);
+        is_all.then_some(index)
     }
 
     /// The chunk's index, if it agrees exactly with the tail.

@@ -121,8 +121,11 @@ impl<G: Grammar> Forward<'_, G> {
                 self.total = Some(messages);
                 pass(stream, len)
             }
-            RecordHead::DataEnd { len } => {
+            RecordHead::DataEnd { len, crc } => {
                 self.ended = true;
+                if crc.is_some_and(|crc| stream.sum().is_some_and(|sum| sum != crc)) {
+                    self.damage("the checksum of its data is wrong");
+                }
                 pass(stream, len)
             }
             RecordHead::FileEnd { len } => self.file_end(stream, len),

@@ -132,6 +132,11 @@ impl<G: Grammar> Query<'_, G> {
         }
     }
 
+    /// Whether more than the time of a message in `index` is wanted.
+    pub(super) fn wants_messages(&self, index: &Index) -> bool {
+        !self.wanted(index).is_empty()
+    }
+
     /// The entries for which more than the stamp is wanted, in the order of the chunk.
     fn wanted(&self, index: &Index) -> Vec<Wanted> {
         let mut all = Vec::new();

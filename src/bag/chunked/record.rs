@@ -23,8 +23,9 @@ pub(crate) enum RecordHead<D> {
     Index { raw: u32, count: u32, len: u64 },
     /// The number of messages that the bag states.
     Total { messages: u64, len: u64 },
-    /// The end of the data: no message follows.
-    DataEnd { len: u64 },
+    /// The end of the data: no message follows. `crc` is the CRC-32 of all bytes of the bag before the `len` bytes, if it
+    /// is stated.
+    DataEnd { len: u64, crc: Option<u32> },
     /// The end of the file: only the closing bytes of the bag follow.
     FileEnd { len: u64 },
     /// A record that does not concern us.
@@ -45,7 +46,7 @@ impl<D> RecordHead<D> {
             Self::Description { len, .. }
             | Self::Index { len, .. }
             | Self::Total { len, .. }
-            | Self::DataEnd { len }
+            | Self::DataEnd { len, .. }
             | Self::FileEnd { len }
             | Self::Other { len }
             | Self::Tail { len }

@@ -1,10 +1,11 @@
 //! The records of a chunk, one after the other, with checks of the chunk's own numbers.
 
-use std::io::{self, Read};
+use std::io::Read;
 use std::sync::Arc;
 
 use super::Grammar;
 use super::record::{ChunkHead, NoRecord, RecordHead, pass, walk};
+use crate::bag::checksum::CrcReader;
 use crate::bag::decompress::{Allowance, Compression};
 use crate::bag::source::ByteStream;
 use crate::base::time::Stamp;
@@ -129,36 +130,5 @@ pub(super) fn records<G: Grammar>(
         NoRecord::End if is_odd => Err(NoRecord::Broken),
         NoRecord::End => Ok(()),
         stop => Err(stop),
-    }
-}
-
-/// A reader that sums up the bytes it reads.
-pub(crate) struct CrcReader<R> {
-    from: R,
-    hasher: crc32fast::Hasher,
-    is_at_end: bool,
-}
-
-impl<R> CrcReader<R> {
-    pub(crate) fn new(from: R) -> Self {
-        Self {
-            from,
-            hasher: crc32fast::Hasher::new(),
-            is_at_end: false,
-        }
-    }
-
-    /// The CRC-32 of all bytes; `None` before the end of them.
-    pub(crate) fn sum(&self) -> Option<u32> {
-        self.is_at_end.then(|| self.hasher.clone().finalize())
-    }
-}
-
-impl<R: Read> Read for CrcReader<R> {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let n = self.from.read(into)?;
-        self.hasher.update(&into[..n]);
-        self.is_at_end = n == 0;
-        Ok(n)
     }
 }

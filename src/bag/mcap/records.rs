@@ -9,6 +9,7 @@ use mcap::MAGIC;
 use mcap::records::op;
 
 use super::{Described, Mcap};
+use crate::bag::checksum::Checksum;
 use crate::bag::chunked::{ChunkHead, Connections, NoRecord, RecordHead};
 use crate::bag::decompress::Compression;
 use crate::bag::model::{Connection, ConnectionId, Encoding};
@@ -25,7 +26,7 @@ pub(super) const ENTRY: usize = 16;
 /// The number of bytes of a footer, and of the record that ends the data, which tells them from records with a damaged
 /// kind.
 pub(super) const FOOTER: u64 = 20;
-const DATA_END: u64 = 4;
+pub(super) const DATA_END: u64 = 4;
 /// The number of bytes of statistics before the counts of channels.
 pub(super) const STATISTICS: u64 = 8 + 2 + 4 + 4 + 4 + 4 + 8 + 8;
 /// The bytes of a record that are looked at for the lengths in it; names are shorter.
@@ -81,7 +82,10 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
         op::CHUNK_INDEX | op::ATTACHMENT_INDEX | op::METADATA_INDEX | op::SUMMARY_OFFSET => {
             RecordHead::Tail { len }
         }
-        op::DATA_END if len == DATA_END => RecordHead::DataEnd { len },
+        op::DATA_END if len == DATA_END => RecordHead::DataEnd {
+            len,
+            crc: data_crc(stream.peek(4)?),
+        },
         op::FOOTER if len == FOOTER => RecordHead::FileEnd { len },
         op::DATA_END | op::FOOTER => return Err(NoRecord::Broken),
         kind => RecordHead::Unknown {
@@ -89,6 +93,16 @@ pub(super) fn next(stream: &mut ByteStream<'_>) -> Result<RecordHead<Described>,
             extension: kind >= FIRST_EXTENSION,
         },
     })
+}
+
+/// The CRC-32 of all bytes before the content of the record that ends the data: what that states, 0 for nothing, is of the
+/// bytes before the record, whose head is always the same.
+fn data_crc(content: &[u8]) -> Option<u32> {
+    let stated = FieldCursor(content).u32().filter(|crc| *crc != 0)?;
+    let mut sum = Checksum::of(stated);
+    sum.add(&[op::DATA_END]);
+    sum.add(&DATA_END.to_le_bytes());
+    Some(sum.crc())
 }
 
 /// The length of a record as the lengths in it add up; `None` if they are not in these first bytes of it.

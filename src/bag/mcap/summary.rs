@@ -5,11 +5,12 @@ use std::io;
 use mcap::MAGIC;
 use mcap::records::op;
 
-use super::records::{self, FOOTER, FieldCursor, HEAD};
+use super::records::{self, DATA_END, FOOTER, FieldCursor, HEAD};
 use super::{Described, Mcap};
+use crate::bag::checksum::CrcReader;
 use crate::bag::chunked::{
-    Chunk, ChunkPlan, CrcReader, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead,
-    Unindexed, Used, pass, walk,
+    Chunk, ChunkPlan, Grammar as _, IndexSum, MOST_CHUNKS, NoRecord, RecordHead, Unindexed, Used,
+    pass, walk,
 };
 use crate::bag::model::MOST_PAYLOAD;
 use crate::bag::source::{ByteStream, FAR, FileSource, NEAR};
@@ -69,6 +70,24 @@ fn footer(source: &FileSource) -> io::Result<Result<(u64, u32), Unindexed>> {
         }
         n => Ok((n, crc)),
     })
+}
+
+/// The number of bytes of the record that ends the data.
+const DATA_END_RECORD: usize = 9 + 4;
+
+/// The CRC-32 that the record before the summary, or the footer, states of all data before it, 0 for none; `None` if that
+/// is not there.
+pub(super) fn data_crc(source: &FileSource) -> io::Result<Option<u32>> {
+    let end = match footer(source)? {
+        Ok((start, _)) => start,
+        Err(_) => source.len().saturating_sub(END as u64),
+    };
+    let mut bytes = [0; DATA_END_RECORD];
+    let at = end.saturating_sub(DATA_END_RECORD as u64);
+    let got = source.read_at(at, &mut bytes)?;
+    let mut cursor = FieldCursor(&bytes[..got]);
+    let is_end = (cursor.u8(), cursor.u64()) == (Some(op::DATA_END), Some(DATA_END));
+    Ok(cursor.u32().filter(|_| is_end))
 }
 
 /// The part of a summary that has been read.

@@ -18,9 +18,11 @@ use crate::bag::Input;
 use crate::base::digest::hex;
 use crate::base::error::{Error, Result};
 use crate::base::table::Batch;
+use crate::export::check::check_folder;
 use crate::export::sink::OutputSink;
 use crate::export::tables::{TableFormat, writer::Writer};
 use crate::export::target::Target;
+use crate::pipeline::read::files;
 use crate::pipeline::{Stage, Watch};
 
 /// The treatment of a bag that cannot be read at all.
@@ -103,6 +105,11 @@ pub fn tables(job: &FleetJob, watch: &mut dyn Watch) -> Result<Tabled> {
     let mut plan = plan(&job.sources, &job.planning)?;
     if let Some((index, count)) = job.shard {
         plan = plan.shard(index, count)?;
+    }
+    let inputs: Vec<Input> = plan.bags.iter().map(PlannedBag::input).collect();
+    let kept = files(&inputs);
+    for folder in ["counts", "bags"] {
+        check_folder(&job.folder.join(folder), "parquet", &kept)?;
     }
     let work = FleetWork {
         job,
