@@ -261,12 +261,12 @@ fn values<T: DataType>(
 
 /// The places of the values inside these rows of lists.
 fn places(lists: &[Vec<i32>], rows: Range<usize>) -> Range<usize> {
-    lists
-        .iter()
-        .fold(rows, |inside, ends| match inside.is_empty() {
-            true => 0..0,
-            false => span(ends, inside.start).start..span(ends, inside.end - 1).end,
-        })
+    lists.iter().fold(rows, |inside, ends| {
+        if inside.is_empty() {
+            return 0..0;
+        }
+        span(ends, inside.start).start..span(ends, inside.end - 1).end
+    })
 }
 
 /// The levels of lists as Parquet (and Dremel, Melnik et al. 2010) has them: one entry per value and per empty list.

@@ -145,7 +145,7 @@ fn a_bag_cut_behind_any_byte_has_the_messages_before_it() {
                 kept.iter().all(|m| whole.contains(m)),
                 "{name}: cut at {end}"
             );
-            let is_said = !report.complete || name.starts_with("front") && name.ends_with(".bag");
+            let is_said = !report.complete || name.starts_with("front") && name.contains(".bag");
             assert!(kept.len() == TINY || is_said, "{name}: cut at {end}");
             before = kept.len();
         }

@@ -267,8 +267,8 @@ fn of_pills(
         .collect();
     let drawn = finished(sheet, canvas, (looks, vertices, spaces, talks), 1)?;
     Some(MapDrawing {
-        alone,
         members,
+        alone,
         ..drawn
     })
 }

@@ -164,14 +164,14 @@ impl Steps {
             |a: &Stretch, b: &Stretch| !self.has(sender, b.first) && b.first.since(a.last) < least;
         let runs = sender.stretches.chunk_by(parts);
         let piece = |run: &[Stretch]| {
-            let (first, last) = (run.first()?, run.last()?);
-            let nanos = last.last.since(first.first);
+            let (start, end) = (run.first()?.first, run.last()?.last);
+            let nanos = end.since(start);
             let count: u64 = run.iter().fold(0, |n, s| n.saturating_add(s.count));
             let mean = count.saturating_sub(1) as f64 * 1e9 / nanos.max(1) as f64;
             Some(Piece {
                 span: Span {
-                    start: first.first,
-                    end: last.last.plus(1),
+                    start,
+                    end: end.plus(1),
                 },
                 hz: match run {
                     [one] => one.hz(),

@@ -121,9 +121,9 @@ impl<'a> PdfFace<'a> {
         buffer.guess_segment_properties();
         buffer.set_direction(Direction::LeftToRight);
         let shaper = self.shaper.shaper(&self.font).build();
-        let shaped = shaper.shape(buffer, ShapeOptions::new());
+        let out = shaper.shape(buffer, ShapeOptions::new());
         let em = self.embedded.units_per_em();
-        let (infos, positions) = (shaped.glyph_infos(), shaped.glyph_positions());
+        let (infos, positions) = (out.glyph_infos(), out.glyph_positions());
         let glyphs = infos
             .iter()
             .zip(positions)
