@@ -85,7 +85,10 @@ impl Reading {
 
     /// The files and folders of the user's that it reads: never overwritten.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
+        #[cfg(feature = "source")]
         let source = self.code.iter().map(|code| &code.folder);
+        #[cfg(not(feature = "source"))]
+        let source = std::iter::empty();
         let topology = self.conclude.topology.files.iter();
         let named = source.chain(topology).chain(self.phases.file());
         let there = named.filter(|path| path.exists()).cloned();
