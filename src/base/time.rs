@@ -171,6 +171,40 @@ fn to_nanos(secs: f64) -> Option<i64> {
     (nanos.is_finite() && nanos < 9.2e18).then_some(nanos as i64)
 }
 
+/// The smallest length of time that people count in and that is at least `least` nanoseconds: 1 ms, 2 ms, … 6 h, and whole
+/// days.
+pub(crate) fn round_length(least: i64) -> i64 {
+    const STEPS: [i64; 24] = [
+        SECOND / 1000,
+        SECOND / 500,
+        SECOND / 200,
+        SECOND / 100,
+        SECOND / 50,
+        SECOND / 20,
+        SECOND / 10,
+        SECOND / 5,
+        SECOND / 2,
+        SECOND,
+        2 * SECOND,
+        5 * SECOND,
+        10 * SECOND,
+        20 * SECOND,
+        30 * SECOND,
+        60 * SECOND,
+        120 * SECOND,
+        300 * SECOND,
+        600 * SECOND,
+        1200 * SECOND,
+        1800 * SECOND,
+        3600 * SECOND,
+        7200 * SECOND,
+        21_600 * SECOND,
+    ];
+    const DAY: i64 = 86_400 * SECOND;
+    let found = STEPS.iter().copied().find(|step| *step >= least);
+    found.unwrap_or_else(|| ((least - 1) / DAY + 1).saturating_mul(DAY))
+}
+
 /// A moment on the axis of a bag, as `--start` and `--end` take it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {

@@ -5,7 +5,7 @@ use super::course::CourseStrip;
 use super::page::PageFrame;
 use super::title::whole;
 use crate::base::geometry::{Point, Rect};
-use crate::base::time::{Span, Stamp};
+use crate::base::time::{Span, Stamp, round_length};
 use crate::base::words;
 use crate::draw::figure::Course;
 use crate::draw::figure::canvas::entry_data;
@@ -246,7 +246,7 @@ impl<'a> Timeline<'a> {
         let last = words::offset(whole(total));
         #[expect(clippy::cast_possible_truncation, reason = "at most a few hundred")]
         let most = (self.plot.w / (width(&last) * 2.2).max(1.0)).clamp(1.0, 12.0) as i64;
-        let step = nice(total / most.max(1));
+        let step = round_length(total / most.max(1));
         let end = self.plot.right() - width(&last) * 1.4;
         // Counted, not added up: a span may be as long as a number can say.
         for at in (0..=total / step).map(|tick| tick * step) {
@@ -325,40 +325,6 @@ pub(crate) fn mark(lane: usize, c: Point, r: f64) -> Form {
     }
 }
 
-/// The smallest length of time that people count in and that is at least `least` nanoseconds.
-fn nice(least: i64) -> i64 {
-    const SECOND: i64 = 1_000_000_000;
-    const STEPS: [i64; 24] = [
-        SECOND / 1000,
-        SECOND / 500,
-        SECOND / 200,
-        SECOND / 100,
-        SECOND / 50,
-        SECOND / 20,
-        SECOND / 10,
-        SECOND / 5,
-        SECOND / 2,
-        SECOND,
-        2 * SECOND,
-        5 * SECOND,
-        10 * SECOND,
-        20 * SECOND,
-        30 * SECOND,
-        60 * SECOND,
-        120 * SECOND,
-        300 * SECOND,
-        600 * SECOND,
-        1200 * SECOND,
-        1800 * SECOND,
-        3600 * SECOND,
-        7200 * SECOND,
-        21_600 * SECOND,
-    ];
-    let day = 86_400 * SECOND;
-    let found = STEPS.iter().copied().find(|step| *step >= least);
-    found.unwrap_or_else(|| (least / day + 1).saturating_mul(day))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -366,16 +332,16 @@ mod tests {
     #[test]
     fn ticks_stand_at_round_times() {
         const SECOND: i64 = 1_000_000_000;
-        assert_eq!(nice(7 * SECOND), 10 * SECOND);
-        assert_eq!(nice(100 * SECOND), 120 * SECOND);
-        assert_eq!(nice(100_000 * SECOND), 172_800 * SECOND);
-        assert!(nice(i64::MAX) > 0);
+        assert_eq!(round_length(7 * SECOND), 10 * SECOND);
+        assert_eq!(round_length(100 * SECOND), 120 * SECOND);
+        assert_eq!(round_length(100_000 * SECOND), 172_800 * SECOND);
+        assert!(round_length(i64::MAX) > 0);
     }
 
     #[test]
     fn the_longest_span_has_a_few_ticks_too() {
         for total in [1, 1_000_000_000, i64::MAX] {
-            let step = nice(total / 12);
+            let step = round_length(total / 12);
             assert!(total / step <= 12, "{total}: {step}");
         }
     }
