@@ -81,10 +81,10 @@ fn bound_chunk(stream: &mut ByteStream<'_>, len: u64) -> Result<(), String> {
     let end = stream.position() + head.packed;
     let stop = walk(stream, end, |stream| {
         let (_, len) = records::head(stream)?;
-        if len > end.saturating_sub(stream.position()) {
-            return Err(NoRecord::Broken);
+        match end.checked_sub(stream.position()) {
+            Some(left) if len <= left => pass(stream, len),
+            _ => Err(NoRecord::Broken),
         }
-        pass(stream, len)
     });
     match stop {
         NoRecord::End => Ok(()),
