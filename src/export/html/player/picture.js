@@ -69,7 +69,9 @@ function header() {
 	const p = phases.findLastIndex(([from]) => from < ends[now]);
 	say('phase', p < 0 ? '' : `${p + 1} · ${phases[p][2]}`);
 	$.phase.title = p < 0 ? '' : `phase ${p + 1} of ${phases.length}: ${phases[p][2]}`;
-	$.chips.dataset.entries = base < 0 ? (news.get(now)?.lines ?? []).map(line => line[4]).join(' ') : '';
+	// The events of the log that the chips count; what differs between any two windows need not be one.
+	if (base < 0) $.chips.dataset.entries = (news.get(now)?.lines ?? []).map(line => line[4]).join(' ');
+	else delete $.chips.dataset.entries;
 	$.chips.replaceChildren(...chips.flatMap((text, m) => text ? [make('span', { className: KINDS[m], textContent: text })] : []));
 	$.seek.value = now;
 	$.seek.ariaValueText = [clock(starts[now]), place, ...chips.filter(Boolean)].join(', ');
