@@ -6,11 +6,13 @@ mod collapse;
 mod counts;
 mod filter;
 mod filtered;
+mod frame;
 mod frames;
 mod group;
 mod hidden;
 mod hubs;
 mod items;
+mod lasting;
 mod lives;
 mod marks;
 mod names;
@@ -28,16 +30,18 @@ pub(crate) mod union;
 use std::sync::Arc;
 
 use crate::base::notice::Notices;
-use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::Degree;
 use crate::graph::{Element, State};
 use crate::mission::Mission;
-use crate::mission::ledger::{EntryId, Kind};
+use crate::mission::ledger::EntryId;
 
 pub(crate) use collapse::{Collapsible, headlines};
 pub(crate) use filter::NameFilter;
 pub(crate) use filtered::filtered;
+pub(crate) use frame::Phrase;
+pub use frame::{Frame, Headline};
+pub(crate) use lasting::Lasting;
 pub(crate) use nothing::nothing;
 pub use options::{Grouping, Hide, Mode, ViewOptions};
 pub use showing::Showing;
@@ -216,7 +220,7 @@ impl Arrow {
 pub enum Mark {
     /// It began.
     Added,
-    /// It ended: listed in this one window as a ghost.
+    /// It ended, listed in this one window as a ghost, or left to come back in a later window.
     Removed,
     /// Its rate rose.
     Faster,
@@ -224,7 +228,7 @@ pub enum Mark {
     Slower,
     /// It is a topic whose messages now come from other senders.
     HandedOver,
-    /// It is a node that ended and came back.
+    /// It is back: a node that ended and came back, or something silent that sends again.
     Restarted,
     /// It paused.
     Paused,
@@ -232,14 +236,17 @@ pub enum Mark {
     Changed,
     /// Something inside a group or a collapsed namespace was added, removed or changed.
     Inside,
+    /// It is a node that left in an earlier window and comes back in a later one.
+    Away,
 }
 
 impl Mark {
-    /// The class in SVG: `added`, `removed` or `changed`.
+    /// The class in SVG: `added`, `removed`, `away` or `changed`.
     pub fn class(self) -> &'static str {
         match self {
             Self::Added => "added",
             Self::Removed => "removed",
+            Self::Away => "away",
             _ => "changed",
         }
     }
@@ -328,41 +335,6 @@ pub struct Counts {
     pub values: usize,
 }
 
-/// A headline of the ledger in the window that tells it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Headline {
-    /// Its place in the ledger.
-    pub entry: EntryId,
-    /// The kind of event.
-    pub kind: Kind,
-    /// The element it is about.
-    pub what: Element,
-    /// The time of the event.
-    pub time: Stamp,
-}
-
-/// A few words of a caption, and the number of headlines they stand for.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Phrase {
-    /// The words: `/robot1/planner started`.
-    pub text: String,
-    /// The number of headlines that they tell; 0 for a return.
-    pub headlines: usize,
-}
-
-impl Headline {
-    /// The start of a node.
-    #[cfg(test)]
-    pub(crate) fn started() -> Self {
-        Self {
-            entry: 0,
-            kind: Kind::Started,
-            what: Element::Node(0),
-            time: Stamp(0),
-        }
-    }
-}
-
 /// The items and arrows of a window, ghosts included, each list sorted by id.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SeenWindow {
@@ -370,61 +342,6 @@ pub struct SeenWindow {
     pub items: Vec<Shown>,
     /// The arrows.
     pub arrows: Vec<Shown>,
-}
-
-/// One window of the picture; the items and arrows in it are in [`View::seen`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
-    /// The window's index, counted from 0.
-    pub index: usize,
-    /// Its time.
-    pub span: Span,
-    /// Whether it is shorter than the others.
-    pub partial: bool,
-    /// The number of all messages of the bag in the window, hidden topics included.
-    pub messages: u64,
-    /// For each namespace that stands for several, in the order of [`View::namespaces`], the presence of each of them.
-    pub rolls: Vec<Vec<Attendance>>,
-    /// The headlines in it, in the order of the ledger. Chips, caption, marks and timeline are all made from these.
-    pub headlines: Vec<Headline>,
-    /// The number of headlines of each kind.
-    pub counts: Counts,
-    /// The headlines in words, the most important first, and behind them who is back from a silence or an absence. That
-    /// is no headline again: an entry counts in the window in which it begins.
-    pub caption: Vec<Phrase>,
-}
-
-impl Frame {
-    /// A window without messages and headlines.
-    pub fn empty(index: usize, span: Span) -> Self {
-        Self {
-            index,
-            span,
-            partial: false,
-            messages: 0,
-            rolls: Vec::new(),
-            headlines: Vec::new(),
-            counts: Counts::default(),
-            caption: Vec::new(),
-        }
-    }
-
-    /// The caption in at most `most` phrases, the rest counted: `a started; b stopped; and 3 more`.
-    pub fn words(&self, most: usize) -> String {
-        let mut parts: Vec<String> = self
-            .caption
-            .iter()
-            .take(most)
-            .map(|p| p.text.clone())
-            .collect();
-        let rest: usize = self.caption.iter().skip(most).map(|p| p.headlines).sum();
-        match rest {
-            0 => {}
-            n if parts.is_empty() => parts.push(words::count(n, "change")),
-            n => parts.push(format!("and {n} more")),
-        }
-        parts.join("; ")
-    }
 }
 
 /// The whole sequence as the picture shows it. Items are sorted by (kind, name), arrows by (from, to, kind),
@@ -460,18 +377,9 @@ impl View {
         at.since(first.span.start) as f64 / whole
     }
 
-    /// The length of all windows but a partial one; `None` where there is one window, or where they differ.
-    pub(crate) fn window_nanos(&self) -> Option<i64> {
-        let first = self.frames.first()?.span.nanos();
-        let is_equal = |f: &Frame| f.partial || f.span.nanos() == first;
-        (self.frames.len() > 1 && self.frames.iter().all(is_equal)).then_some(first)
-    }
-
     /// Whether window `k` shows a change.
     pub fn is_changed(&self, k: usize) -> bool {
-        self.frames
-            .get(k)
-            .is_some_and(|frame| !frame.headlines.is_empty())
+        self.frames.get(k).is_some_and(Frame::is_changed)
     }
 
     /// The items and arrows seen in the window at place `k`; none past the last one.

@@ -50,6 +50,7 @@ const FLOORS: &[(&str, &[&[&str]])] = &[
         &["options"],
         &["group", "select"],
         &["items"],
+        &["frame", "lasting"],
         &["caption", "hidden", "marks", "nothing", "state"],
         &["filtered", "frames"],
     ]),

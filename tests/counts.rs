@@ -1,4 +1,4 @@
-//! Every frame counted by script against the data, as it lies in the files: chips, marks and timeline of SVG frames,
+//! Every frame counted by script against the data, as it lies in the files: headlines, marks and timeline of SVG frames,
 //! the page, the report, and what a GIF is drawn from.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -92,46 +92,41 @@ fn every_frame_counts_what_the_data_says() {
         let mission: Value = serde_json::from_str(&text("x.json")).unwrap();
         let expected = headlines(&mission);
         let digits = (expected.len() - 1).to_string().len();
-        let over = over(&mission);
-        for (index, told) in expected.iter().enumerate() {
+        let (lasting, over) = lasting(&mission);
+        let reported = joined(&expected, &lasting);
+        let changed = joined(&expected, &over);
+        for (index, told) in reported.iter().enumerate() {
             let svg = text(&format!("x{index:0digits$}.svg"));
             let at = format!("{bag} by {period} s, window {index}");
             frame(&svg, told, &at);
             alive(&svg, &mission["windows"][index], &at);
-            let is_back = svg.contains(" is back after ") || svg.contains(" are back");
-            assert_eq!(is_back, over.contains(&index), "who is back in {at}");
             chart(&text(&format!("x{index:0digits$}.mmd")), told, &at);
         }
-        settled(&folder.path().join("x"), &expected, &over, digits);
+        settled(&folder.path().join("x"), &reported, digits);
         terminal(&said, &expected);
-        strip(bag, period, &expected, folder.path());
+        strip(bag, period, &changed, folder.path());
         timeline(
             &text(&format!("x{:0digits$}.svg", 0)),
             &expected,
             &format!("{bag} by {period} s"),
         );
-        page(&text("x.html"), &expected, &format!("{bag} by {period} s"));
-        report(&text("x.md"), &expected, &format!("{bag} by {period} s"));
+        let at = format!("{bag} by {period} s");
+        page(&text("x.html"), (&expected, &changed), &at);
+        report(&text("x.md"), (&expected, &changed), &at);
     }
 }
 
-/// One frame: its chips, its caption, and the marks of its boxes and arrows.
+/// One frame: its headline, and the marks of its boxes and arrows.
 fn frame(svg: &str, told: &BTreeSet<u64>, at: &str) {
-    for class in ["chips", "caption"] {
-        let named: BTreeSet<u64> = groups(svg, class).flatten().collect();
-        assert_eq!(named, *told, "{class} of {at}");
-    }
+    let named: BTreeSet<u64> = groups(svg, "headline").flatten().collect();
+    assert_eq!(named, *told, "headline of {at}");
     let marks = ["node", "topic", "edge"].into_iter();
     let marked: BTreeSet<u64> = marks
         .flat_map(|class| groups(svg, class))
         .flatten()
         .collect();
     assert_eq!(marked, *told, "marks of {at}");
-    assert_eq!(
-        told.is_empty(),
-        svg.contains("no reconfiguration"),
-        "caption of {at}"
-    );
+    assert_eq!(told.is_empty(), svg.contains("no change"), "words of {at}");
 }
 
 /// A node that is drawn as active is one of the window's nodes in the data: of an anonymous one, a run of it.
@@ -163,7 +158,7 @@ fn timeline(svg: &str, expected: &[BTreeSet<u64>], at: &str) {
 }
 
 /// What the page's chips and jumps are made of, and the elements that it marks in each window.
-fn page(html: &str, expected: &[BTreeSet<u64>], at: &str) {
+fn page(html: &str, (expected, changed): (&[BTreeSet<u64>], &[BTreeSet<u64>]), at: &str) {
     let (_, rest) = html
         .split_once(" id=\"data\"")
         .or_else(|| html.split_once(" id=data"))
@@ -197,8 +192,8 @@ fn page(html: &str, expected: &[BTreeSet<u64>], at: &str) {
             marked[window] |= is_mark(classes[run[1]]);
         }
     }
-    let with_headlines: Vec<bool> = expected.iter().map(|told| !told.is_empty()).collect();
-    assert_eq!(marked, with_headlines, "marks of the page of {at}");
+    let is_changed: Vec<bool> = changed.iter().map(|told| !told.is_empty()).collect();
+    assert_eq!(marked, is_changed, "marks of the page of {at}");
 }
 
 fn place(number: &Value) -> usize {
@@ -206,7 +201,8 @@ fn place(number: &Value) -> usize {
 }
 
 /// The report's first line: its numbers add up to all headlines.
-fn report(markdown: &str, expected: &[BTreeSet<u64>], at: &str) {
+fn report(markdown: &str, (expected, all): (&[BTreeSet<u64>], &[BTreeSet<u64>]), at: &str) {
+    let windows = all.iter().filter(|told| !told.is_empty()).count();
     let all: usize = expected.iter().map(BTreeSet::len).sum();
     let mut lines = markdown.lines().filter(|line| !line.is_empty());
     let (first, second) = (lines.next().unwrap(), lines.next().unwrap());
@@ -216,7 +212,6 @@ fn report(markdown: &str, expected: &[BTreeSet<u64>], at: &str) {
         .filter_map(|word| word.parse::<usize>().ok());
     let (_, changed) = second.split_once(", of which ").unwrap();
     let changed: usize = changed.split(' ').next().unwrap().parse().unwrap();
-    let windows = expected.iter().filter(|told| !told.is_empty()).count();
     assert_eq!(changed, windows, "{at}: {second}");
     assert_eq!(numbers.sum::<usize>(), all, "{at}: {first}");
 }
@@ -297,7 +292,7 @@ fn drawn(svg: &str) -> BTreeMap<&str, String> {
         };
         let id = &rest[..rest.find('"').unwrap()];
         // Labels of rates are numbers all over.
-        if ["window", "clock", "past", "playhead"].contains(&id) || id.ends_with("..over") {
+        if ["clock", "past", "playhead"].contains(&id) || id.ends_with("..over") {
             continue;
         }
         all.insert(id, without_numbers(line));
@@ -322,37 +317,44 @@ fn without_numbers(line: &str) -> String {
 }
 
 /// A window without a headline after another such is drawn as that one, but for its clock and its numbers.
-fn settled(stem: &Path, expected: &[BTreeSet<u64>], over: &BTreeSet<usize>, digits: usize) {
+fn settled(stem: &Path, expected: &[BTreeSet<u64>], digits: usize) {
     let read = |k: usize| {
         let path = format!("{}{k:0digits$}.svg", stem.display());
         fs::read_to_string(path).unwrap()
     };
     for k in 1..expected.len() {
-        if expected[k - 1].is_empty() && expected[k].is_empty() && !over.contains(&k) {
+        // The line below the headline names the last change.
+        let is_quiet = |k: usize| expected[k].is_empty();
+        if k > 1 && (k - 2..=k).all(is_quiet) {
             let (before, after) = (read(k - 1), read(k));
             assert_eq!(drawn(&before), drawn(&after), "window {k}");
         }
     }
 }
 
-/// The windows in which a headline of an earlier one ends, such as a silence: their captions say who is back.
-fn over(mission: &Value) -> BTreeSet<usize> {
-    let windows = mission["windows"].as_array().unwrap();
-    let span = |k: usize| {
-        let nanos = |key: &str| windows[k][key].as_i64().unwrap();
-        nanos("start_ns")..nanos("end_ns")
-    };
-    let ledger = mission["ledger"].as_array().unwrap();
+/// The events of earlier windows that are drawn in each: absences that last into it, and whatever ends in it; and
+/// those of them that end.
+fn lasting(mission: &Value) -> (Vec<BTreeSet<u64>>, Vec<BTreeSet<u64>>) {
     let headlines: BTreeSet<u64> = headlines(mission).into_iter().flatten().collect();
-    let lasts = ledger
-        .iter()
-        .filter(|e| headlines.contains(&e["id"].as_u64().unwrap()))
-        .filter_map(|e| Some((e["time_ns"].as_i64()?, e["until_ns"].as_i64()?)));
-    let lasts: Vec<(i64, i64)> = lasts.collect();
-    let ends = |k: &usize| {
-        let is_over =
-            |(time, until): &(i64, i64)| span(*k).contains(until) && *time < span(*k).start;
-        lasts.iter().any(is_over)
-    };
-    (0..windows.len()).filter(ends).collect()
+    let ledger = mission["ledger"].as_array().unwrap().iter();
+    let lasts = ledger.filter_map(|e| {
+        let id = e["id"].as_u64().filter(|id| headlines.contains(id))?;
+        let (from, to) = (e["time_ns"].as_i64()?, e["until_ns"].as_i64()?);
+        Some((id, from, to, e["kind"] == "restarted"))
+    });
+    let lasts: Vec<(u64, i64, i64, bool)> = lasts.collect();
+    let windows = mission["windows"].as_array().unwrap().iter();
+    let both = windows.map(|window| {
+        let nanos = |key: &str| window[key].as_i64().unwrap();
+        let (start, end) = (nanos("start_ns"), nanos("end_ns"));
+        let open = lasts.iter().filter(|e| e.1 < start && e.2 >= start);
+        let over = open.clone().filter(|e| e.2 < end).map(|e| e.0);
+        let drawn = open.filter(|e| e.2 < end || e.3).map(|e| e.0);
+        (drawn.collect(), over.collect())
+    });
+    both.unzip()
+}
+
+fn joined(a: &[BTreeSet<u64>], b: &[BTreeSet<u64>]) -> Vec<BTreeSet<u64>> {
+    a.iter().zip(b).map(|(a, b)| a | b).collect()
 }

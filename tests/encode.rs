@@ -18,7 +18,7 @@ use bagreel::internals::export::{Output, Written};
 use bagreel::internals::graph::Element;
 use bagreel::internals::mission::ledger::Kind;
 use bagreel::internals::mission::{Mission, read_json};
-use bagreel::internals::view::{Counts, Frame, Headline, View};
+use bagreel::internals::view::{Frame, Headline, View};
 
 /// A disc that moves through every window, over discs in all colours.
 struct Discs;
@@ -61,14 +61,6 @@ fn mission(windows: usize) -> (Mission, View) {
     );
     let mission = read_json(&text, "mission.json".as_ref()).unwrap();
     let frame = |index: usize| Frame {
-        rolls: Vec::new(),
-        index,
-        span: Span {
-            start: second(index),
-            end: second(index + 1),
-        },
-        partial: false,
-        messages: 0,
         headlines: (index % 2 == 1)
             .then_some(Headline {
                 entry: 0,
@@ -78,8 +70,13 @@ fn mission(windows: usize) -> (Mission, View) {
             })
             .into_iter()
             .collect(),
-        counts: Counts::default(),
-        caption: Vec::new(),
+        ..Frame::empty(
+            index,
+            Span {
+                start: second(index),
+                end: second(index + 1),
+            },
+        )
     };
     let frames = (0..windows).map(frame).collect();
     (

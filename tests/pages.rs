@@ -306,10 +306,7 @@ fn windows_that_overlap_are_told_with_their_own_spans() {
         (&data["starts"][1], &data["ends"][1]),
         (&json!(5), &json!(15))
     );
-    assert!(
-        frame.contains("00:05 – 00:15") && frame.contains("10 s per window"),
-        "{frame}"
-    );
+    assert!(frame.contains(">0:05 – 0:15<"), "{frame}");
 }
 
 #[test]
@@ -317,10 +314,7 @@ fn windows_that_were_merged_are_told_with_their_own_spans() {
     let (data, mission, frame) = divided(&["--period", "2", "--skip-unchanged"]);
     holds_its_windows(&data, &mission);
     assert!(data["starts"].as_array().unwrap().len() < 30);
-    assert!(
-        frame.contains("00:08 – 00:18") && !frame.contains("per window"),
-        "{frame}"
-    );
+    assert!(frame.contains(">0:08 – 0:18<"), "{frame}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use bagreel::internals::mission::ledger::Kind;
 use bagreel::internals::pipeline::{Reading, Unwatched, read};
 use bagreel::internals::view::{Mark, SeenWindow, Shown, View, ViewOptions, view};
 
@@ -41,12 +42,10 @@ fn every_headline_is_counted_said_and_marked() {
             let seen = view.seen(k);
             let at = format!("{name}, window {}", frame.index);
             let told: BTreeSet<u32> = frame.headlines.iter().map(|h| h.entry).collect();
-            let said: usize = frame.caption.iter().map(|phrase| phrase.headlines).sum();
-            assert_eq!(
-                (told.len(), told.len()),
-                (frame.counts.total(), said),
-                "{at}"
-            );
+            assert_eq!(told.len(), frame.counts.total(), "{at}");
+            let told: BTreeSet<u32> = frame.entries().collect();
+            let said: usize = frame.caption.iter().map(|phrase| phrase.names.len()).sum();
+            assert_eq!(told.len(), said, "{at}");
             let marked = all(&seen).filter(|s| s.mark.is_some());
             let marked: BTreeSet<u32> = marked.flat_map(|s| s.entries.clone()).collect();
             assert_eq!(marked, told, "{at}");
@@ -68,13 +67,67 @@ fn settled(seen: &SeenWindow) -> Vec<String> {
 #[test]
 fn a_window_without_a_headline_looks_like_the_one_before() {
     let view = example("warehouse.bag", Some("10"));
-    let quiet = (1..view.frames.len()).filter(|k| view.frames[*k].headlines.is_empty());
+    let quiet = (1..view.frames.len()).filter(|k| view.frames[*k].caption.is_empty());
     for k in quiet {
         let pair = [view.seen(k - 1), view.seen(k)];
         if !pair.iter().any(|seen| all(seen).any(|s| s.is_paused)) {
             assert_eq!(settled(&pair[0]), settled(&pair[1]), "window {k}");
         }
     }
+}
+
+#[test]
+fn a_crash_is_drawn_before_while_and_after() {
+    let view = example("warehouse.bag", Some("10"));
+    let of = |k: usize| {
+        let frame = &view.frames[k];
+        let name = |s: &&Shown| {
+            view.items[s.id as usize]
+                .label
+                .ends_with("/object_detector")
+        };
+        let seen = view.seen(k);
+        let mark = seen.items.iter().find(name).and_then(|s| s.mark);
+        (mark, frame.words(usize::MAX), frame.note.clone())
+    };
+    let said = |mark, words: &str, note: &str| (mark, words.to_owned(), note.to_owned());
+    let missed = "arm_controller and grasp_planner get no detections";
+    assert_eq!(of(25).0, None);
+    let gone = format!("/robot1 · 4:26 · {missed}");
+    let away = format!("/robot1 · since 4:26 · {missed}");
+    assert_eq!(
+        of(26),
+        said(Some(Mark::Removed), "− object_detector goes away", &gone)
+    );
+    assert_eq!(
+        of(27),
+        said(Some(Mark::Away), "object_detector still away", &away)
+    );
+    let back = "object_detector back after 15.6 s";
+    assert_eq!(of(28), said(Some(Mark::Restarted), back, "/robot1 · 4:41"));
+    // Where both ends lie in one window, it restarted there.
+    let minutes = example("warehouse.bag", Some("60"));
+    let words = minutes.frames[4].fitting(|_| true);
+    assert!(
+        words.contains("object_detector restarts after 15.6 s"),
+        "{words}"
+    );
+}
+
+#[test]
+fn an_element_shows_the_rates_of_its_event_and_not_their_mean() {
+    let view = example("warehouse.bag", Some("10"));
+    let mut events = 0;
+    for (k, frame) in view.frames.iter().enumerate() {
+        let seen = view.seen(k);
+        for change in frame.headlines.iter().filter(|h| h.kind == Kind::Rate) {
+            let own = all(&seen).filter(|s| s.entries == [change.entry]);
+            let rates: Vec<_> = own.map(|s| s.rates).collect();
+            events += 1;
+            assert!(!rates.is_empty() && !rates.contains(&None), "window {k}");
+        }
+    }
+    assert!(events >= 4, "{events}");
 }
 
 #[test]

@@ -188,6 +188,15 @@ pub fn offset_tenths(nanos: i64) -> String {
     format!("{}.{tenth}", offset_seconds(nanos))
 }
 
+/// A moment as [`offset`] writes it, without a leading zero: `3:20`, `0:38.5`, `1:02:03`.
+pub fn moment(nanos: i64) -> String {
+    let text = offset(nanos);
+    match text.strip_prefix('0') {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    }
+}
+
 /// The UTC clock of a time since 1970, in nanoseconds: `14:03:22`.
 pub fn clock(nanos: i64) -> String {
     let second = nanos.div_euclid(SECOND).rem_euclid(86_400);

@@ -145,11 +145,8 @@ impl<'a> Board<'a> {
             return scene;
         };
         if !self.options.bare {
-            scene.groups.push(self.title.window(self.view, frame));
-            scene.groups.push(self.title.chips(frame));
-            scene.groups.push(self.title.clock(frame));
             let phase = self.options.phases.get(k).map_or("", String::as_str);
-            scene.groups.push(self.title.caption(frame, phase));
+            scene.groups.extend(self.title.words(frame, phase));
         }
         let mut span = frame.span;
         if let Some(before) = k.checked_sub(1).and_then(|k| self.view.frames.get(k)) {
@@ -405,7 +402,7 @@ fn messages(source: &FigureSource<'_>, track: &Track) -> u64 {
 /// The part of the page for the board.
 fn room(page: &PageFrame, options: &PageOptions) -> Rect {
     let margin = page.graph.x;
-    let top = page.caption.bottom().max(margin / 2.0) + margin / 4.0;
+    let top = page.title.bottom().max(margin / 2.0) + margin / 4.0;
     let size = options.size;
     Rect::new(
         margin,

@@ -292,16 +292,10 @@ impl<'a> Picture<'a> {
             .phases
             .get(k)
             .map_or("", String::as_str);
-        if self.measured.view.compares {
-            groups.extend(self.title.compared(frame, self.len()));
-            groups.push(self.title.caption(frame, phase));
-            return;
+        groups.extend(self.title.words(frame, phase));
+        if !self.measured.view.compares {
+            groups.extend(self.timeline.head(k, frame));
         }
-        groups.push(self.title.window(self.measured.view, frame));
-        groups.push(self.title.chips(frame));
-        groups.push(self.title.clock(frame));
-        groups.push(self.title.caption(frame, phase));
-        groups.extend(self.timeline.head(k, frame));
     }
 
     fn graph(&self, frame: &Frame, seen: &SeenWindow, groups: &mut Vec<Group>) {

@@ -387,7 +387,7 @@ mod tests {
     use crate::evidence::Degree;
     use crate::graph::{Element, Elements, State};
     use crate::layout;
-    use crate::view::{Counts, Headline, Item, ItemKind, Mark, Phrase, SeenWindow, Shown};
+    use crate::view::{Headline, Item, ItemKind, Mark, Phrase, SeenWindow, Shown};
 
     /// Four minutes in which a node is there and another comes and goes.
     fn two_nodes() -> (Mission, View) {
@@ -425,23 +425,23 @@ mod tests {
             ..Shown::plain(id, State::Active, Degree::Measured)
         };
         let frame = |(index, mark): (usize, Option<Mark>)| Frame {
-            rolls: Vec::new(),
-            index,
-            span: Span {
-                start: minute(index),
-                end: minute(index + 1),
-            },
-            partial: false,
-            messages: 0,
             headlines: mark.map(|_| Headline::started()).into_iter().collect(),
-            counts: Counts::default(),
             caption: mark
                 .map(|m| Phrase {
-                    text: format!("/planner {}", m.class()),
-                    headlines: 1,
+                    sign: ' ',
+                    lead: String::new(),
+                    names: vec!["/planner".to_owned()],
+                    tail: m.class().to_owned(),
                 })
                 .into_iter()
                 .collect(),
+            ..Frame::empty(
+                index,
+                Span {
+                    start: minute(index),
+                    end: minute(index + 1),
+                },
+            )
         };
         let marks = [None, Some(Mark::Added), None, Some(Mark::Removed)];
         let seen = |mark: &Option<Mark>| SeenWindow {

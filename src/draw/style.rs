@@ -96,8 +96,10 @@ macro_rules! sections {
 
 sections! {
     Page { background: Color, margin: f64, text: Color, quiet: Color }
-    Title { fill: Color, line: Color, text: Color, quiet: Color, size: f64, quiet_size: f64, clock_size: f64, height: f64 }
-    Caption { fill: Color, text: Color, quiet: Color, size: f64, height: f64 }
+    Title {
+        fill: Color, line: Color, text: Color, quiet: Color, added: Color, removed: Color, changed: Color,
+        size: f64, quiet_size: f64, clock_size: f64, height: f64,
+    }
     Legend { fill: Color, line: Color, text: Color, size: f64 }
     Timeline { past: Color, future: Color, now: Color, head: Color, axis: Color, text: Color, size: f64, height: f64 }
     Cluster { fill: Color, stroke: Color, width: f64, dash: Vec<f64>, radius: f64, text: Color, size: f64 }
@@ -118,7 +120,6 @@ sections! {
     Badge { glow: f64, radius: f64, sign: Color, halo: Color }
     Chip {
         added: Color, added_text: Color, removed: Color, removed_text: Color, changed: Color, changed_text: Color,
-        none: Color, none_text: Color, size: f64,
     }
 }
 
@@ -127,7 +128,6 @@ sections! {
 pub struct Style {
     pub(crate) page: Page,
     pub(crate) title: Title,
-    pub(crate) caption: Caption,
     pub(crate) legend: Legend,
     pub(crate) timeline: Timeline,
     pub(crate) cluster: Cluster,
@@ -147,6 +147,19 @@ pub struct Style {
     pub(crate) chip: Chip,
     #[serde(skip)]
     palette: Vec<Color>,
+}
+
+impl Style {
+    /// The look of a node that is away: the colour of what went, dotted as what is only known of.
+    pub(crate) fn away(&self) -> Quiet {
+        Quiet {
+            fill: Color::NONE,
+            stroke: self.removed.color,
+            text: self.removed.color,
+            width: self.removed.width,
+            dash: self.declared.dash.clone(),
+        }
+    }
 }
 
 impl Body {

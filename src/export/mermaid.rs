@@ -18,7 +18,7 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
             continue;
         };
         let line = match (&arrow.kind, shown.mark) {
-            (_, Some(Mark::Removed)) => "-.->",
+            (_, Some(Mark::Removed | Mark::Away)) => "-.->",
             _ => "-->",
         };
         let topic = arrow.carries(shown);
@@ -63,6 +63,12 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
             change.fill, change.color, change.text
         );
     }
+    let away = style.away();
+    let _ = writeln!(
+        out,
+        "  classDef away fill:none,stroke:{},color:{},stroke-dasharray:2 4",
+        away.stroke, away.text
+    );
     let cluster = &style.cluster;
     let _ = writeln!(
         out,
@@ -75,7 +81,7 @@ pub(crate) fn chart(view: &View, style: &Style, seen: &SeenWindow) -> String {
 fn colour(style: &Style, class: &str) -> String {
     match class {
         "added" => style.added.color.to_string(),
-        "removed" => style.removed.color.to_string(),
+        "removed" | "away" => style.removed.color.to_string(),
         _ => style.changed.color.to_string(),
     }
 }

@@ -65,8 +65,7 @@ impl Book<'_> {
         let frame = self.sequence.view.frames.get(place);
         frame.map_or_else(String::new, |frame| {
             let at = words::offset(self.sequence.mission.offset(frame.span.start));
-            let caption = frame.caption.first().map_or("", |phrase| &phrase.text);
-            format!("{at} {caption}").trim_end().to_owned()
+            format!("{at} {}", frame.words(1)).trim_end().to_owned()
         })
     }
 }

@@ -1,217 +1,287 @@
-//! The caption of a window: its headlines in words, the most important first.
+//! The words of a window: its events as phrases for the headline, and the line below it.
 
 use std::collections::BTreeMap;
 
 use super::items::Viewed;
-use super::{Headline, ItemKind, Phrase};
-use crate::base::name::last_part;
-use crate::base::time::{Span, Stamp};
+use super::{Frame, Headline, ItemKind, Lasting, Phrase};
+use crate::base::name::{is_quiet, namespace};
+use crate::base::time::Stamp;
 use crate::base::words;
-use crate::graph::{Element, Elements, NodeId};
+use crate::graph::{Element, Elements, NodeId, TopicId};
 use crate::mission::Mission;
-use crate::mission::ledger::{Detail, Entry, EntryId, Kind, Ledger};
+use crate::mission::ledger::{Detail, EntryId, Kind, Ledger};
+use crate::view::lasting::Part;
 
-/// The largest number of headlines of one kind that are told one by one; more are told together.
-const MOST_NAMED: usize = 3;
 /// The largest length of a name in characters; longer ones are cut.
 const LONGEST_NAME: usize = 48;
+/// The most names in the line below the headline.
+const MOST_NAMED: usize = 3;
 
-/// A writer of captions: it puts headlines into words, with full names, so that equal names in two namespaces are told
-/// apart.
+/// A writer of headlines, window by window.
 pub(crate) struct Speaker<'a> {
     elements: &'a Elements,
     viewed: &'a Viewed,
     ledger: &'a Ledger,
-    /// Per headline of a node, the number of topics that came or went with it.
-    topics: BTreeMap<EntryId, usize>,
-    /// The headlines that last, in the order of their ends.
-    lasting: Vec<(Stamp, &'a Entry)>,
+    start: Stamp,
+    /// The last event of the windows so far.
+    last: Option<Stamp>,
+    audience: Audience<'a>,
 }
+
+/// The events of a window, in the order of their phrases, each with what is equal within one phrase.
+type Groups = BTreeMap<(u8, [String; 2]), Phrase>;
 
 impl<'a> Speaker<'a> {
     pub(crate) fn new(mission: &'a Mission, viewed: &'a Viewed) -> Self {
-        let mut topics = BTreeMap::new();
-        for entry in &mission.ledger.entries {
-            if let (Some(whole), Element::Topic(_)) = (entry.part_of, entry.what)
-                && viewed.sees(entry.what)
-                && matches!(entry.kind, Kind::Appeared | Kind::Vanished)
-            {
-                *topics.entry(whole).or_default() += 1;
-            }
-        }
-        let entries = mission.ledger.entries.iter();
-        let lasting = entries.filter(|e| e.is_headline() && viewed.sees(e.what));
-        let mut lasting: Vec<(Stamp, &Entry)> =
-            lasting.filter_map(|e| Some((e.until?, e))).collect();
-        lasting.sort_by_key(|(until, _)| *until);
         Self {
             elements: &mission.elements,
             viewed,
             ledger: &mission.ledger,
-            topics,
-            lasting,
+            start: mission.span.start,
+            last: None,
+            audience: Audience::new(&mission.elements),
         }
     }
 
-    /// A phrase for every headline, or for all of a kind where there are more than [`MOST_NAMED`].
-    pub(crate) fn caption(&self, headlines: &[Headline]) -> Vec<Phrase> {
-        const ORDER: [Kind; 11] = [
-            Kind::Started,
-            Kind::Stopped,
-            Kind::Restarted,
-            Kind::HandedOver,
-            Kind::Silent,
-            Kind::Appeared,
-            Kind::Vanished,
-            Kind::Lifecycle,
-            Kind::Type,
-            Kind::Qos,
-            Kind::Rate,
-        ];
-        let mut phrases = Vec::new();
-        for kind in ORDER {
-            let of_kind = headlines.iter().filter(|h| h.kind == kind);
-            let all: Vec<&Headline> = of_kind.collect();
-            if all.len() > MOST_NAMED && together(kind).is_some() {
-                phrases.push(self.together(kind, &all));
+    /// Puts the events of a window into words.
+    pub(crate) fn tell(&mut self, frame: &mut Frame) {
+        let whats = frame.headlines.iter().map(|h| h.what);
+        let whats = whats.chain(frame.lasting.iter().map(|l| l.what));
+        let home: &'a str = home(whats.filter_map(|what| self.subject(what)));
+        let mut groups = Groups::new();
+        for headline in &frame.headlines {
+            let part = self.entry(headline.entry).map(|e| Part::of(e, frame.span));
+            let phrase = self.phrase(headline, part.unwrap_or(Part::Whole), home);
+            add(&mut groups, phrase);
+        }
+        for lasting in &frame.lasting {
+            add(&mut groups, self.lasting(lasting, home));
+        }
+        frame.caption = groups.into_values().map(plural).collect();
+        frame.note = self.note(frame, home);
+    }
+
+    fn entry(&self, id: EntryId) -> Option<&'a crate::mission::ledger::Entry> {
+        self.ledger.entries.get(id as usize)
+    }
+
+    /// The line below the headline: `/robot1 · 4:26 · arm_controller gets no detections`; in a window in which nothing
+    /// changes `no change since 3:20`.
+    fn note(&mut self, frame: &Frame, home: &str) -> String {
+        if self.ledger.compares {
+            let none = frame.caption.is_empty().then_some("no difference");
+            return none.unwrap_or_default().to_owned();
+        }
+        let begun = frame.headlines.iter().map(|h| h.time);
+        let times = begun.chain(frame.lasting.iter().filter_map(|l| l.ended));
+        let span = times.fold(None, |span: Option<(Stamp, Stamp)>, at| {
+            Some(span.map_or((at, at), |(a, b)| (a.min(at), b.max(at))))
+        });
+        if frame.caption.is_empty() {
+            return match self.last {
+                Some(last) => format!("no change since {}", self.moment(last)),
+                None => "no change yet".to_owned(),
+            };
+        }
+        let mut parts = vec![words::shorten(home, LONGEST_NAME).into_owned()];
+        if let Some((first, last)) = span {
+            self.last = Some(last);
+            let (first, last) = (self.moment(first), self.moment(last));
+            parts.push(if first == last {
+                first
             } else {
-                phrases.extend(all.iter().map(|h| self.phrase(h)));
-            }
+                format!("{first} – {last}")
+            });
+        } else if let [one] = &frame.lasting[..] {
+            parts.push(format!("since {}", self.moment(one.since)));
         }
-        phrases
+        let leaves = frame.headlines.iter().filter(|h| {
+            let entry = self.entry(h.entry);
+            entry.is_some_and(|e| Part::of(e, frame.span) == Part::Leaves)
+        });
+        let away = frame.lasting.iter().filter(|l| l.ended.is_none());
+        let mut whats = leaves.map(|h| h.what).chain(away.map(|l| l.what));
+        parts.extend(whats.find_map(|what| self.missed(what, home)));
+        parts.retain(|part| !part.is_empty());
+        parts.join(" · ")
     }
 
-    /// A phrase for what is back from a silence or an absence that an earlier window told; it stands for no headline.
-    pub(crate) fn back(&self, window: Span) -> Option<Phrase> {
-        let from = self.lasting.partition_point(|(at, _)| *at < window.start);
-        let to = self.lasting.partition_point(|(at, _)| *at < window.end);
-        let ended = self.lasting[from..to.max(from)].iter();
-        let back: Vec<&Entry> = ended
-            .map(|(_, e)| *e)
-            .filter(|e| e.time < window.start)
-            .collect();
-        let text = match &back[..] {
-            [] => return None,
-            [one] => {
-                let away = words::duration(one.until.unwrap_or(one.time).since(one.time));
-                format!("{} is back after {away}", self.name(one.what))
-            }
-            all => {
-                let names: Vec<String> = all.iter().map(|e| self.short(e.what)).collect();
-                format!("{} are back", words::some_of(&names, MOST_NAMED))
-            }
-        };
-        Some(Phrase { text, headlines: 0 })
+    fn moment(&self, at: Stamp) -> String {
+        const SECOND: i64 = 1_000_000_000;
+        words::moment(
+            at.since(self.start)
+                .div_euclid(SECOND)
+                .saturating_mul(SECOND),
+        )
     }
 
-    /// `4 nodes stopped with 5 topics (planner, costmap, …)`.
-    fn together(&self, kind: Kind, all: &[&Headline]) -> Phrase {
-        let topics: usize = all.iter().filter_map(|h| self.topics.get(&h.entry)).sum();
-        let what = together(kind).unwrap_or_default();
-        let names: Vec<String> = all
-            .iter()
-            .map(|h| self.short(h.what))
-            .take(MOST_NAMED)
-            .collect();
-        Phrase {
-            text: format!(
-                "{} {what}{}{} ({}, …)",
-                all.len(),
-                self.verb(kind),
-                with(topics),
-                names.join(", ")
-            ),
-            headlines: all.len(),
-        }
-    }
-
-    fn phrase(&self, headline: &Headline) -> Phrase {
-        let name = self.name(headline.what);
-        let topics = self.topics.get(&headline.entry).copied().unwrap_or(0);
-        let text = match headline.kind {
-            Kind::Started | Kind::Stopped | Kind::Restarted | Kind::Silent => {
-                format!("{name} {}{}", self.verb(headline.kind), with(topics))
-            }
-            Kind::Appeared | Kind::Vanished => self
-                .edge(headline)
-                .unwrap_or_else(|| format!("{name} {}", self.verb(headline.kind))),
-            Kind::HandedOver | Kind::Rate | Kind::Lifecycle | Kind::Type | Kind::Qos => {
-                self.changed(headline, &name)
-            }
-        };
-        Phrase { text, headlines: 1 }
-    }
-
-    fn changed(&self, headline: &Headline, name: &str) -> String {
-        let entry = self.ledger.entries.get(headline.entry as usize);
-        match entry.map(|e| &e.detail) {
-            Some(Detail::Rates { from_hz, to_hz }) => {
-                format!("{name} {}", words::rate_change(*from_hz, *to_hz))
-            }
-            Some(Detail::Senders { from, to }) => {
-                let (from, to) = (self.people(from), self.people(to));
-                let (from, to) = (prefixed(" from ", &from), prefixed(" to ", &to));
-                format!("{name} handed over{from}{to}")
-            }
-            Some(Detail::Values { from, to })
-                if headline.kind == Kind::Lifecycle || self.ledger.compares =>
-            {
-                match &**from {
-                    "" => format!("{name} {}", clip(to)),
-                    from => format!("{name} {} → {}", clip(from), clip(to)),
-                }
-            }
-            _ if headline.kind == Kind::Type => format!("{name} changed its type"),
-            _ if headline.kind == Kind::Qos => format!("{name} changed its quality of service"),
-            _ => format!("{name} changed"),
-        }
-    }
-
-    /// The verb of a kind of headline, which follows the name of the element it is about.
-    fn verb(&self, kind: Kind) -> &'static str {
-        match kind {
-            Kind::Silent => "fell silent",
-            Kind::Lifecycle => "changed",
-            kind => self.ledger.word(kind),
-        }
-    }
-
-    /// The phrase for a headline of an edge: `b now subscribes /t`; `None` for one of a node or topic.
-    fn edge(&self, headline: &Headline) -> Option<String> {
-        let (Some(node), Some(topic)) = self.elements.ends(headline.what) else {
+    /// Who misses the topic of a node that is away: `a, b get no detections`; `None` where nobody is known to.
+    fn missed(&self, what: Element, home: &str) -> Option<String> {
+        let Element::Node(node) = what else {
             return None;
         };
-        let verb = match headline.what {
-            Element::Publish(_) => "publishes",
-            _ => "subscribes to",
+        let (topic, nodes) = self.audience.of(node)?;
+        let names: Vec<String> = nodes
+            .iter()
+            .filter(|id| self.viewed.sees(Element::Node(**id)))
+            .map(|id| self.name(Element::Node(*id), home))
+            .collect();
+        let gets = match names.len() {
+            0 => return None,
+            1 => "gets",
+            _ => "get",
         };
-        let node = self.name(Element::Node(node));
-        let topic = self.name(Element::Topic(topic));
-        if self.ledger.compares {
-            let side = self.verb(headline.kind);
-            return Some(format!("{node} {verb} {topic} {side}"));
+        let topic = self.name(Element::Topic(topic), home);
+        Some(format!(
+            "{} {gets} no {topic}",
+            words::some_of(&names, MOST_NAMED)
+        ))
+    }
+
+    /// An event of an earlier window in this one.
+    fn lasting(&self, lasting: &Lasting, home: &str) -> (u8, Phrase) {
+        let name = self.name(lasting.what, home);
+        match lasting.ended {
+            None => (12, said(' ', "", name, "still away")),
+            Some(end) => {
+                let away = words::duration(end.since(lasting.since));
+                (6, said(' ', "", name, &format!("back after {away}")))
+            }
         }
-        let now = match headline.kind {
-            Kind::Appeared => "now",
-            _ => "no longer",
+    }
+
+    /// The place of a headline among the phrases, and its phrase. What ended comes before what began.
+    fn phrase(&self, headline: &Headline, part: Part, home: &str) -> (u8, Phrase) {
+        let name = self.name(headline.what, home);
+        let kind = headline.kind;
+        if self.ledger.compares {
+            return self.compared(headline, home);
+        }
+        if part == Part::Leaves {
+            return (1, said('−', "", name, "goes away"));
+        }
+        match kind {
+            Kind::Stopped => (0, said('−', "", name, "stops")),
+            Kind::Vanished | Kind::Appeared => self.edge(headline, home),
+            Kind::Silent => (3, said(' ', "", name, "falls silent")),
+            Kind::Started => (4, said('+', "", name, "starts")),
+            Kind::Restarted => {
+                let entry = self.entry(headline.entry);
+                let away = entry.and_then(|e| Some(e.until?.since(e.time)));
+                let away = away.filter(|nanos| *nanos > 0);
+                let tail = away.map_or_else(String::new, |nanos| {
+                    format!("after {}", words::duration(nanos))
+                });
+                (
+                    7,
+                    said(' ', "", name, format!("restarts {tail}").trim_end()),
+                )
+            }
+            Kind::HandedOver | Kind::Lifecycle | Kind::Type | Kind::Qos | Kind::Rate => {
+                self.changed(headline, name, home)
+            }
+        }
+    }
+
+    fn changed(&self, headline: &Headline, name: String, home: &str) -> (u8, Phrase) {
+        match self.entry(headline.entry).map(|e| &e.detail) {
+            Some(Detail::Rates { from_hz, to_hz }) => {
+                let change = words::rate_change(*from_hz, *to_hz);
+                (11, said(' ', "", format!("{name} {change}"), ""))
+            }
+            Some(Detail::Senders { from, to }) if !from.is_empty() && !to.is_empty() => {
+                let verb = if to.len() == 1 { "takes" } else { "take" };
+                let lead = format!("{} {verb} over", self.people(to, home));
+                let tail = format!("from {}", self.people(from, home));
+                (8, said(' ', &lead, name, &tail))
+            }
+            Some(Detail::Senders { .. }) => (8, said(' ', "", name, "handed over")),
+            Some(Detail::Values { from, to }) if headline.kind == Kind::Lifecycle => {
+                let tail = match &**from {
+                    "" => format!("→ {}", clip(to)),
+                    from => format!("{} → {}", clip(from), clip(to)),
+                };
+                (9, said(' ', "", name, &tail))
+            }
+            _ if headline.kind == Kind::Qos => {
+                (10, said(' ', "", name, "with another quality of service"))
+            }
+            _ => (10, said(' ', "", name, "with another type")),
+        }
+    }
+
+    /// A topic that begins or ends, or a connection of a node that stays.
+    fn edge(&self, headline: &Headline, home: &str) -> (u8, Phrase) {
+        let begins = headline.kind == Kind::Appeared;
+        let (place, sign) = if begins { (5, '+') } else { (2, '−') };
+        let name = self.name(headline.what, home);
+        let (Some(node), Some(_)) = self.elements.ends(headline.what) else {
+            let verb = if begins { "appears" } else { "ends" };
+            return (place, said(sign, "", name, verb));
         };
-        Some(format!("{node} {now} {verb} {topic}"))
+        let verb = match (headline.what, begins) {
+            (Element::Publish(_), true) => "publishes",
+            (Element::Publish(_), false) => "no longer publishes",
+            (_, true) => "subscribes to",
+            (_, false) => "no longer subscribes to",
+        };
+        let lead = format!("{} {verb}", self.name(Element::Node(node), home));
+        (place, said(sign, &lead, name, ""))
     }
 
-    /// The full name of a node (as a role) or topic; of an edge, that of its topic.
-    fn name(&self, what: Element) -> String {
-        clip(self.whole_name(what).unwrap_or_default())
+    /// A difference of two missions.
+    fn compared(&self, headline: &Headline, home: &str) -> (u8, Phrase) {
+        let name = self.name(headline.what, home);
+        let (place, sign) = match headline.kind {
+            Kind::Stopped | Kind::Vanished => (0, '−'),
+            Kind::Started | Kind::Appeared => (1, '+'),
+            Kind::Rate | Kind::HandedOver => return self.changed(headline, name, home),
+            _ => {
+                let entry = self.entry(headline.entry);
+                let Some(Detail::Values { from, to }) = entry.map(|e| &e.detail) else {
+                    return self.changed(headline, name, home);
+                };
+                let change = format!("{name} {} → {}", clip(from), clip(to));
+                return (9, said(' ', "", change.replace("  ", " "), ""));
+            }
+        };
+        let lead = match (headline.what, self.elements.ends(headline.what).0) {
+            (Element::Publish(_), Some(node)) => {
+                format!("{} publishes", self.name(Element::Node(node), home))
+            }
+            (Element::Subscribe(_), Some(node)) => {
+                format!("{} subscribes to", self.name(Element::Node(node), home))
+            }
+            _ => String::new(),
+        };
+        (
+            place,
+            said(sign, &lead, name, self.ledger.word(headline.kind)),
+        )
     }
 
-    fn whole_name(&self, what: Element) -> Option<&str> {
-        match what {
+    /// The name of a node (as a role) or topic below `home`, in full outside it; of an edge, that of its topic.
+    fn name(&self, what: Element, home: &str) -> String {
+        let name = match what {
             Element::Node(id) => self.node_name(id),
             _ => self.elements.names(what).1,
+        };
+        let name = without_transport(name.unwrap_or_default());
+        let below = name.strip_prefix(home).filter(|_| !home.is_empty());
+        let below = below.and_then(|rest| rest.strip_prefix('/'));
+        clip(below.unwrap_or(name))
+    }
+
+    /// The node, or the topic where it is about none.
+    fn subject(&self, what: Element) -> Option<&'a str> {
+        match self.elements.ends(what).0 {
+            Some(node) => self.node_name(node),
+            None => self.elements.names(what).1,
         }
     }
 
     /// The label of its box; its role if it has no box of its own.
-    fn node_name(&self, id: NodeId) -> Option<&str> {
+    fn node_name(&self, id: NodeId) -> Option<&'a str> {
         let item = self.viewed.node.get(id as usize).copied().flatten();
         let item = item.and_then(|at| self.viewed.items.get(at as usize));
         match item.filter(|i| i.kind == ItemKind::Node && !i.is_replica) {
@@ -220,56 +290,153 @@ impl<'a> Speaker<'a> {
         }
     }
 
-    fn short(&self, what: Element) -> String {
-        clip(last_part(self.whole_name(what).unwrap_or_default()))
-    }
-
-    /// Nodes by name, whether or not they are shown: `/planner`, `/planner and /teleop`, `4 nodes`.
-    fn people(&self, nodes: &[NodeId]) -> String {
+    fn people(&self, nodes: &[NodeId], home: &str) -> String {
         let names: Vec<String> = nodes
             .iter()
-            .map(|id| self.name(Element::Node(*id)))
+            .map(|id| self.name(Element::Node(*id), home))
             .collect();
-        match &names[..] {
-            [] => String::new(),
-            [one] => one.clone(),
-            [one, two] => format!("{one} and {two}"),
-            more => format!("{} nodes", more.len()),
+        words::some_of(&names, 2)
+    }
+}
+
+/// The subscribers of topics with one publisher.
+struct Audience<'a> {
+    elements: &'a Elements,
+    publishers: BTreeMap<TopicId, Vec<NodeId>>,
+    subscribers: BTreeMap<TopicId, Vec<NodeId>>,
+    published: BTreeMap<NodeId, Vec<TopicId>>,
+}
+
+impl<'a> Audience<'a> {
+    fn new(elements: &'a Elements) -> Self {
+        let mut all = Self {
+            elements,
+            publishers: BTreeMap::new(),
+            subscribers: BTreeMap::new(),
+            published: BTreeMap::new(),
+        };
+        for edge in &elements.publishes {
+            all.publishers
+                .entry(edge.topic)
+                .or_default()
+                .push(edge.node);
+            all.published.entry(edge.node).or_default().push(edge.topic);
+        }
+        for edge in &elements.subscribes {
+            all.subscribers
+                .entry(edge.topic)
+                .or_default()
+                .push(edge.node);
+        }
+        all
+    }
+
+    /// The topic that only this node, or other runs of it, publish with most subscribers, and those.
+    fn of(&self, node: NodeId) -> Option<(TopicId, &[NodeId])> {
+        let topics = self.published.get(&node)?.iter().copied();
+        let name = |topic: TopicId| self.elements.topics.get(topic as usize).map(|t| &t.name);
+        let role = |id: NodeId| self.elements.nodes.get(id as usize).map(|n| &n.role);
+        let own = topics.filter(|topic| {
+            let is_shown = name(*topic).is_some_and(|name| !is_quiet(name.as_str()));
+            let mut publishers = self.publishers.get(topic).into_iter().flatten();
+            is_shown && publishers.all(|other| role(*other) == role(node))
+        });
+        let missed = own.filter_map(|topic| Some((topic, &self.subscribers.get(&topic)?[..])));
+        missed.max_by_key(|(topic, nodes)| (nodes.len(), std::cmp::Reverse(*topic)))
+    }
+}
+
+fn said(sign: char, lead: &str, name: String, tail: &str) -> Phrase {
+    Phrase {
+        sign,
+        lead: lead.to_owned(),
+        names: vec![name],
+        tail: tail.to_owned(),
+    }
+}
+
+/// Adds a phrase to an equal one.
+fn add(groups: &mut Groups, (place, phrase): (u8, Phrase)) {
+    let key = (place, [phrase.lead.clone(), phrase.tail.clone()]);
+    match groups.entry(key) {
+        std::collections::btree_map::Entry::Vacant(new) => {
+            new.insert(phrase);
+        }
+        std::collections::btree_map::Entry::Occupied(mut old) => {
+            old.get_mut().names.extend(phrase.names);
         }
     }
 }
 
-/// The noun for several headlines of a kind; `None` for kinds of which each is told by its name.
-fn together(kind: Kind) -> Option<&'static str> {
-    Some(match kind {
-        Kind::Started | Kind::Stopped | Kind::Restarted => "nodes ",
-        Kind::Silent => "",
-        Kind::Appeared | Kind::Vanished => "connections and topics ",
-        Kind::Lifecycle => "states ",
-        Kind::HandedOver | Kind::Rate | Kind::Type | Kind::Qos => return None,
-    })
+/// A phrase with its verb in the number of its names.
+fn plural(phrase: Phrase) -> Phrase {
+    const VERBS: [(&str, &str); 7] = [
+        ("goes away", "go away"),
+        ("stops", "stop"),
+        ("falls silent", "fall silent"),
+        ("starts", "start"),
+        ("appears", "appear"),
+        ("ends", "end"),
+        ("restarts", "restart"),
+    ];
+    let verb = VERBS.iter().find(|(one, _)| phrase.tail.starts_with(one));
+    let many = verb.filter(|_| phrase.names.len() > 1 && phrase.lead.is_empty());
+    let tail = many.map(|(one, many)| phrase.tail.replacen(one, many, 1));
+    Phrase {
+        tail: tail.unwrap_or(phrase.tail),
+        ..phrase
+    }
 }
 
-fn with(topics: usize) -> String {
-    match topics {
-        0 => String::new(),
-        n => format!(" with {}", words::count(n, "topic")),
+/// The namespace below which names are written without it: the one around all names that have one, else that of most
+/// of them; empty where all stand at the root.
+fn home<'n>(names: impl Iterator<Item = &'n str>) -> &'n str {
+    let spaces = names.map(|name| namespace(without_transport(name)));
+    let spaces: Vec<&str> = spaces.filter(|space| *space != "/").collect();
+    let Some(first) = spaces.first() else {
+        return "";
+    };
+    let around = spaces.iter().fold(*first, |a, b| shared(a, b));
+    if !around.is_empty() {
+        return around;
     }
+    let mut most: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
+    for space in spaces {
+        let end = space[1..].find('/').map_or(space.len(), |at| at + 1);
+        let (count, around) = most.entry(&space[..end]).or_insert((0, space));
+        (*count, *around) = (*count + 1, shared(around, space));
+    }
+    // Of equal ones the first.
+    let best = most.values().rev().max_by_key(|(count, _)| *count);
+    best.map_or("", |(_, around)| around)
+}
+
+/// The namespace around two others; empty for the root.
+fn shared<'n>(a: &'n str, b: &str) -> &'n str {
+    let mut end = 0;
+    for (x, y) in a.split('/').zip(b.split('/')) {
+        if x != y {
+            break;
+        }
+        end += x.len() + 1;
+    }
+    &a[..end.saturating_sub(1).min(a.len())]
+}
+
+/// The name of an image topic without its transport.
+fn without_transport(name: &str) -> &str {
+    const TRANSPORTS: [&str; 3] = ["/compressed", "/compressedDepth", "/theora"];
+    let cut = TRANSPORTS.iter().find_map(|end| name.strip_suffix(end));
+    cut.filter(|rest| !rest.is_empty()).unwrap_or(name)
 }
 
 fn clip(name: &str) -> String {
     words::shorten(name, LONGEST_NAME).into_owned()
 }
 
-fn prefixed(prefix: &str, text: &str) -> String {
-    match text {
-        "" => String::new(),
-        _ => format!("{prefix}{text}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::{home, shared};
     use crate::view::testing::mission;
     use crate::view::{Frame, Mark, ViewOptions, view};
 
@@ -284,40 +451,44 @@ mod tests {
     }
 
     #[test]
-    fn nodes_come_with_their_topics() {
+    fn started_nodes_are_named_below_their_namespace() {
+        let frame = last(&["/a", "/a /cam/driver>/cam/image /cam/driver>/cam/info"]);
+        assert_eq!(frame.words(usize::MAX), "+ driver starts");
+        assert!(frame.note.starts_with("/cam · "), "{}", frame.note);
+        assert_eq!(caption(&["/a /b>/t", "/a"]), "− /b stops");
         assert_eq!(
-            caption(&["/a", "/a /cam/driver>/cam/image /cam/driver>/cam/info"]),
-            "/cam/driver started with 2 topics"
+            caption(&["/a /b>/t", "/a /c /d"]),
+            "− /b stops; + /c, /d start"
         );
-        assert_eq!(caption(&["/a /b>/t", "/a"]), "/b stopped with 1 topic");
     }
 
     #[test]
     fn topics_rates_and_connections_have_their_own_words() {
-        assert_eq!(caption(&["/a", "/a =/s/scan"]), "/s/scan appeared");
+        assert_eq!(caption(&["/a", "/a =/s/scan"]), "+ scan appears");
         assert_eq!(
             caption(&["=/s/scan@15", "=/s/scan@7.4"]),
-            "/s/scan 15 → 7.4 Hz"
+            "scan 15 → 7.4 Hz"
         );
         assert_eq!(
             caption(&["/a>/t /b", "/a>/t /b</t"]),
-            "/b now subscribes to /t"
+            "+ /b subscribes to /t"
         );
         assert_eq!(
-            caption(&["/a>/t /b>/t", "/a>/t /b"]),
-            "/b no longer publishes /t"
+            caption(&["/a>/t /a>/u /b>/t /b>/u", "/a>/t /a>/u /b"]),
+            "− /b no longer publishes /t, /u"
         );
         assert_eq!(caption(&["/a", "/a"]), "");
+        assert_eq!(last(&["/a", "/a"]).note, "no change yet");
     }
 
     #[test]
-    fn a_hand_over_is_told_once() {
+    fn a_hand_over_is_reported_once() {
         let windows = ["/planner>/cmd_vel@2 /teleop", "/planner /teleop>/cmd_vel@2"];
         let (view, _) = view(&mission(&windows), &ViewOptions::default());
         let (frame, seen) = (&view.frames[1], view.seen(1));
         assert_eq!(
             frame.words(usize::MAX),
-            "/cmd_vel handed over from /planner to /teleop"
+            "/teleop takes over /cmd_vel from /planner"
         );
         let topic = seen.items.last().unwrap();
         assert_eq!(
@@ -327,17 +498,29 @@ mod tests {
     }
 
     #[test]
-    fn the_words_of_a_caption_stand_for_all_headlines() {
+    fn names_give_way_until_the_headline_fits_its_line() {
         let name = "x".repeat(10_000);
         let now = format!("/{name} /b /c /d =/e =/h@5 =/i@5 =/j@5 =/k@5 =/l@5");
         let frame = last(&["/m =/h@1 =/i@1 =/j@1 =/k@1 =/l@1", &now]);
-        let told: usize = frame.caption.iter().map(|p| p.headlines).sum();
-        assert_eq!((told, frame.counts.total()), (11, 11));
+        let named: usize = frame.caption.iter().map(|p| p.names.len()).sum();
+        assert_eq!((named, frame.counts.total()), (11, 11));
         assert_eq!(frame.headlines.len(), 11);
         assert_eq!(
             frame.words(3),
-            "4 nodes started (b, c, d, …); /m stopped; /e appeared; and 5 more"
+            "− /m stops; + /b, /c, /d, +1 start; + /e appears; +5"
         );
-        assert!(frame.words(usize::MAX).len() < 400);
+        assert!(frame.fitting(|_| true).contains("/k 1 → 5 Hz"));
+        let short = frame.fitting(|text| text.chars().count() < 40);
+        assert_eq!(short, "− /m stops; + /b, +3 start; +6");
+        assert_eq!(frame.fitting(|_| false), "− /m stops; +10");
+    }
+
+    #[test]
+    fn the_namespace_of_most_names_is_left_out() {
+        assert_eq!(home(["/r1/a", "/r1/nav/b", "/c"].into_iter()), "/r1");
+        assert_eq!(home(["/r1/x/a", "/r2/b", "/r2/c"].into_iter()), "/r2");
+        assert_eq!(home(["/a", "/b"].into_iter()), "");
+        assert_eq!(home(["/cam/image/compressed"].into_iter()), "/cam");
+        assert_eq!(shared("/robot1", "/robot10"), "");
     }
 }

@@ -2,6 +2,7 @@
 
 use super::caption::Speaker;
 use super::items::Viewed;
+use super::lasting::LastingEvents;
 use super::lives::{Alive, ItemTurns};
 use super::marks::{News, Parts, Told};
 use super::settle::{Lengths, settled};
@@ -9,6 +10,7 @@ use super::showing::{Showing, ShowingWriter};
 use super::state::{LivingItems, Now};
 use super::{ArrowKind, Attendance, Counts, Frame, ItemKind, Mark, Shown, ViewOptions};
 use crate::graph::Element;
+use crate::mission::ledger::EntryId;
 use crate::mission::{Mission, Window};
 
 /// The windows, and the looks of each item and arrow in them.
@@ -22,7 +24,7 @@ pub(crate) struct Frames {
 /// The windows one after the other. In one without headlines, only elements whose numbers changed are looked at.
 pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) -> Frames {
     let mut stage = ShownWindows::new(mission, options, viewed);
-    let speaker = Speaker::new(mission, viewed);
+    let mut speaker = Speaker::new(mission, viewed);
     let mut walk = mission.graphs.walk();
     let mut list = Vec::with_capacity(mission.windows.len());
     let turns = turns(mission);
@@ -34,19 +36,18 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
         } else {
             stage.go_on(at);
         }
-        let told = std::mem::take(&mut stage.turn.news.headlines);
-        let mut caption = speaker.caption(&told);
-        caption.extend(speaker.back(window.span));
-        list.push(Frame {
-            index: window.index,
-            span: window.span,
+        let headlines = std::mem::take(&mut stage.turn.news.headlines);
+        let mut frame = Frame {
             partial: window.partial,
             messages: window.messages,
-            counts: Counts::of(&told),
-            caption,
-            headlines: told,
+            counts: Counts::of(&headlines),
+            headlines,
+            lasting: stage.turn.news.lasting.clone(),
             rolls: stage.rolls.clone(),
-        });
+            ..Frame::empty(window.index, window.span)
+        };
+        speaker.tell(&mut frame);
+        list.push(frame);
     }
     let lengths = Lengths::new(mission.windows.iter().map(|w| w.span));
     Frames {
@@ -82,6 +83,7 @@ struct ShownWindows<'a> {
     viewed: &'a Viewed,
     lives: ItemTurns<'a>,
     parts: Parts,
+    lasting: LastingEvents<'a>,
     now: Now<'a>,
     turn: WindowTurn,
     rolls: Vec<Vec<Attendance>>,
@@ -142,6 +144,7 @@ impl<'a> ShownWindows<'a> {
             viewed,
             lives: ItemTurns::new(mission),
             parts: mission.ledger.all_parts(),
+            lasting: LastingEvents::new(&mission.ledger, viewed),
             now: Now::new(mission, options, viewed),
             turn: WindowTurn::default(),
             rolls: Vec::new(),
@@ -175,7 +178,12 @@ impl<'a> ShownWindows<'a> {
         self.turn = WindowTurn {
             before: LivingItems::of(self.viewed, &before),
             after: LivingItems::of(self.viewed, &after),
-            news: News::new(&self.mission.ledger, &self.parts, span, self.viewed),
+            news: News::new(
+                &self.mission.ledger,
+                &self.parts,
+                (span, self.lasting.at(span)),
+                self.viewed,
+            ),
         };
         self.rolls = rolls(self.viewed, &before, &after, window.index == 0);
         self.items.take_touched();
@@ -190,7 +198,8 @@ impl<'a> ShownWindows<'a> {
         }
     }
 
-    /// Shows a window without headlines after another without: everything that is there stays there.
+    /// Shows a window without headlines after another without: everything that is there stays there, and what is away
+    /// stays away.
     fn go_on(&mut self, at: u32) {
         for who in self.rolls.iter_mut().flatten() {
             *who = match who {
@@ -201,6 +210,8 @@ impl<'a> ShownWindows<'a> {
         for id in self.items.take_touched() {
             let is_there = self.turn.after.items[id as usize];
             let shown = is_there.then(|| self.now.item(id)).flatten();
+            let told = self.turn.news.items.get(&id);
+            let shown = shown.and_then(|shown| marked(shown, (true, true), told));
             self.items.show(at, id, shown);
         }
         for id in self.arrows.take_touched() {
@@ -209,6 +220,14 @@ impl<'a> ShownWindows<'a> {
             let ends = is_item(arrow.from) && is_item(arrow.to);
             let is_there = ends && self.turn.after.arrows[id as usize];
             let shown = is_there.then(|| self.now.arrow(id)).flatten();
+            let shown = shown.and_then(|shown| {
+                let news = &self.turn.news;
+                let ends = [arrow.from, arrow.to].map(|id| news.items.get(&id));
+                let ends = ends.map(|told| told.map(|told| (told.mark, &told.entries[..])));
+                let told = news.arrows.get(&id).cloned();
+                let told = told.or_else(|| with_ends((true, true), ends));
+                marked(shown, (true, true), told.as_ref())
+            });
             self.arrows.show(at, id, shown);
         }
     }
@@ -276,9 +295,11 @@ impl WindowTurn {
             let ends = [from.marked.as_ref()?, to.marked.as_ref()?];
             let at = id as usize;
             // A node that restarts keeps its arrows, though it is away when the window ends.
-            let is_back = ends.iter().any(|end| end.mark == Some(Mark::Restarted));
-            let there = (self.before.arrows[at], self.after.arrows[at] || is_back);
+            let is_back = |end: &&Shown| matches!(end.mark, Some(Mark::Restarted | Mark::Away));
+            let is_kept = ends.iter().any(is_back);
+            let there = (self.before.arrows[at], self.after.arrows[at] || is_kept);
             let told = self.news.arrows.get(&id).cloned();
+            let ends = ends.map(|end| Some((end.mark, &end.entries[..])));
             let told = told.or_else(|| with_ends(there, ends));
             let shown = marked(shown, there, told.as_ref())?;
             let is_bundle = arrow.kind == ArrowKind::Bundle;
@@ -296,18 +317,23 @@ impl WindowTurn {
     }
 }
 
-/// The news of an arrow that follows from its ends; `there` says whether it was there before and is there after.
-fn with_ends(there: (bool, bool), ends: [&Shown; 2]) -> Option<Told> {
-    let mark = match there {
-        (false, true) => Mark::Added,
-        (_, false) => Mark::Removed,
-        (true, true) => return None,
+/// The news of an arrow that follows from the marks of its ends and their events; `there` says whether it was there
+/// before and is there after.
+fn with_ends(there: (bool, bool), ends: [Option<(Option<Mark>, &[EntryId])>; 2]) -> Option<Told> {
+    let marks: &[Mark] = match there {
+        (false, true) => &[Mark::Added],
+        (_, false) => &[Mark::Removed],
+        // Lines stay, dotted, while one of their ends is away.
+        (true, true) => &[Mark::Removed, Mark::Away],
     };
-    let end = ends.into_iter().find(|end| end.mark == Some(mark))?;
+    let of = |mark: Option<Mark>| mark.filter(|mark| marks.contains(mark));
+    let mut ends = ends.into_iter().flatten();
+    let (mark, entries) = ends.find_map(|(mark, all)| Some((of(mark)?, all)))?;
     Some(Told {
         came: mark == Mark::Added,
         went: mark == Mark::Removed,
-        entries: end.entries.clone(),
+        mark: Some(mark).filter(|_| there == (true, true)),
+        entries: entries.to_vec(),
         ..Told::default()
     })
 }

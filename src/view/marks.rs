@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::items::{EdgePlace, Viewed};
-use super::{Headline, ItemKind, Mark};
+use super::lasting::Part;
+use super::{Headline, ItemKind, Lasting, Mark};
 use crate::base::time::Span;
 use crate::graph::Element;
 use crate::mission::Ledger;
@@ -30,15 +31,27 @@ pub(crate) type Parts = BTreeMap<EntryId, Vec<EntryId>>;
 #[derive(Default)]
 pub(crate) struct News {
     pub(crate) headlines: Vec<Headline>,
+    pub(crate) lasting: Vec<Lasting>,
     pub(crate) items: BTreeMap<u32, Told>,
     pub(crate) arrows: BTreeMap<u32, Told>,
 }
 
 impl News {
-    /// The news of the window `span`. `parts` are the parts of each headline; they are told with it, whenever they were
-    /// seen.
-    pub(crate) fn new(ledger: &Ledger, parts: &Parts, span: Span, viewed: &Viewed) -> Self {
+    /// The news of the window `span`, with the events of earlier windows that last. `parts` are the parts of each
+    /// headline; they are told with it, whenever they were seen.
+    pub(crate) fn new(
+        ledger: &Ledger,
+        parts: &Parts,
+        (span, lasting): (Span, Vec<Lasting>),
+        viewed: &Viewed,
+    ) -> Self {
         let mut news = Self::default();
+        for last in &lasting {
+            if let Some(entry) = ledger.entries.get(last.entry as usize) {
+                news.tell(viewed, entry, last.entry, last.part());
+            }
+        }
+        news.lasting = lasting;
         for (id, entry) in ledger.headlines(span) {
             if !viewed.sees(entry.what) {
                 continue;
@@ -49,20 +62,20 @@ impl News {
                 what: entry.what,
                 time: entry.time,
             });
-            news.tell(viewed, entry, id);
+            news.tell(viewed, entry, id, Part::of(entry, span));
             // One that came back says so by itself.
             let parts = parts.get(&id).filter(|_| entry.kind != Kind::Restarted);
             for part in parts.into_iter().flatten() {
                 if let Some(part) = ledger.entries.get(*part as usize) {
-                    news.tell(viewed, part, id);
+                    news.tell(viewed, part, id, Part::Whole);
                 }
             }
         }
         news
     }
 
-    fn tell(&mut self, viewed: &Viewed, entry: &Entry, headline: EntryId) {
-        let sign = EntrySign::of(entry, headline);
+    fn tell(&mut self, viewed: &Viewed, entry: &Entry, headline: EntryId, part: Part) {
+        let sign = EntrySign::of(entry, headline, part);
         self.add(viewed, entry.what, &sign);
         match (&entry.detail, entry.what) {
             (Detail::Senders { from, to }, Element::Topic(topic)) => {
@@ -162,14 +175,16 @@ impl Reach {
 /// The effect of one entry on the item or arrow that it is told on.
 struct EntrySign {
     kind: Kind,
+    part: Part,
     rates: Option<(f64, f64)>,
     headline: EntryId,
 }
 
 impl EntrySign {
-    fn of(entry: &Entry, headline: EntryId) -> Self {
+    fn of(entry: &Entry, headline: EntryId, part: Part) -> Self {
         Self {
             kind: entry.kind,
+            part,
             rates: match entry.detail {
                 Detail::Rates { from_hz, to_hz } => Some((from_hz, to_hz)),
                 _ => None,
@@ -181,6 +196,12 @@ impl EntrySign {
     /// The mark on something that was there before and still is.
     fn mark(&self, reach: Reach) -> Option<Mark> {
         let is_faster = self.rates.is_some_and(|(from, to)| to > from);
+        match (self.part, reach) {
+            (_, Reach::Part | Reach::Inside) | (Part::Whole, _) => {}
+            (Part::Leaves, Reach::Whole) => return Some(Mark::Removed),
+            (Part::Away, Reach::Whole) => return Some(Mark::Away),
+            (Part::Back, Reach::Whole) => return Some(Mark::Restarted),
+        }
         match (self.kind, reach) {
             (Kind::Rate, Reach::Whole | Reach::Part) if is_faster => Some(Mark::Faster),
             (Kind::Rate, Reach::Whole | Reach::Part) => Some(Mark::Slower),
@@ -211,10 +232,11 @@ impl EntrySign {
 
 fn weight(mark: Mark) -> u8 {
     match mark {
+        Mark::Removed => 5,
         Mark::HandedOver | Mark::Restarted => 4,
         Mark::Paused => 3,
         Mark::Changed => 2,
-        Mark::Inside => 1,
-        Mark::Faster | Mark::Slower | Mark::Added | Mark::Removed => 0,
+        Mark::Inside | Mark::Away => 1,
+        Mark::Faster | Mark::Slower | Mark::Added => 0,
     }
 }

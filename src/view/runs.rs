@@ -157,6 +157,7 @@ pub(crate) fn word(mark: Mark) -> &'static str {
         Mark::Paused => "paused",
         Mark::Changed => "other",
         Mark::Inside => "inside",
+        Mark::Away => "away",
     }
 }
 

@@ -98,7 +98,7 @@ impl<'a> DotView<'a> {
     fn colour(&self, shown: &Shown) -> Option<String> {
         let change = match shown.mark? {
             Mark::Added => &self.style.added,
-            Mark::Removed => &self.style.removed,
+            Mark::Removed | Mark::Away => &self.style.removed,
             _ => &self.style.changed,
         };
         Some(change.color.to_string().to_lowercase())
@@ -110,6 +110,7 @@ impl<'a> DotView<'a> {
 fn line(shown: &Shown) -> &'static str {
     use crate::evidence::Degree;
     match (shown.mark, shown.degree, shown.state) {
+        (Some(Mark::Away), ..) => "dotted",
         (Some(Mark::Removed), ..) | (_, Degree::Inferred, _) => "dashed",
         (_, Degree::Declared, _) | (.., State::Silent | State::Declared) => "dotted",
         _ => "solid",

@@ -10,6 +10,10 @@ use crate::view::Mark;
 
 /// Draws the badge of `mark` around `centre`, `scale` times its size in the style.
 pub(crate) fn badge(group: &mut Group, style: &Style, mark: Mark, centre: Point, scale: f64) {
+    // Its words say since when it is away.
+    if mark == Mark::Away {
+        return;
+    }
     let radius = style.badge.radius * scale;
     let around = |r: f64| Form::Ellipse(Rect::around(centre, Size::new(2.0 * r, 2.0 * r)));
     let color = options::change(style, mark).color;
@@ -95,7 +99,7 @@ fn sign(group: &mut Group, color: Color, mark: Mark, centre: Point, r: f64) {
                 color,
             ));
         }
-        Mark::Inside => {
+        Mark::Away | Mark::Inside => {
             group.shape(Shape::filled(
                 Form::Ellipse(Rect::around(centre, Size::new(1.1 * r, 1.1 * r))),
                 color,

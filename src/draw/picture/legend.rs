@@ -76,7 +76,7 @@ pub(crate) fn signs(view: &View, rate_change: f64) -> Vec<(LegendSign, String)> 
         (
             mark(&[Mark::Restarted]),
             LegendSign::Change(Mark::Restarted),
-            "restarted",
+            "back",
         ),
         (
             mark(&[Mark::Paused]),

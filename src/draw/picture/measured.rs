@@ -329,8 +329,14 @@ pub(crate) fn arrow_label(
     let topic = arrow.carries(shown).map_or_else(String::new, |t| t + " ");
     if arrow.kind == ArrowKind::Bundle {
         let inside = shown.inside.as_deref().map(chips::came_and_went);
-        let parts = [chips::rate_in(shown), inside];
-        let text = topic + &parts.map(Option::unwrap_or_default).join(" ");
+        let rate = match (shown.rates, shown.mark) {
+            (Some((before, now)), _) => Some(words::rate_change(before, now)),
+            // The mean of a window in which a rate changes is no rate of it.
+            (None, Some(Mark::Faster | Mark::Slower)) => None,
+            (None, _) => chips::rate_in(shown),
+        };
+        let inside = inside.filter(|_| shown.rates.is_none());
+        let text = topic + &[rate, inside].map(Option::unwrap_or_default).join(" ");
         return Some((text.trim_end().to_owned(), shown.mark.is_some()));
     }
     if let Some((before, now)) = shown.rates {

@@ -1,7 +1,7 @@
 //! The paint of an element: its mark counts more than its state, and that more than its degree.
 
 use crate::draw::scene::Stroke;
-use crate::draw::style::{Body, Change, Color, Style};
+use crate::draw::style::{Body, Change, Color, Quiet, Style};
 use crate::draw::text::Weight;
 use crate::evidence::Degree;
 use crate::graph::State;
@@ -34,13 +34,16 @@ pub(crate) struct ArrowLook {
 pub(crate) fn change(style: &Style, mark: Mark) -> &Change {
     match mark {
         Mark::Added => &style.added,
-        Mark::Removed => &style.removed,
+        Mark::Removed | Mark::Away => &style.removed,
         _ => &style.changed,
     }
 }
 
 /// The paint of a box.
 pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
+    if shown.mark == Some(Mark::Away) {
+        return quiet_box(&style.away());
+    }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
         return BoxLook {
@@ -69,6 +72,10 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
             };
         }
     };
+    quiet_box(quiet)
+}
+
+fn quiet_box(quiet: &Quiet) -> BoxLook {
     BoxLook {
         fill: quiet.fill,
         stroke: line(quiet.stroke, quiet.width, &quiet.dash),
@@ -82,6 +89,9 @@ pub(crate) fn of_box(style: &Style, body: &Body, shown: &Shown) -> BoxLook {
 pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowLook {
     let edge = &style.edge;
     let latched = shown.state == State::Latched;
+    if shown.mark == Some(Mark::Away) {
+        return quiet_arrow(&style.away());
+    }
     if let Some(mark) = shown.mark {
         let change = change(style, mark);
         let width = match mark {
@@ -102,12 +112,7 @@ pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
         _ => None,
     };
     if let Some(quiet) = quiet {
-        return ArrowLook {
-            stroke: line(quiet.stroke, quiet.width, &quiet.dash),
-            text: quiet.text,
-            dot: false,
-            glow: Color::NONE,
-        };
+        return quiet_arrow(quiet);
     }
     let known = shown.steady_hz.is_some() || *kind == ArrowKind::Publish;
     let width = match shown.degree {
@@ -123,6 +128,15 @@ pub(crate) fn of_arrow(style: &Style, kind: &ArrowKind, shown: &Shown) -> ArrowL
         stroke: line(edge.stroke, width, dash),
         text: edge.text,
         dot: latched,
+        glow: Color::NONE,
+    }
+}
+
+fn quiet_arrow(quiet: &Quiet) -> ArrowLook {
+    ArrowLook {
+        stroke: line(quiet.stroke, quiet.width, &quiet.dash),
+        text: quiet.text,
+        dot: false,
         glow: Color::NONE,
     }
 }

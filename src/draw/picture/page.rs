@@ -1,4 +1,4 @@
-//! The page: its parts for title, caption, graph, legend and timeline, and the scale of the graph in its part.
+//! The page: its parts for title, graph, legend and timeline, and the scale of the graph in its part.
 
 use super::PageOptions;
 use crate::base::geometry::{Point, Rect, Size};
@@ -17,7 +17,6 @@ pub(crate) struct PageFrame {
     pub(crate) unit: f64,
     /// Empty parts (`--bare`) have no height.
     pub(crate) title: Rect,
-    pub(crate) caption: Rect,
     pub(crate) graph: Rect,
     pub(crate) legend: Rect,
     pub(crate) timeline: Rect,
@@ -43,10 +42,9 @@ impl PageFrame {
         let size = options.size;
         let unit = unit(options);
         let strip = |y: f64, height: f64| Rect::new(0.0, y, size.w, height);
-        let (mut title, mut caption, mut legend, mut timeline) = (0.0, 0.0, 0.0, 0.0);
+        let (mut title, mut legend, mut timeline) = (0.0, 0.0, 0.0);
         if !options.bare {
             title = style.title.height * unit;
-            caption = style.caption.height * unit;
             if options.has_legend {
                 legend = (style.legend.size * 1.9 * rows as f64 + 8.0) * unit;
             }
@@ -57,7 +55,7 @@ impl PageFrame {
         let margin = (style.page.margin * unit)
             .min(size.w / 20.0)
             .min(size.h / 20.0);
-        let top = title + caption;
+        let top = title;
         let bottom = (size.h - legend - timeline).max(top + 1.0);
         let above = if options.bare { margin } else { margin / 4.0 };
         let graph = Rect::new(
@@ -70,7 +68,6 @@ impl PageFrame {
             size,
             unit,
             title: strip(0.0, title),
-            caption: strip(title, caption),
             graph: Rect::new(graph.x, graph.y, graph.w.max(1.0), graph.h.max(1.0)),
             legend: strip(bottom, legend),
             timeline: strip(bottom + legend, timeline),

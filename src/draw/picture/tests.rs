@@ -124,7 +124,7 @@ fn a_frame_says_what_changed_in_names_classes_and_words() {
         "a topic without a publisher tells its rate itself"
     );
     assert!(!svg(3).contains("n-cam\""), "a ghost stays for one window");
-    assert!(svg(0).contains("window 1 of 5") && svg(0).contains("no reconfiguration"));
+    assert!(svg(0).contains("window 1 of 5") && svg(0).contains("no change yet"));
 }
 
 #[test]

@@ -1,36 +1,30 @@
-//! The bar on top and the line below it: the bag, the window, its time, the number of changes, and the changes in
-//! words.
+//! The bar on top: what changed in the window, in words, with its time.
 
+use super::PageOptions;
 use super::page::PageFrame;
-use super::{PageOptions, chips};
-use crate::base::geometry::{Point, Rect};
+use crate::base::geometry::Point;
 use crate::base::words;
 use crate::draw::scene::{Anchor, Form, Group, Shape, Stroke, Text, line};
 use crate::draw::style::{Color, Style};
 use crate::draw::text::{Fonts, Weight};
 use crate::view::{Frame, View};
 
-/// The room in a chip beside its words, and between two chips.
-const CHIP_PAD: f64 = 20.0;
-const CHIP_GAP: f64 = 8.0;
-
 /// The usual width of a character, as a share of the size of the text.
 const USUAL_WIDTH: f64 = 0.5;
+/// The space between the words on the left and those on the right.
+const GAP: f64 = 24.0;
+/// The part of the bar that the name of the bag and the date may take.
+const MOST_RIGHT: f64 = 0.45;
+/// The lines of words, as parts of the bar's height.
+const LINES: (f64, f64) = (0.46, 0.82);
 
-/// The bar's fixed places, decided once for all frames.
+/// The bar on top of every frame.
 pub(crate) struct Title<'a> {
     style: &'a Style,
     fonts: &'a Fonts,
     page: PageFrame,
+    view: &'a View,
     name: String,
-    /// The x at which the last chip ends.
-    right: f64,
-    /// The x at which the words on the left must end.
-    end: f64,
-    /// The width of the widest phase.
-    phase: f64,
-    /// The text for a window in which nothing changed.
-    none: &'static str,
 }
 
 impl<'a> Title<'a> {
@@ -38,47 +32,15 @@ impl<'a> Title<'a> {
         style: &'a Style,
         fonts: &'a Fonts,
         page: &PageFrame,
-        view: &View,
+        view: &'a View,
         options: &PageOptions,
     ) -> Self {
-        let unit = page.unit;
-        let clock = fonts.width("00:00:00", style.title.clock_size * unit, Weight::SemiBold);
-        let date = fonts.width(
-            "0000-00-00 UTC",
-            style.title.quiet_size * unit,
-            Weight::Regular,
-        );
-        let clock = clock.max(date);
-        let right = page.size.w - (style.page.margin + 14.0) * unit - clock;
-        let none = if view.compares {
-            "no difference"
-        } else {
-            "no reconfiguration"
-        };
-        let wide = |text: &str| {
-            fonts.width(text, style.chip.size * unit, Weight::SemiBold)
-                + (CHIP_PAD + CHIP_GAP) * unit
-        };
-        let widths = view.frames.iter().map(|frame| {
-            let chips = chips::chips(&frame.counts);
-            let told = chips.iter().filter(|(text, _)| !text.is_empty());
-            told.map(|(text, _)| wide(text)).sum::<f64>()
-        });
-        let end = right - widths.fold(wide(none), f64::max) - 10.0 * unit;
-        let widest = options
-            .phases
-            .iter()
-            .map(|p| fonts.width(&fonts.shown(p), style.caption.size * unit, Weight::SemiBold));
-        let phase = widest.fold(0.0, f64::max).min(page.size.w * 0.4);
         Self {
             style,
             fonts,
             page: page.clone(),
+            view,
             name: fonts.shown(options.title()).into_owned(),
-            right,
-            end,
-            phase,
-            none,
         }
     }
 
@@ -92,248 +54,136 @@ impl<'a> Title<'a> {
             let edge = line(Point::new(bar.x, y), Point::new(bar.right(), y));
             group.shape(Shape::line(edge, Stroke::solid(style.line, self.page.unit)));
         }
-        let size = style.size * self.page.unit;
-        let name = self
-            .fonts
-            .fit(&self.name, size, Weight::SemiBold, self.end - self.left())
-            .into_owned();
-        group.text(self.words(name, 0.43, size, Weight::SemiBold, style.text));
         group
     }
 
-    /// The line under the name: the window and its part of the mission.
-    pub(crate) fn window(&self, view: &View, frame: &Frame) -> Group {
-        let mut group = Group::named("window");
-        let start = view
-            .frames
-            .first()
-            .map_or(frame.span.start, |f| f.span.start);
-        let end = view.frames.last().map_or(frame.span.end, |f| f.span.end);
-        let at = |stamp: crate::base::time::Stamp| words::offset(whole(stamp.since(start)));
-        let mut parts = vec![format!(
-            "{} – {} of {}",
-            at(frame.span.start),
-            at(frame.span.end),
-            words::offset(whole(end.since(start)))
-        )];
-        if view.frames.len() > 1 {
-            let window = format!("window {} of {}", frame.index + 1, view.frames.len());
-            parts.insert(0, window);
+    /// The headline with the line below it, and the window's time, bag and date on the right.
+    pub(crate) fn words(&self, frame: &Frame, phase: &str) -> Vec<Group> {
+        let (clock, room) = self.clock(frame);
+        let mut headline = Group::named("headline");
+        headline.data = vec![("entries", entries(frame))];
+        let mut note = Group::named("note");
+        let (style, unit) = (&self.style.title, self.page.unit);
+        let (size, small) = (style.size * unit, style.quiet_size * unit);
+        let mut below = vec![phase];
+        if frame.caption.is_empty() {
+            let text = self.cut(&frame.note, size, Weight::Regular, room.0);
+            note.text(self.text(text, LINES.0, (size, Weight::Regular), style.quiet));
+        } else {
+            let wide = |text: &str| self.width(&self.fonts.shown(text), size, Weight::SemiBold);
+            let text = frame.fitting(|text| wide(text) <= room.0);
+            let text = self.cut(&text, size, Weight::SemiBold, room.0);
+            headline.title = frame.fitting(|_| true);
+            headline.text(self.text(text, LINES.0, (size, Weight::SemiBold), self.color(frame)));
+            below.push(&frame.note);
         }
-        if frame.messages == 0 {
-            parts.insert(0, "no message".to_owned());
+        if frame.messages == 0 && !self.view.compares {
+            below.push("no messages");
         }
-        if let Some(length) = view.window_nanos() {
-            parts.push(format!("{} per window", words::period(whole(length))));
+        below.retain(|part| !part.is_empty());
+        let text = self.cut(&below.join(" · "), small, Weight::Regular, room.1);
+        if !text.is_empty() {
+            note.text(self.text(text, LINES.1, (small, Weight::Regular), style.quiet));
         }
-        if frame.partial {
-            parts.push("partial".to_owned());
+        vec![headline, note, clock]
+    }
+
+    /// The colour of what most of the headline is about: what went counts more than what came, and that more than what
+    /// changed.
+    fn color(&self, frame: &Frame) -> Color {
+        let style = &self.style.title;
+        let is_away = frame.lasting.iter().any(|l| l.ended.is_none());
+        let has = |sign| frame.caption.iter().any(|p| p.sign == sign);
+        match (has('−'), has('+')) {
+            (true, true) => style.text,
+            (true, false) => style.removed,
+            (false, true) => style.added,
+            (false, false) if is_away => style.removed,
+            (false, false) => style.changed,
         }
-        let size = self.style.title.quiet_size * self.page.unit;
-        // On a narrow page the least important part goes first.
-        while parts.len() > 1
-            && self.fonts.width(&parts.join(" · "), size, Weight::Regular) > self.end - self.left()
-        {
+    }
+
+    /// The window's time with the length of the mission, the bag and the date, and the widths that they leave on the two
+    /// lines.
+    fn clock(&self, frame: &Frame) -> (Group, (f64, f64)) {
+        let mut group = Group::named("clock");
+        let (style, unit, view) = (&self.style.title, self.page.unit, self.view);
+        let span = |k: Option<&Frame>| k.map_or(frame.span, |frame| frame.span);
+        let (start, end) = (
+            span(view.frames.first()).start,
+            span(view.frames.last()).end,
+        );
+        let at = |stamp: crate::base::time::Stamp| words::moment(whole(stamp.since(start)));
+        let mut parts = vec![self.name.clone()];
+        let time = if view.compares {
+            let is_alone = view.frames.len() > 1 && frame.index == 0;
+            SIDES[usize::from(!is_alone)].to_owned()
+        } else {
+            group.title = frame.span.start.rfc3339();
+            if view.frames.len() > 1 {
+                parts.insert(0, format!("of {}", at(end)));
+            }
+            parts.push(words::date_and_clock(frame.span.start.0));
+            format!("{} – {}", at(frame.span.start), at(frame.span.end))
+        };
+        parts.retain(|part| !part.is_empty());
+        let (size, small) = (style.clock_size * unit, style.quiet_size * unit);
+        let most = self.page.title.w * MOST_RIGHT;
+        let wide = |parts: &[String]| self.width(&parts.join(" · "), small, Weight::Regular);
+        // On a narrow page the date goes first.
+        while parts.len() > 1 && wide(&parts) > most {
             parts.pop();
         }
-        group.text(self.words(
-            parts.join(" · "),
-            0.8,
-            size,
-            Weight::Regular,
-            self.style.title.quiet,
-        ));
-        group
-    }
-
-    /// The line where two missions are compared, in the place of the window's time: the side that is seen, and the
-    /// number of differences, but for the first of several windows, which is A alone.
-    pub(crate) fn compared(&self, frame: &Frame, windows: usize) -> Vec<Group> {
-        let is_alone = windows > 1 && frame.index == 0;
-        let mut group = Group::named("window");
-        let side = SIDES[usize::from(!is_alone)];
-        group.text(self.words(
-            side.to_owned(),
-            0.8,
-            self.style.title.quiet_size * self.page.unit,
-            Weight::Regular,
-            self.style.title.quiet,
-        ));
-        let chips = (!is_alone).then(|| self.chips(frame));
-        std::iter::once(group).chain(chips).collect()
+        let below = self.cut(&parts.join(" · "), small, Weight::Regular, most);
+        let all = self.page.title.w - 2.0 * self.left() - GAP * unit;
+        let room = (
+            (all - self.width(&time, size, Weight::SemiBold)).max(1.0),
+            (all - self.width(&below, small, Weight::Regular)).max(1.0),
+        );
+        let right = |text: Text| Text {
+            at: Point::new(self.page.title.right() - self.left(), text.at.y),
+            anchor: Anchor::End,
+            ..text
+        };
+        let time = self.text(time, LINES.0, (size, Weight::SemiBold), style.text);
+        let below = self.text(below, LINES.1, (small, Weight::Regular), style.quiet);
+        group.text(right(time));
+        group.text(right(below));
+        (group, room)
     }
 
     fn left(&self) -> f64 {
         self.style.page.margin * self.page.unit
     }
 
-    fn words(&self, text: String, part: f64, size: f64, weight: Weight, color: Color) -> Text {
+    /// The width of a text; where an SVG is shown in another font, its words may be wider.
+    fn width(&self, text: &str, size: f64, weight: Weight) -> f64 {
+        let elsewhere = text.chars().count() as f64 * size * USUAL_WIDTH;
+        self.fonts.width(text, size, weight).max(elsewhere)
+    }
+
+    fn cut(&self, text: &str, size: f64, weight: Weight, most: f64) -> String {
+        let text = self.fonts.shown(text);
+        self.fonts.fit(&text, size, weight, most).into_owned()
+    }
+
+    fn text(&self, text: String, part: f64, font: (f64, Weight), color: Color) -> Text {
         let bar = self.page.title;
         Text {
             at: Point::new(self.left(), bar.y + bar.h * part),
             anchor: Anchor::Start,
-            size,
-            weight,
+            size: font.0,
+            weight: font.1,
             color,
             halo: None,
             text,
         }
-    }
-
-    /// The UTC time at which the window begins.
-    pub(crate) fn clock(&self, frame: &Frame) -> Group {
-        let mut group = Group::named("clock");
-        let style = &self.style.title;
-        let (bar, size) = (self.page.title, style.clock_size * self.page.unit);
-        let small = style.quiet_size * self.page.unit;
-        group.title = frame.span.start.rfc3339();
-        group.text(Text {
-            at: Point::new(bar.right() - self.left(), bar.y + bar.h * 0.43),
-            anchor: Anchor::End,
-            size,
-            weight: Weight::SemiBold,
-            color: style.text,
-            halo: None,
-            text: words::clock(frame.span.start.0),
-        });
-        group.text(Text {
-            at: Point::new(bar.right() - self.left(), bar.y + bar.h * 0.8),
-            anchor: Anchor::End,
-            size: small,
-            weight: Weight::Regular,
-            color: style.quiet,
-            halo: None,
-            text: words::date(frame.span.start.0),
-        });
-        group
-    }
-
-    /// The chips with the numbers of what came, went and changed, each at its own place.
-    pub(crate) fn chips(&self, frame: &Frame) -> Group {
-        let mut group = Group::named("chips");
-        let chip = &self.style.chip;
-        let texts = chips::chips(&frame.counts);
-        group.data = vec![("entries", entries(frame))];
-        let paint = [
-            (chip.added, chip.added_text),
-            (chip.removed, chip.removed_text),
-            (chip.changed, chip.changed_text),
-        ];
-        let mut right = self.right;
-        for ((text, _), paint) in texts.iter().zip(paint).rev() {
-            if !text.is_empty() {
-                right -= self.chip(&mut group, text, right, paint) + self.page.unit * CHIP_GAP;
-            }
-        }
-        if frame.counts.total() == 0 {
-            let paint = (chip.none, chip.none_text);
-            self.chip(&mut group, self.none, self.right, paint);
-        }
-        group
-    }
-
-    /// Draws a chip that ends at `right`, and returns its width.
-    fn chip(&self, group: &mut Group, text: &str, right: f64, paint: (Color, Color)) -> f64 {
-        let unit = self.page.unit;
-        let size = self.style.chip.size * unit;
-        let width = self.fonts.width(text, size, Weight::SemiBold) + CHIP_PAD * unit;
-        let bar = self.page.title;
-        let place = Rect::new(
-            right - width,
-            bar.y + bar.h / 2.0 - 11.0 * unit,
-            width,
-            22.0 * unit,
-        );
-        group.shape(Shape {
-            form: Form::Rect(place, place.h / 2.0),
-            fill: paint.0,
-            // Of the bar's own colour, as on paper, it would not be seen.
-            stroke: Stroke::solid(
-                paint.1,
-                if paint.0 == self.style.title.fill {
-                    unit
-                } else {
-                    0.0
-                },
-            ),
-        });
-        group.text(Text {
-            at: Point::new(place.centre().x, place.centre().y + size * 0.36),
-            anchor: Anchor::Middle,
-            size,
-            weight: Weight::SemiBold,
-            color: paint.1,
-            halo: None,
-            text: text.to_owned(),
-        });
-        width
-    }
-
-    /// The line below the bar: the mission's phase, and the changes in words.
-    pub(crate) fn caption(&self, frame: &Frame, phase: &str) -> Group {
-        let mut group = Group::named("caption");
-        "caption headline".clone_into(&mut group.class);
-        group.data = vec![("entries", entries(frame))];
-        let (style, place) = (&self.style.caption, self.page.caption);
-        let size = style.size * self.page.unit;
-        if style.fill != self.style.page.background {
-            group.shape(Shape::filled(Form::Rect(place, 0.0), style.fill));
-        }
-        let y = place.centre().y + size * 0.36;
-        let text = |x: f64, weight, color, text: String| Text {
-            at: Point::new(x, y),
-            anchor: Anchor::Start,
-            size,
-            weight,
-            color,
-            halo: None,
-            text,
-        };
-        let mut x = self.left();
-        if self.phase > 0.0 {
-            let phase = self.fonts.shown(phase);
-            let phase = self
-                .fonts
-                .fit(&phase, size, Weight::SemiBold, self.phase)
-                .into_owned();
-            group.text(text(x, Weight::SemiBold, style.text, phase));
-            x += self.phase + 18.0 * self.page.unit;
-        }
-        let changes = self.sentence(frame, size, place.right() - self.left() - x);
-        let color = if self.phase > 0.0 {
-            style.quiet
-        } else {
-            style.text
-        };
-        group.title = frame.words(usize::MAX);
-        group.text(text(x, Weight::Regular, color, changes));
-        group
-    }
-
-    /// As many of the changes as fit, the most important first.
-    fn sentence(&self, frame: &Frame, size: f64, most: f64) -> String {
-        let all = frame.caption.len();
-        let texts = (1..=all)
-            .rev()
-            .map(|keep| self.fonts.shown(&frame.words(keep)).into_owned());
-        // Where an SVG is shown in another font, its words may be wider.
-        let wide = |text: &str| {
-            let elsewhere = text.chars().count() as f64 * size * USUAL_WIDTH;
-            self.fonts.width(text, size, Weight::Regular).max(elsewhere)
-        };
-        let mut fitting = texts.filter(|text| wide(text) <= most);
-        fitting.next().unwrap_or_else(|| {
-            let first = self.fonts.shown(&frame.words(1.min(all))).into_owned();
-            self.fonts
-                .fit(&first, size, Weight::Regular, most)
-                .into_owned()
-        })
     }
 }
 
-/// The places in the log of a window's headlines, separated by blanks.
+/// The ids of the events that a window reports, separated by blanks.
 fn entries(frame: &Frame) -> String {
-    let ids = frame.headlines.iter().map(|h| h.entry.to_string());
+    let ids = frame.entries().map(|entry| entry.to_string());
     ids.collect::<Vec<_>>().join(" ")
 }
 

@@ -64,6 +64,9 @@ pub(crate) fn states(style: &Style, words: &BTreeSet<&str>) -> String {
     for (kind, change) in changes.iter().filter(|(word, _)| words.contains(word)) {
         self::change(&mut out, kind, change);
     }
+    if words.contains("away") {
+        self::quiet(&mut out, "away", &style.away());
+    }
     let badges = MARKS.iter().filter(|word| words.contains(*word));
     let mut shown: Vec<String> = badges.map(|word| format!(".{word}>.{word}")).collect();
     shown.push(":is(.faster,.slower)>.c,.latched:not(.removed)>.l".to_owned());

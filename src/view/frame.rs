@@ -1,0 +1,149 @@
+//! One window of the picture with its events, and the words of its headline.
+
+use super::{Attendance, Counts, Lasting};
+use crate::base::time::{Span, Stamp};
+use crate::graph::Element;
+use crate::mission::ledger::{EntryId, Kind};
+
+/// An event of the log that begins in a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Headline {
+    /// Its place in the ledger.
+    pub entry: EntryId,
+    /// The kind of event.
+    pub kind: Kind,
+    /// The element it is about.
+    pub what: Element,
+    /// The time of the event.
+    pub time: Stamp,
+}
+
+impl Headline {
+    /// The start of a node.
+    #[cfg(test)]
+    pub(crate) fn started() -> Self {
+        Self {
+            entry: 0,
+            kind: Kind::Started,
+            what: Element::Node(0),
+            time: Stamp(0),
+        }
+    }
+}
+
+/// Elements with the same change in a window: `+ planner, costmap start`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Phrase {
+    /// `+` for what came, `−` for what went, a blank for all else.
+    pub sign: char,
+    /// The words before the names: `controller subscribes to`.
+    pub lead: String,
+    /// The names, one per event.
+    pub names: Vec<String>,
+    /// The words after the names: `start`.
+    pub tail: String,
+}
+
+impl Phrase {
+    /// The phrase with at most `most` names, the rest counted: `+ planner, costmap, +2 start`.
+    fn text(&self, most: usize) -> String {
+        let mut names = self.names.iter().take(most).cloned().collect::<Vec<_>>();
+        let rest = self.names.len() - names.len();
+        if rest > 0 {
+            names.push(format!("+{rest}"));
+        }
+        let sign = match self.sign {
+            ' ' => String::new(),
+            sign => sign.to_string(),
+        };
+        let parts = [&sign, &self.lead, &names.join(", "), &self.tail];
+        let parts = parts.into_iter().filter(|part| !part.is_empty());
+        parts.cloned().collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// One window of the picture; the items and arrows in it are in [`View::seen`](super::View::seen).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// The window's index, counted from 0.
+    pub index: usize,
+    /// Its time.
+    pub span: Span,
+    /// Whether it is shorter than the others.
+    pub partial: bool,
+    /// The number of all messages of the bag in the window, hidden topics included.
+    pub messages: u64,
+    /// For each namespace that stands for several, in the order of [`View::namespaces`](super::View::namespaces), the
+    /// presence of each of them.
+    pub rolls: Vec<Vec<Attendance>>,
+    /// The events that begin in it, in the order of the ledger. Headline, marks and timeline are all made from these.
+    pub headlines: Vec<Headline>,
+    /// The events of earlier windows that last into it or end in it: marked and in words, but counted once, where they
+    /// begin.
+    pub lasting: Vec<Lasting>,
+    /// The number of headlines of each kind.
+    pub counts: Counts,
+    /// What changed in words, the most important first; empty exactly if nothing is marked.
+    pub caption: Vec<Phrase>,
+    /// The line below: namespace, exact times and consequence of the changes, or since when nothing changed.
+    pub note: String,
+}
+
+impl Frame {
+    /// A window without messages and headlines.
+    pub fn empty(index: usize, span: Span) -> Self {
+        Self {
+            index,
+            span,
+            partial: false,
+            messages: 0,
+            rolls: Vec::new(),
+            headlines: Vec::new(),
+            lasting: Vec::new(),
+            counts: Counts::default(),
+            caption: Vec::new(),
+            note: String::new(),
+        }
+    }
+
+    /// Whether an event begins or ends in it.
+    pub fn is_changed(&self) -> bool {
+        !self.headlines.is_empty() || self.lasting.iter().any(|l| l.ended.is_some())
+    }
+
+    /// The events that it reports: the ids of those that begin in it, and of those that last.
+    pub fn entries(&self) -> impl Iterator<Item = EntryId> {
+        let lasting = self.lasting.iter().map(|l| l.entry);
+        self.headlines.iter().map(|h| h.entry).chain(lasting)
+    }
+
+    /// The caption in at most `most` phrases of three names each, the rest counted: `− a stops; + b starts; +3`.
+    pub fn words(&self, most: usize) -> String {
+        self.shortened(most, 3)
+    }
+
+    /// The caption with as many names as fit, at most 40 of each kind; the shortest form where none fits.
+    pub fn fitting(&self, fits: impl Fn(&str) -> bool) -> String {
+        let all = self.caption.len();
+        let longest = self.caption.iter().map(|p| p.names.len()).max();
+        let named = (1..=longest.unwrap_or(1).min(40)).rev();
+        let named = named.map(|names| (all, names));
+        let fewer = (1..all).rev().map(|phrases| (phrases, 1));
+        let mut texts = named
+            .chain(fewer)
+            .map(|(phrases, names)| self.shortened(phrases, names));
+        let fitting = texts.find(|text| fits(text));
+        fitting.unwrap_or_else(|| self.shortened(1, 1))
+    }
+
+    fn shortened(&self, phrases: usize, names: usize) -> String {
+        let told = self.caption.iter().take(phrases).map(|p| p.text(names));
+        let mut told: Vec<String> = told.collect();
+        let rest = self.caption.iter().skip(phrases).map(|p| p.names.len());
+        let rest: usize = rest.sum();
+        if rest > 0 {
+            told.push(format!("+{rest}"));
+        }
+        told.join("; ")
+    }
+}

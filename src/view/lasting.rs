@@ -1,0 +1,102 @@
+//! Events that last: the node that is away, and what is back after an absence or a silence.
+
+use super::items::Viewed;
+use crate::base::time::{Span, Stamp};
+use crate::graph::Element;
+use crate::mission::ledger::{Entry, EntryId, Kind, Ledger};
+
+/// An event of an earlier window that lasts into this one or ends in it: a node is away, or something is back.
+///
+/// A silence without a proof of an absence is listed where it ends only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lasting {
+    /// Its place in the ledger.
+    pub entry: EntryId,
+    /// The element it is about.
+    pub what: Element,
+    /// Its beginning.
+    pub since: Stamp,
+    /// Its end, if it lies in this window.
+    pub ended: Option<Stamp>,
+}
+
+/// The part of an event that a window shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// All that is drawn of it.
+    Whole,
+    /// A node leaves, to come back in a later window.
+    Leaves,
+    /// A node is away all through the window.
+    Away,
+    /// A node or topic is back.
+    Back,
+}
+
+impl Part {
+    /// The part of an event that lies in the window in which it begins.
+    pub(crate) fn of(entry: &Entry, window: Span) -> Self {
+        let leaves = entry.kind == Kind::Restarted && entry.until.is_some_and(|t| t >= window.end);
+        if leaves { Self::Leaves } else { Self::Whole }
+    }
+}
+
+impl Lasting {
+    pub(crate) fn part(&self) -> Part {
+        if self.ended.is_some() {
+            Part::Back
+        } else {
+            Part::Away
+        }
+    }
+}
+
+/// The events that last, from window to window.
+pub(crate) struct LastingEvents<'a> {
+    /// Those with an end, in the order of their beginnings.
+    all: Vec<(EntryId, &'a Entry)>,
+    /// The first of them that begins in or after the present window.
+    next: usize,
+    /// The places of those that began before it and do not end before it.
+    open: Vec<usize>,
+}
+
+impl<'a> LastingEvents<'a> {
+    pub(crate) fn new(ledger: &'a Ledger, viewed: &Viewed) -> Self {
+        let lasts = |entry: &Entry| {
+            entry.until.is_some_and(|until| until > entry.time)
+                && entry.is_headline()
+                && viewed.sees(entry.what)
+        };
+        let all = (0..).zip(&ledger.entries).filter(|(_, entry)| lasts(entry));
+        Self {
+            all: all.collect(),
+            next: 0,
+            open: Vec::new(),
+        }
+    }
+
+    /// Those that last into a window or end in it. Windows come in the order of their starts.
+    pub(crate) fn at(&mut self, window: Span) -> Vec<Lasting> {
+        let begun = |at: usize| self.all.get(at).is_some_and(|e| e.1.time < window.start);
+        while begun(self.next) {
+            self.open.push(self.next);
+            self.next += 1;
+        }
+        let all = &self.all;
+        let end = |at: usize| all[at].1.until.unwrap_or(window.start);
+        self.open.retain(|at| end(*at) >= window.start);
+        let lasting = self.open.iter().filter_map(|at| {
+            let (entry, event) = all[*at];
+            let ended = Some(end(*at)).filter(|end| *end < window.end);
+            let is_told = ended.is_some() || event.kind == Kind::Restarted;
+            is_told.then_some(Lasting {
+                entry,
+                what: event.what,
+                since: event.time,
+                ended,
+            })
+        });
+        lasting.collect()
+    }
+}
