@@ -4,6 +4,7 @@ mod difference;
 mod kept;
 mod mission;
 mod reports;
+mod times;
 
 use std::fmt::Write as _;
 use std::fs;
@@ -147,7 +148,7 @@ fn a_second_healthy_run_keeps_it_too_and_each_fault_breaks_what_it_should() {
                 crash_ms: 90_000,
                 ..HEALTHY
             },
-            &["node-gone", "topic-rate-low"],
+            &["node-gone", "topic-gap", "topic-rate-low"],
         ),
         (
             "renamed",
@@ -214,7 +215,7 @@ fn what_several_runs_have_in_common_holds_in_each() {
     assert_eq!(code, 0, "{said}");
     let text = fs::read_to_string(here.join("graph.yaml")).unwrap();
     assert!(
-        text.contains("/teleop: {may_end: true, optional: true"),
+        text.contains("/teleop: {within: 90s..110s, may_end: 125s.., optional: true"),
         "{text}"
     );
     assert!(
@@ -287,7 +288,7 @@ rules:
         .replace("    by: [/controller]", "    by: [/controller, /teleop]")
         .replace(
             "  /controller:\n",
-            "  /controller:\n  /teleop: {may_end: true, restarts: ..0}\n",
+            "  /controller:\n  /teleop: {within: 80s..120s, may_end: 111s.., restarts: ..0}\n",
         );
     assert_eq!(text, expected);
     let (code, said) = run(here, &["check", "halved.bag", "--expect", "graph.yaml"]);

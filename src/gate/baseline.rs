@@ -27,10 +27,10 @@ pub(crate) struct Written {
     pub(crate) left_out: usize,
 }
 
-/// The expectation that holds in all of these runs, which were read with windows of one length. `from` names them, for
-/// the reader only.
-pub(crate) fn write(runs: &[Mission], from: &str) -> Written {
-    let written = |first: &Mission| written(&Draft::of(runs), from, first.period);
+/// The expectation that holds in all of these runs, which were read with windows of one length; without times if each `is_part`
+/// of a recording. `from` names them, for the reader only.
+pub(crate) fn write(runs: &[Mission], is_part: bool, from: &str) -> Written {
+    let written = |first: &Mission| written(&Draft::of(runs, is_part), from, first.period);
     runs.first().map(written).unwrap_or_default()
 }
 
@@ -118,6 +118,18 @@ fn length(nanos: i64) -> String {
     } else {
         format!("{}s", nanos as f64 / 1e9)
     }
+}
+
+/// The nanoseconds rounded up to two digits.
+fn two_digits(nanos: i64) -> i64 {
+    let mut step = 1;
+    while nanos / step >= 100 {
+        step *= 10;
+    }
+    nanos
+        .div_euclid(step)
+        .saturating_add(i64::from(nanos % step > 0))
+        .saturating_mul(step)
 }
 
 /// Text as YAML: as it is where YAML takes it for a text, in quotes otherwise.

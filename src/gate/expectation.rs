@@ -72,13 +72,15 @@ pub(crate) struct NodeFacts {
     pub(crate) forbidden: bool,
     /// Whether it need not be there.
     pub(crate) optional: bool,
-    /// Whether it need not stay to the end.
-    pub(crate) may_end: bool,
+    /// The stretch in which it may end; `None` if it must stay.
+    pub(crate) may_end: Option<At<During>>,
+    /// Whether only its log names it, so that it may be there unnamed.
+    pub(crate) is_logged: bool,
     pub(crate) restarts: Option<At<Range>>,
     /// The state that it is in at the end.
     pub(crate) lifecycle: Option<At<String>>,
-    /// Nanoseconds from the mission's start in which it must appear.
-    pub(crate) within: Option<At<i64>>,
+    /// The stretch in which it must appear.
+    pub(crate) within: Option<At<During>>,
 }
 
 /// The facts that can be expected of a topic.
@@ -86,8 +88,8 @@ pub(crate) struct NodeFacts {
 pub(crate) struct TopicFacts {
     pub(crate) forbidden: bool,
     pub(crate) optional: bool,
-    /// Whether its rate is judged up to its last message only.
-    pub(crate) may_end: bool,
+    /// The stretch in which its last message may come, up to which its rate is judged; `None` if it must stay.
+    pub(crate) may_end: Option<At<During>>,
     pub(crate) kind: Option<At<String>>,
     /// The nodes that publish it: these and no others.
     pub(crate) by: Option<At<Vec<At<Pattern>>>>,
@@ -95,6 +97,10 @@ pub(crate) struct TopicFacts {
     pub(crate) to: Option<At<Vec<At<Pattern>>>>,
     /// Messages per second in every window.
     pub(crate) hz: Option<At<Range>>,
+    /// Messages per second from its first to its last one.
+    pub(crate) mean_hz: Option<At<Range>>,
+    /// The stretch in which its first message must come.
+    pub(crate) within: Option<At<During>>,
     /// The share of windows in which the rate must hold, in per cent; all if `None`.
     pub(crate) percent: Option<f64>,
     /// The longest silence in nanoseconds.
@@ -106,6 +112,16 @@ pub(crate) struct TopicFacts {
     pub(crate) during: Option<During>,
     /// The condition on the windows in which they are judged; all if `None`.
     pub(crate) whilst: Option<While>,
+}
+
+impl TopicFacts {
+    /// Whether something is asked of its messages, so that it must have some.
+    pub(crate) fn wants_messages(&self) -> bool {
+        self.hz.is_some()
+            || self.mean_hz.is_some()
+            || self.max_gap.is_some()
+            || self.within.is_some()
+    }
 }
 
 /// A condition on windows.

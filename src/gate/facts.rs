@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::pattern::Pattern;
 use crate::base::name::is_quiet;
 use crate::base::notice::NoticeKind;
+use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::{Span, Stamp};
 use crate::base::words;
 use crate::evidence::{Degree, Evidence};
@@ -349,6 +350,37 @@ impl<'a> Facts<'a> {
                 latest: first,
             },
         })
+    }
+
+    /// The time at which a role was last there, if that is before the mission is closed down, and whether that is known to
+    /// within a few seconds.
+    pub(crate) fn ended(&self, nodes: &[NodeId]) -> Option<(Stamp, bool)> {
+        let end = self.lives(nodes).last()?.end;
+        if self.mission.span.end.since(end) <= CLOSING_NS {
+            return None;
+        }
+        let stopped = self.entries(nodes, Kind::Stopped);
+        let vague = stopped
+            .last()
+            .is_some_and(|e| e.latest.since(e.earliest) > CLOSING_NS);
+        Some((end, !vague))
+    }
+
+    /// Whether a role is known by its log alone: nothing else of it was recorded, and nothing lists the nodes.
+    pub(crate) fn is_logged_only(&self, nodes: &[NodeId]) -> bool {
+        let elements = &self.mission.elements;
+        let is_listed = |id: &NodeId| {
+            let evidence = elements.nodes[*id as usize].evidence;
+            has(evidence, &LISTING) || has(evidence, &STARTING) || !has(evidence, &["rosout"])
+        };
+        let edges = (0..).zip(&elements.publishes);
+        let mut own = edges.filter(|(_, e)| nodes.contains(&e.node));
+        let sends = own.any(|(id, e)| {
+            let rows = self.mission.graphs.rows(Element::Publish(id));
+            let count: u64 = rows.filter_map(|(_, row)| row.count).sum();
+            count > 0 && !self.is_housekeeping(e.topic)
+        });
+        !sends && !nodes.iter().any(is_listed)
     }
 
     /// A moment of the mission as text for people.

@@ -24,6 +24,8 @@ pub(crate) enum FindingKind {
     TopicRateLow,
     TopicRateHigh,
     TopicGap,
+    TopicLate,
+    TopicGone,
     PublisherMissing,
     PublisherUnexpected,
     SubscriberMissing,
@@ -43,7 +45,7 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
         "A node that is expected is not in the bag.",
         "A node is there by any evidence but source code and launch files, under its name or its role (anonymous suffixes \
          folded). Undecidable in a bag that names no node at all or only those that wrote a log, in one whose senders a tool \
-         has merged, and where more are missing than a bag of ROS 2 names, as where its recorder came late. `optional: \
+         has merged, of nodes with `known_by: log`, and where more are missing than a bag of ROS 2 names, as where its recorder came late. `optional: \
          true` asks for nothing.",
     ),
     (
@@ -55,8 +57,8 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
     (
         FindingKind::NodeLate,
         "node-late",
-        "A node appeared later than it should have.",
-        "`present_within: 20s` counts from the first message. Undecidable where the node may have been there earlier for \
+        "A node appeared later, or earlier, than it should have.",
+        "`within: 40s..1:10` counts from the first message; `present_within: 20s` is short for `within: ..20s`. Undecidable where the node may have been there earlier for \
          all that the bag tells.",
     ),
     (
@@ -64,7 +66,8 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
         "node-gone",
         "A node ended before the mission did.",
         "A node that is expected is expected to stay. Its end is told by a rhythm that broke for good, or by something \
-         that says so; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go.",
+         that says so; the last 5 s, in which robots are shut down, do not count. `may_end: true` lets it go, \
+         `may_end: 1:30..` from then on.",
     ),
     (
         FindingKind::NodeRestarted,
@@ -82,7 +85,8 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
         FindingKind::TopicMissing,
         "topic-missing",
         "A topic that is expected is not in the bag.",
-        "A topic is there if it has messages or a publisher. `optional: true` asks for nothing.",
+        "A topic is there if it has messages or a publisher; with `hz`, `mean_hz`, `max_gap` or `within` it must have \
+         messages. `optional: true` asks for nothing.",
     ),
     (
         FindingKind::TopicForbidden,
@@ -108,7 +112,8 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
         "topic-rate-low",
         "A topic had fewer messages per second than expected.",
         "`hz: 13.5..16.5` is judged in every whole window from the topic's first message to the mission's end, `percent: \
-         95` of them at least. A message more or less at the edge of a window is none.",
+         95` of them at least. A message more or less at the edge of a window is none. `mean_hz: 2..3` is judged from the \
+         first to the last message, for topics that come unevenly.",
     ),
     (
         FindingKind::TopicRateHigh,
@@ -121,6 +126,19 @@ pub(crate) const KINDS: &[(FindingKind, &str, &str, &str)] = &[
         "topic-gap",
         "A topic was silent for longer than allowed.",
         "`max_gap: 0.5s` holds between any two messages, and from the last one to the end of the mission unless it `may_end`.",
+    ),
+    (
+        FindingKind::TopicLate,
+        "topic-late",
+        "A topic's first message came later, or earlier, than it should have.",
+        "`within: 40s..1:10` counts from the first message of the bag. What comes within 2.5 s of the recorder's start is \
+         never early: it may have been there before.",
+    ),
+    (
+        FindingKind::TopicGone,
+        "topic-gone",
+        "A topic's last message came before its time.",
+        "`may_end: 1:30..` lets a topic end from then on. The last 5 s, in which robots are shut down, do not count.",
     ),
     (
         FindingKind::PublisherMissing,

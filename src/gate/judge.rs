@@ -96,13 +96,14 @@ impl Verdict {
     }
 }
 
-/// Judges a mission.
-pub(crate) fn judge(expectation: &Expectation, mission: &Mission) -> Verdict {
+/// Judges a mission. Times since its start are not judged where it `is_part` of a recording.
+pub(crate) fn judge(expectation: &Expectation, mission: &Mission, is_part: bool) -> Verdict {
     let facts = Facts::new(mission);
     let mut judge = Judge {
         names_nodes: facts.names_nodes(lost(expectation, &facts)),
         facts: &facts,
         expectation,
+        is_part,
         checks: Vec::new(),
         told: Cell::new(0),
     };
@@ -136,6 +137,7 @@ struct Judge<'a> {
     /// Whether a node that the bag does not name is not there.
     names_nodes: bool,
     expectation: &'a Expectation,
+    is_part: bool,
     checks: Vec<Checked>,
     /// The number of names that were looked for among those that are there.
     told: Cell<usize>,

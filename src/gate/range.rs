@@ -72,6 +72,25 @@ pub(crate) struct During {
 }
 
 impl During {
+    /// The whole mission.
+    pub(crate) const WHOLE: Self = Self {
+        from: None,
+        to: None,
+    };
+
+    /// From the mission's start to a moment.
+    pub(crate) fn until(nanos: i64) -> Self {
+        Self {
+            from: None,
+            to: Some(Moment::AfterStart(nanos)),
+        }
+    }
+
+    /// Whether it ends after the mission does.
+    pub(crate) fn is_beyond(&self, mission: Span) -> bool {
+        self.to.is_some_and(|to| to.on(mission) > mission.end)
+    }
+
     /// Reads a stretch; `None` if it is not one.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (from, to) = text.split_once("..")?;

@@ -74,7 +74,7 @@ pub(crate) fn check(job: &Check, watch: &mut dyn Watch) -> Result<CheckResult> {
         reading.division.length = Length::Fixed(period);
     }
     let mission = read(&reading, watch)?;
-    let mut verdict = judge(&expectation, &mission);
+    let mut verdict = judge(&expectation, &mission, is_part(&reading));
     if job.is_strict {
         verdict.decide();
     }
@@ -220,11 +220,12 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
         left_out: 0,
     };
     let text = if let Some((path, text, _)) = old {
-        let new = update(&text, path, &done.missions, &job.only)?;
+        let is_part = job.runs.iter().any(is_part);
+        let new = update(&text, path, (&done.missions, is_part), &job.only)?;
         (done.changed, done.left) = (new.changed, new.left);
         new.text
     } else {
-        let new = written(&done.missions);
+        let new = written(&done.missions, job.runs.iter().any(is_part));
         done.left_out = new.left_out;
         new.text
     };
@@ -232,11 +233,16 @@ pub(crate) fn baseline(job: &Baseline, watch: &mut dyn Watch) -> Result<Baseline
     Ok(done)
 }
 
+/// Whether a part of a recording is read, in which nothing begins when it began in the whole.
+fn is_part(reading: &Reading) -> bool {
+    reading.division.start.is_some() || reading.division.end.is_some()
+}
+
 /// The expectation that holds in all of these runs.
-fn written(missions: &[Mission]) -> Written {
+fn written(missions: &[Mission], is_part: bool) -> Written {
     let names: Vec<String> = missions.iter().map(name).collect();
     let from = words::some_of(&names, 3);
-    write(missions, &from)
+    write(missions, is_part, &from)
 }
 
 fn name(mission: &Mission) -> String {

@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{list, mapping, scalar};
-use crate::base::rhythm::{CLOSING_NS, FEWEST};
+use super::{length, list, mapping, scalar, two_digits};
+use crate::base::rhythm::{CLOSING_NS, FEWEST, GAP_NS};
+use crate::base::time::Stamp;
 use crate::evidence::Degree;
 use crate::gate::facts::{Facts, Rate};
 use crate::gate::pattern::Pattern;
@@ -14,8 +15,16 @@ use crate::mission::ledger::Kind;
 
 /// The share by which a rate may differ from run to run.
 const SHARE: f64 = 0.1;
+/// The share by which the mean rate of an uneven topic may differ from run to run.
+const MEAN_SHARE: f64 = 0.15;
+/// The fewest messages that show a mean rate: chance moves a count by its square root, that of 40 by a sixth.
+const FEWEST_OF_MEAN: u64 = 40;
+/// A silence may be so many times as long as the longest of the runs.
+const GAPS: i64 = 2;
 /// The number of times the spread between windows by which a rate may differ besides.
 const SPREADS: f64 = 3.0;
+
+const SECOND: i64 = 1_000_000_000;
 
 /// The facts that hold in all runs.
 #[derive(Debug, Default)]
@@ -28,7 +37,10 @@ pub(crate) struct Draft {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeLine {
     pub(crate) optional: bool,
-    pub(crate) may_end: bool,
+    /// The stretches in which it began, and may end, as they are written.
+    pub(crate) within: Option<String>,
+    pub(crate) may_end: Option<String>,
+    pub(crate) is_logged: bool,
     pub(crate) restarts: usize,
     pub(crate) lifecycle: Option<String>,
 }
@@ -37,11 +49,15 @@ pub(crate) struct NodeLine {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TopicLine {
     pub(crate) optional: bool,
-    pub(crate) may_end: bool,
+    pub(crate) within: Option<String>,
+    pub(crate) may_end: Option<String>,
     pub(crate) kind: Option<String>,
     pub(crate) by: Option<BTreeSet<String>>,
     pub(crate) to: BTreeSet<String>,
     pub(crate) hz: Option<Range>,
+    pub(crate) mean_hz: Option<Range>,
+    /// The longest silence in nanoseconds.
+    pub(crate) max_gap: Option<i64>,
     pub(crate) is_latched: bool,
 }
 
@@ -52,8 +68,10 @@ impl NodeLine {
         if let Some(state) = &self.lifecycle {
             pairs.push(("lifecycle", scalar(state)));
         }
-        if self.may_end {
-            pairs.push(("may_end", "true".to_owned()));
+        pairs.extend(self.within.clone().map(|within| ("within", within)));
+        pairs.extend(self.may_end.clone().map(|end| ("may_end", end)));
+        if self.is_logged {
+            pairs.push(("known_by", "log".to_owned()));
         }
         if self.optional {
             pairs.push(("optional", "true".to_owned()));
@@ -79,9 +97,12 @@ impl TopicLine {
         if let Some(hz) = &self.hz {
             pairs.push(("hz", hz.to_string()));
         }
-        if self.may_end && self.hz.is_some() {
-            pairs.push(("may_end", "true".to_owned()));
+        if let Some(hz) = &self.mean_hz {
+            pairs.push(("mean_hz", hz.to_string()));
         }
+        pairs.extend(self.max_gap.map(|gap| ("max_gap", length(gap))));
+        pairs.extend(self.within.clone().map(|within| ("within", within)));
+        pairs.extend(self.may_end.clone().map(|end| ("may_end", end)));
         if self.is_latched {
             pairs.push(("latched", "true".to_owned()));
         }
@@ -93,48 +114,132 @@ impl TopicLine {
 }
 
 impl Draft {
-    /// The facts that all of these runs have in common.
-    pub(crate) fn of(runs: &[Mission]) -> Self {
+    /// The facts that all of these runs have in common; without times if each `is_part` of a recording.
+    pub(crate) fn of(runs: &[Mission], is_part: bool) -> Self {
         let runs: Vec<Facts<'_>> = runs.iter().map(Facts::new).collect();
+        let times = Times::of(&runs, is_part);
         Self {
-            nodes: nodes(&runs),
-            topics: topics(&runs),
+            nodes: nodes(&runs, &times),
+            topics: topics(&runs, &times),
         }
     }
 }
 
-fn nodes(runs: &[Facts<'_>]) -> BTreeMap<String, NodeLine> {
-    let mut all: BTreeMap<String, Vec<NodeLine>> = BTreeMap::new();
+fn nodes(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, NodeLine> {
+    let mut all: BTreeMap<String, Vec<NodeInRun<'_>>> = BTreeMap::new();
     for facts in runs {
         for (role, nodes) in facts.roles() {
             if facts.is_sure(nodes) && !facts.is_tool(nodes) {
-                all.entry(role.to_owned())
-                    .or_default()
-                    .push(node(facts, nodes));
+                let own = all.entry(role.to_owned()).or_default();
+                own.push(NodeInRun { facts, nodes });
             }
         }
     }
-    let join = |(name, lines): (String, Vec<NodeLine>)| {
-        let state = lines.first().and_then(|l| l.lifecycle.clone());
-        let line = NodeLine {
-            optional: lines.len() < runs.len(),
-            may_end: lines.iter().any(|l| l.may_end),
-            restarts: lines.iter().map(|l| l.restarts).max().unwrap_or(0),
-            lifecycle: state.filter(|s| lines.iter().all(|l| l.lifecycle.as_ref() == Some(s))),
-        };
+    let line = |(name, seen): (String, Vec<NodeInRun<'_>>)| {
+        let mut line = node(&seen, times);
+        line.optional = seen.len() < runs.len();
         (name, line)
     };
-    all.into_iter().map(join).collect()
+    all.into_iter().map(line).collect()
 }
 
-fn node(facts: &Facts<'_>, nodes: &[NodeId]) -> NodeLine {
-    let end = facts.lives(nodes).last().map(|life| life.end);
-    let whole = facts.mission.span.end;
+/// A node in one of the runs.
+struct NodeInRun<'a> {
+    facts: &'a Facts<'a>,
+    nodes: &'a [NodeId],
+}
+
+fn node(seen: &[NodeInRun<'_>], times: &Times) -> NodeLine {
+    let since = |run: &NodeInRun<'_>, at: Stamp| at.since(run.facts.mission.span.start);
+    let ends = seen
+        .iter()
+        .filter_map(|s| Some((s, s.facts.ended(s.nodes)?)));
+    let ends: Vec<(i64, bool)> = ends
+        .map(|(s, (end, is_sure))| (since(s, end), is_sure))
+        .collect();
+    let is_sure = ends.iter().all(|(_, is_sure)| *is_sure);
+    let ends: Vec<i64> = ends.into_iter().map(|(end, _)| end).collect();
+    // A start that is known to within seconds; that of a node that was there before the recorder is not.
+    let began = seen.iter().map(|s| {
+        let began = s.facts.began(s.nodes)?;
+        let is_sure =
+            began.earliest != Stamp::MIN && began.latest.since(began.earliest) <= CLOSING_NS;
+        is_sure.then(|| since(s, began.time))
+    });
+    let began: Option<Vec<i64>> = began.collect();
+    let state = |s: &NodeInRun<'_>| s.facts.lifecycle(s.nodes).map(str::to_owned);
+    let last = seen.first().and_then(state);
+    let restarts = seen
+        .iter()
+        .map(|s| s.facts.entries(s.nodes, Kind::Restarted).len());
     NodeLine {
         optional: false,
-        may_end: end.is_some_and(|end| whole.since(end) > CLOSING_NS),
-        restarts: facts.entries(nodes, Kind::Restarted).len(),
-        lifecycle: facts.lifecycle(nodes).map(str::to_owned),
+        within: began.and_then(|began| times.within(&began)),
+        may_end: times.may_end(&ends, is_sure),
+        is_logged: seen.iter().all(|s| s.facts.is_logged_only(s.nodes)),
+        restarts: restarts.max().unwrap_or(0),
+        lifecycle: last.filter(|last| seen.iter().all(|s| state(s).as_ref() == Some(last))),
+    }
+}
+
+/// The time by which starts and ends differ from run to run.
+struct Times {
+    /// The shortest of the runs.
+    shortest: i64,
+    runs: usize,
+    /// Whether each run is a part of a recording, whose times mean nothing.
+    is_part: bool,
+}
+
+impl Times {
+    fn of(runs: &[Facts<'_>], is_part: bool) -> Self {
+        let lengths = runs.iter().map(|facts| facts.mission.span.nanos());
+        Self {
+            shortest: lengths.min().unwrap_or(0),
+            runs: runs.len(),
+            is_part,
+        }
+    }
+
+    /// The headroom on both sides of these times: a tenth of the time, which no two runs take alike; at least 5 s, less in
+    /// a short mission; and as much as the runs differ. One run does not show how much that is.
+    fn room(&self, times: &[i64]) -> Option<(i64, i64, i64)> {
+        let (first, last) = (*times.iter().min()?, *times.iter().max()?);
+        let least = (self.shortest / 10).clamp(SECOND, CLOSING_NS);
+        let room = least.max(last / 10).max(last - first);
+        let room = if self.runs > 1 { room } else { 2 * room };
+        Some((first, last, room))
+    }
+
+    /// The stretch in which something begins that began at these times.
+    fn within(&self, times: &[i64]) -> Option<String> {
+        let (first, last, room) = self.room(times).filter(|_| !self.is_part)?;
+        let to = length((last + room + SECOND - 1) / SECOND * SECOND);
+        let from = (first - room) / SECOND * SECOND;
+        Some(if from > 0 {
+            format!("{}..{to}", length(from))
+        } else {
+            format!("..{to}")
+        })
+    }
+
+    /// The stretch in which something may end that was silent for no more than `tail` nanoseconds in the end.
+    fn stays(&self, tail: i64) -> Option<String> {
+        let room = (self.shortest / 10).max(SECOND);
+        let room = tail + if self.runs > 1 { room } else { 2 * room };
+        let is_some = room < self.shortest / 2 && !self.is_part;
+        is_some.then(|| format!("-{}..", length((room + SECOND - 1) / SECOND * SECOND)))
+    }
+
+    /// The stretch in which something may end that ended at these times; `None` if it never did.
+    fn may_end(&self, times: &[i64], is_sure: bool) -> Option<String> {
+        let (first, _, room) = self.room(times)?;
+        let from = (first - room) / SECOND * SECOND;
+        Some(if is_sure && from > 0 && !self.is_part {
+            format!("{}..", length(from))
+        } else {
+            "true".to_owned()
+        })
     }
 }
 
@@ -144,7 +249,7 @@ struct TopicInRun<'a> {
     id: TopicId,
 }
 
-fn topics(runs: &[Facts<'_>]) -> BTreeMap<String, TopicLine> {
+fn topics(runs: &[Facts<'_>], times: &Times) -> BTreeMap<String, TopicLine> {
     let mut all: BTreeMap<String, Vec<TopicInRun<'_>>> = BTreeMap::new();
     for facts in runs {
         for id in facts.topics(&Pattern::new("**")) {
@@ -155,15 +260,22 @@ fn topics(runs: &[Facts<'_>]) -> BTreeMap<String, TopicLine> {
         }
     }
     let line = |(name, seen): (String, Vec<TopicInRun<'_>>)| {
-        let mut line = topic(&seen);
+        let mut line = topic(&seen, times);
         line.optional = seen.len() < runs.len();
         (name, line)
     };
     all.into_iter().map(line).collect()
 }
 
-fn topic(seen: &[TopicInRun<'_>]) -> TopicLine {
-    let may_end = seen.iter().any(TopicInRun::ends);
+fn topic(seen: &[TopicInRun<'_>], times: &Times) -> TopicLine {
+    let since = |s: &TopicInRun<'_>, at: Stamp| at.since(s.facts.mission.span.start);
+    let heard = || seen.iter().filter_map(|s| Some((s, s.facts.heard(s.id)?)));
+    let ends: Vec<i64> = heard()
+        .filter(|(s, _)| s.ends())
+        .map(|(s, heard)| since(s, heard.end))
+        .collect();
+    let began: Vec<i64> = heard().map(|(s, heard)| since(s, heard.start)).collect();
+    let may_end = !ends.is_empty();
     let same = |get: &dyn Fn(&TopicInRun<'_>) -> Option<BTreeSet<String>>| {
         let first = seen.first().and_then(get)?;
         seen.iter()
@@ -180,15 +292,75 @@ fn topic(seen: &[TopicInRun<'_>]) -> TopicLine {
     let rates: Vec<Vec<Rate>> = seen.iter().map(judged).collect();
     let is_rated = rates.iter().all(|own| !own.is_empty());
     let is_even = rates.iter().all(|own| Rate::are_even(own));
+    let hz = band(&rates.concat(), is_even).filter(|_| is_rated);
+    let is_latched = seen.iter().all(|s| s.facts.is_latched(s.id) == Some(true));
+    // What comes once, when somebody asks for it, has no times of its own.
+    let is_regular = hz.is_some()
+        || seen
+            .iter()
+            .all(|s| s.facts.messages(s.id) >= FEWEST_OF_MEAN);
+    let is_timed = !is_latched && is_regular;
+    // What is even stays; of all else the last message shows whether it does.
+    let tails = heard().map(|(s, heard)| s.facts.mission.span.end.since(heard.end));
+    let stays = times
+        .stays(tails.max().unwrap_or(0))
+        .filter(|_| hz.is_none());
     TopicLine {
         optional: false,
-        may_end,
+        within: times.within(&began).filter(|_| is_timed),
+        may_end: times.may_end(&ends, true).or(stays).filter(|_| is_timed),
+        mean_hz: mean(seen, hz).filter(|_| is_timed),
+        max_gap: longest(seen, may_end).filter(|_| is_timed),
         kind: kinds.and_then(|kinds| kinds.into_iter().next()),
         by: same(&|s| s.by()).filter(|by| !by.is_empty()),
         to,
-        hz: band(&rates.concat(), is_even).filter(|_| is_rated),
-        is_latched: seen.iter().all(|s| s.facts.is_latched(s.id) == Some(true)),
+        hz,
+        is_latched,
     }
+}
+
+/// The range of a topic's rate from its first to its last message, where the one that holds in each window is too wide to
+/// show that a fifth of the messages is lost.
+fn mean(seen: &[TopicInRun<'_>], hz: Option<Range>) -> Option<Range> {
+    let rates = seen.iter().map(|s| s.facts.mean(s.id));
+    let rates: Vec<Rate> = rates.collect::<Option<_>>()?;
+    let fewest = rates.iter().map(|r| r.count).min()?;
+    let values: Vec<f64> = rates.iter().map(Rate::hz).collect();
+    let (least, most) = values
+        .iter()
+        .fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+    let is_shown = hz
+        .and_then(|hz| hz.from)
+        .is_some_and(|from| from >= least * (1.0 - MEAN_SHARE));
+    if is_shown || fewest + 1 < FEWEST_OF_MEAN {
+        return None;
+    }
+    // One run does not show how much runs differ; chance is the least.
+    let chance = if rates.len() > 1 {
+        0.0
+    } else {
+        SPREADS / libm::sqrt(fewest as f64)
+    };
+    let room = (most * MEAN_SHARE.max(chance)).max(SPREADS * (most - least));
+    (least > room).then(|| Range {
+        from: Some(rounded(least - room, libm::floor)),
+        to: Some(rounded(most + room, libm::ceil)),
+    })
+}
+
+/// The longest silence of the runs with headroom, in nanoseconds, unless it is so long that it shows nothing.
+fn longest(seen: &[TopicInRun<'_>], may_end: bool) -> Option<i64> {
+    let silence = |s: &TopicInRun<'_>| {
+        let all = s.facts.silences(s.id, may_end, s.facts.mission.span);
+        all.iter().map(|silence| silence.nanos).max()
+    };
+    let longest = seen.iter().map(silence).collect::<Option<Vec<i64>>>()?;
+    let gap = longest.into_iter().max()?.saturating_mul(GAPS).max(GAP_NS);
+    let life = seen
+        .iter()
+        .filter_map(|s| s.facts.heard(s.id))
+        .map(|h| h.nanos());
+    (gap < life.min()? / 2).then(|| two_digits(gap))
 }
 
 impl TopicInRun<'_> {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::edit::EditedText;
-use super::{Draft, NodeLine, TopicLine, length, list, scalar};
+use super::{Draft, NodeLine, TopicLine, length, list, scalar, two_digits};
 use crate::base::error::{Error, Result};
 use crate::base::nearest::nearest;
 use crate::base::words;
@@ -29,13 +29,18 @@ pub(crate) struct Update {
     pub(crate) left: usize,
 }
 
-/// Writes anew the facts that these runs break: of all names, or of those that `only` holds.
+/// Writes anew the facts that these runs, or parts of runs, break: of all names, or of those that `only` holds.
 ///
 /// # Errors
 /// As [`read`], and where the file is written in a way that cannot be changed in place.
-pub(crate) fn update(text: &str, path: &Path, runs: &[Mission], only: &[String]) -> Result<Update> {
+pub(crate) fn update(
+    text: &str,
+    path: &Path,
+    (runs, is_part): (&[Mission], bool),
+    only: &[String],
+) -> Result<Update> {
     let expectation = read(text, path)?;
-    let draft = Draft::of(runs);
+    let draft = Draft::of(runs, is_part);
     for name in only {
         known(name, &expectation, &draft)?;
     }
@@ -45,7 +50,7 @@ pub(crate) fn update(text: &str, path: &Path, runs: &[Mission], only: &[String])
         draft: &draft,
         runs,
     };
-    let findings = broken(&expectation, runs);
+    let findings = broken(&expectation, runs, is_part);
     let left = findings.iter().filter(|f| f.accept.is_none()).count();
     let mut seen = BTreeSet::new();
     let named = findings
@@ -110,8 +115,8 @@ fn unchanged(path: &Path, bad: &BadYaml) -> Error {
 }
 
 /// The findings of these runs.
-fn broken(expectation: &Expectation, runs: &[Mission]) -> Vec<Finding> {
-    let verdicts = runs.iter().map(|run| judge(expectation, run));
+fn broken(expectation: &Expectation, runs: &[Mission], is_part: bool) -> Vec<Finding> {
+    let verdicts = runs.iter().map(|run| judge(expectation, run, is_part));
     let findings = verdicts
         .flat_map(|verdict| verdict.checks)
         .flat_map(|check| check.findings);
@@ -125,8 +130,8 @@ fn broken(expectation: &Expectation, runs: &[Mission]) -> Vec<Finding> {
 /// The key that a finding is about; empty for the element itself.
 fn fact(kind: FindingKind) -> &'static str {
     match kind {
-        FindingKind::NodeGone => "may_end",
-        FindingKind::NodeLate => "present_within",
+        FindingKind::NodeGone | FindingKind::TopicGone => "may_end",
+        FindingKind::NodeLate | FindingKind::TopicLate => "within",
         FindingKind::NodeRestarted => "restarts",
         FindingKind::NodeLifecycle => "lifecycle",
         FindingKind::TopicType => "type",
@@ -173,7 +178,25 @@ impl Work<'_> {
             | FindingKind::NodeRestarted
             | FindingKind::NodeLifecycle => {
                 let value = self.of_node(name, key);
+                if key == "within" {
+                    self.text.unset("nodes", name, "present_within")?;
+                }
                 self.write("nodes", name, key, value)
+            }
+            FindingKind::TopicRateLow | FindingKind::TopicRateHigh => {
+                let mut own = self.expectation.topics.iter();
+                let own = own
+                    .find(|own| own.name.as_str() == name)
+                    .map(|own| &own.facts);
+                let is_there = [
+                    ("hz", own.is_some_and(|own| own.hz.is_some())),
+                    ("mean_hz", own.is_some_and(|own| own.mean_hz.is_some())),
+                ];
+                for (key, _) in is_there.into_iter().filter(|(_, is_there)| *is_there) {
+                    let value = self.of_topic(name, key);
+                    self.write("topics", name, key, value)?;
+                }
+                Ok(())
             }
             FindingKind::TopicQos => {
                 self.text.unset("topics", name, "qos")?;
@@ -225,7 +248,10 @@ impl Work<'_> {
             .filter(|(role, _)| pattern.matches(role));
         let lines: Vec<&NodeLine> = lines.map(|(_, line)| line).collect();
         match key {
-            "may_end" => Some("true".to_owned()),
+            "may_end" => match lines[..] {
+                [line] => line.may_end.clone(),
+                _ => Some("true".to_owned()),
+            },
             "restarts" => {
                 let most = lines.iter().map(|l| l.restarts).max()?;
                 Some(format!("..{most}"))
@@ -235,11 +261,19 @@ impl Work<'_> {
                 let same = lines.iter().all(|l| l.lifecycle.as_ref() == Some(&first));
                 same.then(|| scalar(&first))
             }
-            _ => self.began(&pattern),
+            _ => match lines[..] {
+                [
+                    NodeLine {
+                        within: Some(within),
+                        ..
+                    },
+                ] => Some(within.clone()),
+                _ => self.began(&pattern),
+            },
         }
     }
 
-    /// The whole seconds within which a node appeared in all runs.
+    /// The stretch of whole seconds in which a node appeared in all runs.
     fn began(&self, pattern: &Pattern) -> Option<String> {
         let mut latest = 0;
         for run in self.runs {
@@ -249,7 +283,7 @@ impl Work<'_> {
                 latest = latest.max(began.time.since(run.span.start));
             }
         }
-        Some(length(whole(latest)))
+        Some(format!("..{}", length(whole(latest))))
     }
 
     /// The value of a topic's key that holds in all runs.
@@ -271,6 +305,9 @@ impl Work<'_> {
             "type" => line.kind.as_deref().map(scalar),
             "by" => line.by.as_ref().map(|by| list(by.iter())),
             "to" => (!line.to.is_empty()).then(|| list(line.to.iter())),
+            "within" => line.within.clone(),
+            "may_end" => line.may_end.clone(),
+            "mean_hz" => line.mean_hz.map(|hz| hz.to_string()),
             _ => line.hz.map(|hz| hz.to_string()),
         }
     }
@@ -290,20 +327,8 @@ impl Work<'_> {
     /// Whether the file lets a topic end.
     fn may_end(&self, pattern: &Pattern) -> bool {
         let mut topics = self.expectation.topics.iter();
-        topics.any(|own| own.name == *pattern && own.facts.may_end)
+        topics.any(|own| own.name == *pattern && own.facts.may_end.is_some())
     }
-}
-
-/// The nanoseconds rounded up to two digits.
-fn two_digits(nanos: i64) -> i64 {
-    let mut step = 1;
-    while nanos / step >= 100 {
-        step *= 10;
-    }
-    nanos
-        .div_euclid(step)
-        .saturating_add(i64::from(nanos % step > 0))
-        .saturating_mul(step)
 }
 
 /// The nanoseconds rounded up to a whole second.

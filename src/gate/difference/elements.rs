@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Difference, Where};
-use crate::base::rhythm::{CLOSING_NS, FEWEST};
+use crate::base::rhythm::FEWEST;
+use crate::base::time::Stamp;
 use crate::base::words;
 use crate::evidence::Degree;
 use crate::gate::facts::{Facts, Rate};
@@ -100,23 +101,29 @@ fn node(
         ));
     }
     let (one, other) = (a.lifecycle(first), b.lifecycle(second));
+    // A node on its way from one state to another is in both, as close as messages come in order.
+    let is_step = |state: &&str| state.ends_with("ing");
     if let (Some(one), Some(other)) = (&one, &other)
         && one != other
+        && !is_step(one)
+        && !is_step(other)
     {
         all.push(Difference::changed("lifecycle", name, *one, *other));
     }
-    let (one, other) = (end(a, first), end(b, second));
-    if one.is_some() != other.is_some() {
-        let told = |end: Option<String>| end.unwrap_or_else(|| "stays".to_owned());
-        all.push(Difference::changed("end", name, told(one), told(other)));
+    let (one, other) = (a.ended(first), b.ended(second));
+    let ended = one.or(other);
+    if one.is_some() != other.is_some() && ended.is_some_and(|(_, is_sure)| is_sure) {
+        let told = |facts: &Facts<'_>, end: Option<(Stamp, bool)>| match end {
+            Some((end, _)) => format!("ends at {}", facts.clock(end)),
+            None => "stays".to_owned(),
+        };
+        all.push(Difference::changed(
+            "end",
+            name,
+            told(a, one),
+            told(b, other),
+        ));
     }
-}
-
-/// The time at which nodes ended in words, if they did not stay.
-fn end(facts: &Facts<'_>, nodes: &[NodeId]) -> Option<String> {
-    let end = facts.lives(nodes).last()?.end;
-    let is_over = facts.mission.span.end.since(end) > CLOSING_NS;
-    is_over.then(|| format!("ends at {}", facts.clock(end)))
 }
 
 fn topic(

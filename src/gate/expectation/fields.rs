@@ -195,6 +195,35 @@ impl<'a> Fields<'a> {
         )
     }
 
+    /// The stretch in which something may end: all of the mission if it is `true`.
+    pub(super) fn may_end(&self) -> Result<Option<At<During>>> {
+        let parse = |text: &str| match text {
+            "true" => Some(Some(During::WHOLE)),
+            "false" => Some(None),
+            text => During::parse(text).map(Some),
+        };
+        let hint = "write `true`, or from when on: `1:30..`, `-20s..`";
+        let found = self.read("may_end", hint, parse)?;
+        Ok(found.and_then(|At { at, value }| Some(At { at, value: value? })))
+    }
+
+    /// The stretch in which something must begin: `within`, or a length from the start, `present_within`.
+    pub(super) fn within(&self) -> Result<Option<At<During>>> {
+        if let Some(length) = self.length("present_within")? {
+            if self.get("within").is_some() {
+                let reason = "`present_within` does not go with `within`";
+                let hint = "`present_within: 20s` means `within: ..20s`";
+                return Err(self.document.bad(length.at, reason, hint));
+            }
+            return Ok(Some(At {
+                at: length.at,
+                value: During::until(length.value),
+            }));
+        }
+        let hint = "write a stretch of time: `1:30..2m`, `..20s`";
+        self.read("within", hint, During::parse)
+    }
+
     pub(super) fn during(&self) -> Result<Option<During>> {
         let hint = "write a stretch of time: `1:30..2m`, `-30s..`";
         Ok(self.read("during", hint, During::parse)?.map(|d| d.value))

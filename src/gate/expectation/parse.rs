@@ -26,9 +26,11 @@ const NODE: &[&str] = &[
     "forbidden",
     "optional",
     "may_end",
+    "known_by",
     "restarts",
     "lifecycle",
     "present_within",
+    "within",
 ];
 const TOPIC: &[&str] = &[
     "forbidden",
@@ -38,8 +40,10 @@ const TOPIC: &[&str] = &[
     "by",
     "to",
     "hz",
+    "mean_hz",
     "percent",
     "max_gap",
+    "within",
     "latched",
     "qos",
 ];
@@ -51,8 +55,10 @@ const FORMS: &[(&str, &[&str])] = &[
         "topic",
         &[
             "hz",
+            "mean_hz",
             "percent",
             "max_gap",
+            "within",
             "by",
             "to",
             "type",
@@ -84,6 +90,7 @@ const RULE: &[&str] = &[
     "forbidden",
     "optional",
     "may_end",
+    "known_by",
     "restarts",
     "lifecycle",
     "present_within",
@@ -91,6 +98,7 @@ const RULE: &[&str] = &[
     "by",
     "to",
     "hz",
+    "mean_hz",
     "percent",
     "max_gap",
     "latched",
@@ -211,10 +219,15 @@ fn node(fields: &Fields<'_>) -> Result<NodeFacts> {
     Ok(NodeFacts {
         forbidden: fields.is_set("forbidden")?,
         optional: fields.is_set("optional")?,
-        may_end: fields.is_set("may_end")?,
+        may_end: fields.may_end()?,
+        is_logged: fields
+            .read("known_by", "write `known_by: log`", |text| {
+                (text == "log").then_some(())
+            })?
+            .is_some(),
         restarts: fields.range("restarts")?,
         lifecycle: fields.string("lifecycle")?,
-        within: fields.length("present_within")?,
+        within: fields.within()?,
     })
 }
 
@@ -223,11 +236,13 @@ fn topic(fields: &Fields<'_>) -> Result<TopicFacts> {
     Ok(TopicFacts {
         forbidden: fields.is_set("forbidden")?,
         optional: fields.is_set("optional")?,
-        may_end: fields.is_set("may_end")?,
+        may_end: fields.may_end()?,
         kind: fields.string("type")?,
         by: fields.names("by")?,
         to: fields.names("to")?,
         hz: fields.range("hz")?,
+        mean_hz: fields.range("mean_hz")?,
+        within: fields.within()?,
         percent: fields
             .read("percent", "write 0 to 100", share)?
             .map(|p| p.value),

@@ -77,7 +77,7 @@ impl<'a> Facts<'a> {
         all
     }
 
-    /// The rates by which a topic is judged: of every whole window from its first message to the mission's end, or to
+    /// The rates by which a topic is judged: of every window, whole or more than half of one, from its first message to the mission's end, or to
     /// its last message if it `may_end`.
     pub(crate) fn rates(&self, topic: TopicId, may_end: bool, during: Span) -> Vec<Rate> {
         let Some(heard) = self.heard(topic) else {
@@ -88,7 +88,9 @@ impl<'a> Facts<'a> {
         for window in &self.mission.windows {
             let row = rows.next_if(|(own, _)| own.index == window.index);
             let inside = during.start <= window.span.start && window.span.end <= during.end;
-            if window.partial || !inside {
+            // The rest of a window that the mission's end cuts shows a rate where it is long enough.
+            let is_short = window.span.nanos() < self.mission.period.nanos() / 2;
+            if window.partial && is_short || !inside {
                 continue;
             }
             let rate = |span| Rate {
@@ -109,6 +111,18 @@ impl<'a> Facts<'a> {
         } else {
             all
         }
+    }
+
+    /// The rate of a topic from its first to its last message, as one that covers all of it; `None` with fewer than two.
+    pub(crate) fn mean(&self, topic: TopicId) -> Option<Rate> {
+        let heard = self.heard(topic)?;
+        let count = self.messages(topic).checked_sub(1)?;
+        (count > 0).then_some(Rate {
+            window: 0,
+            span: heard,
+            count,
+            median_s: None,
+        })
     }
 
     /// The part of a window in which a topic that was heard from one time to another counts; `None` if it is too short.

@@ -1,17 +1,24 @@
 //! The judgement of nodes: to be there, to stay, to come in time, not to restart, to end in a state.
 
+use super::topic::NAMED;
 use super::{Judge, absence};
 use crate::base::rhythm::CLOSING_NS;
 use crate::base::time::Span;
 use crate::base::words;
-use crate::gate::expectation::{Named, NodeFacts, YamlPlace};
+use crate::gate::expectation::{At, Named, NodeFacts, YamlPlace};
 use crate::gate::finding::{Cause, Finding, FindingKind};
 use crate::gate::pattern::Pattern;
+use crate::gate::range::During;
 use crate::graph::NodeId;
 use crate::mission::ledger;
 
 /// The roles that a name stands for.
 type Roles<'a> = [(&'a str, &'a [NodeId])];
+
+/// The place of a stretch in which something may end, unless that is all of the mission, which asks for nothing.
+pub(super) fn limited(may_end: &At<During>) -> Option<YamlPlace> {
+    (may_end.value != During::WHOLE).then_some(may_end.at)
+}
 
 impl Judge<'_> {
     /// Judges a node of the file.
@@ -40,19 +47,22 @@ impl Judge<'_> {
     pub(super) fn node_facts(&mut self, title: &str, pattern: &Pattern, facts: &NodeFacts) {
         let roles = self.facts.nodes(pattern);
         let wanted = [
-            ("present_within", facts.within.as_ref().map(|w| w.at)),
+            ("within", facts.within.as_ref().map(|w| w.at)),
+            ("may_end", facts.may_end.as_ref().and_then(limited)),
             ("restarts", facts.restarts.as_ref().map(|r| r.at)),
             ("lifecycle", facts.lifecycle.as_ref().map(|l| l.at)),
         ];
         for (key, place) in wanted {
             let Some(place) = place else { continue };
             let title = format!("{title} {key}");
-            if roles.is_empty() {
+            let is_timed = matches!(key, "within" | "may_end");
+            if roles.is_empty() || is_timed && self.is_part {
                 self.moot(title, place);
                 continue;
             }
             let found = match key {
-                "present_within" => self.late(&roles, facts, place),
+                "within" => self.late(&roles, facts, place),
+                "may_end" => self.ended(&roles, facts, place),
                 "restarts" => self.restarted(&roles, facts, place),
                 _ => self.lifecycle(&roles, facts, place),
             };
@@ -96,16 +106,24 @@ impl Judge<'_> {
         if roles.is_empty() {
             return match (facts.optional, self.names_nodes) {
                 (true, _) => Vec::new(),
+                (false, _) if facts.is_logged => {
+                    let says =
+                        format!("cannot tell whether {name} is there: only its log would say so");
+                    vec![Finding::unknown(FindingKind::NodeMissing, name, at, says)]
+                }
                 (false, true) => vec![self.missing(pattern, at)],
                 (false, false) => vec![self.unnamed(FindingKind::NodeMissing, name, at)],
             };
         }
-        if facts.may_end {
+        if let Some(finding) = self.mute(pattern, at).filter(|_| !facts.optional) {
+            return vec![finding];
+        }
+        if facts.may_end.is_some() {
             return Vec::new();
         }
         roles
             .iter()
-            .filter_map(|(role, nodes)| self.gone(role, nodes, at))
+            .filter_map(|(role, nodes)| self.gone(role, nodes, "to stay", at))
             .collect()
     }
 
@@ -140,6 +158,24 @@ impl Judge<'_> {
         Finding::unknown(kind, name, at, says).hint(hint)
     }
 
+    /// The finding that a node is named, and none of the topics that only it publishes has a message.
+    fn mute(&self, pattern: &Pattern, at: YamlPlace) -> Option<Finding> {
+        let own = self.expectation.topics.iter().filter(|topic| {
+            let by = topic.facts.by.iter().flat_map(|by| &by.value);
+            let by: Vec<&str> = by.map(|by| by.value.as_str()).collect();
+            by == [pattern.as_str()] && self.is_owed(&topic.facts)
+        });
+        let own: Vec<&str> = own.map(|topic| topic.name.as_str()).collect();
+        let is_sent = |name: &&str| self.is_sent(&self.facts.topics(&Pattern::new(name)));
+        if own.is_empty() || own.iter().any(is_sent) {
+            return None;
+        }
+        let topics = words::some_of(&own, NAMED);
+        let says = format!("{pattern} sends nothing: {topics} without a message");
+        let finding = Finding::new(FindingKind::NodeMissing, pattern.as_str(), at, says);
+        Some(finding.saw("no message", topics))
+    }
+
     fn missing(&self, pattern: &Pattern, at: YamlPlace) -> Finding {
         let name = pattern.as_str();
         let roles = self.facts.roles().map(|(role, _)| role);
@@ -157,21 +193,33 @@ impl Judge<'_> {
         }
     }
 
-    fn gone(&self, role: &str, nodes: &[NodeId], at: YamlPlace) -> Option<Finding> {
+    /// The findings on whether a node ended in the time in which it may.
+    fn ended(&self, roles: &Roles<'_>, facts: &NodeFacts, at: YamlPlace) -> Vec<Finding> {
+        let Some(may_end) = &facts.may_end else {
+            return Vec::new();
+        };
+        let allowed = may_end.value.on(self.facts.mission.span);
+        let expected = format!("to end within {}", self.facts.stretch(allowed));
+        let found = roles.iter().filter_map(|(role, nodes)| {
+            let (end, _) = self.facts.ended(nodes)?;
+            let is_off = end < allowed.start || end > allowed.end;
+            is_off.then(|| self.gone(role, nodes, &expected, at))?
+        });
+        found.collect()
+    }
+
+    fn gone(&self, role: &str, nodes: &[NodeId], expected: &str, at: YamlPlace) -> Option<Finding> {
         let whole = self.facts.mission.span;
-        let end = self.facts.lives(nodes).last()?.end;
-        if whole.end.since(end) <= CLOSING_NS {
-            return None;
-        }
+        let (end, _) = self.facts.ended(nodes)?;
         let clock = self.facts.clock(end);
         let finding = Finding::new(
             FindingKind::NodeGone,
             role,
             at,
-            format!("{role} ended at {clock}, expected to stay"),
+            format!("{role} ended at {clock}, expected {expected}"),
         );
         let mut finding = finding
-            .saw(format!("ended at {clock}"), "to the end")
+            .saw(format!("ended at {clock}"), expected)
             .at(Span {
                 start: end,
                 end: whole.end,
@@ -192,16 +240,19 @@ impl Judge<'_> {
         let Some(within) = &facts.within else {
             return Vec::new();
         };
-        let start = self.facts.mission.span.start;
-        let limit = start.plus(within.value);
-        let expected = format!("within {}", words::duration(within.value));
+        let whole = self.facts.mission.span;
+        let allowed = within.value.on(whole);
+        let expected = format!("within {}", self.facts.stretch(allowed));
         let late = roles.iter().filter_map(|(role, nodes)| {
             let began = self.facts.began(nodes)?;
-            if began.time <= limit {
+            // What is there when the recording starts began who knows when.
+            let is_late = began.time > allowed.end;
+            let is_early = began.time < allowed.start && began.earliest > whole.start;
+            if !is_late && !is_early {
                 return None;
             }
             let clock = self.facts.clock(began.time);
-            if began.earliest <= limit {
+            if is_late && began.earliest <= allowed.end {
                 let says = format!(
                     "cannot tell whether {role} appeared {expected}: its first sign is at {clock}"
                 );
@@ -210,7 +261,7 @@ impl Judge<'_> {
             let says = format!("{role} appeared at {clock}, expected {expected}");
             let finding = Finding::new(FindingKind::NodeLate, role, at, says);
             Some(finding.saw(format!("at {clock}"), &expected).at(Span {
-                start,
+                start: whole.start,
                 end: began.time,
             }))
         });

@@ -1,6 +1,7 @@
 //! The judgement of rates and gaps of topics: in every whole window, or in those that a rule means.
 
 use super::Judge;
+use crate::base::rhythm::{CLOSING_NS, DISCOVERY_NS};
 use crate::base::time::Span;
 use crate::base::words;
 use crate::gate::expectation::{TopicFacts, While, YamlPlace};
@@ -42,6 +43,101 @@ impl Judge<'_> {
             .collect()
     }
 
+    /// The findings on whether a topic's rate from its first to its last message lies in its range.
+    pub(super) fn mean(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
+        let Some(range) = facts.mean_hz.as_ref().map(|hz| hz.value) else {
+            return Vec::new();
+        };
+        let rates = if facts.during.is_none() && facts.whilst.is_none() {
+            self.facts.mean(topic).into_iter().collect()
+        } else {
+            self.judged(topic, facts)
+        };
+        let (Some(first), Some(last)) = (rates.first(), rates.last()) else {
+            return self.no_window(topic, facts, at);
+        };
+        let count: u64 = rates.iter().map(|r| r.count).sum();
+        let nanos: i64 = rates.iter().map(|r| r.span.nanos()).sum();
+        let mean = count as f64 / (nanos.max(1) as f64 / 1e9);
+        if range.holds(mean) {
+            return Vec::new();
+        }
+        let kind = if range.is_above(mean) {
+            FindingKind::TopicRateLow
+        } else {
+            FindingKind::TopicRateHigh
+        };
+        let name = self.facts.topic(topic);
+        let hz = words::rate(mean);
+        let span = Span {
+            start: first.span.start,
+            end: last.span.end,
+        };
+        let says = format!("{name} at {hz} from first to last message, expected {range}");
+        let finding = Finding::new(kind, name, at, says)
+            .saw(&hz, words::rate_range(range.from, range.to))
+            .at(span)
+            .detail(self.facts.stretch(span));
+        vec![finding]
+    }
+
+    /// The findings on whether a topic's first message came in its time.
+    pub(super) fn first(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
+        let whole = self.facts.mission.span;
+        let heard = self.facts.heard(topic);
+        let (Some(within), Some(heard)) = (&facts.within, heard) else {
+            return Vec::new();
+        };
+        let allowed = within.value.on(whole);
+        // What is there when the recorder starts began who knows when.
+        let is_early = heard.start < allowed.start && heard.start.since(whole.start) > DISCOVERY_NS;
+        if heard.start <= allowed.end && !is_early {
+            return Vec::new();
+        }
+        let name = self.facts.topic(topic);
+        let clock = self.facts.clock(heard.start);
+        let expected = format!("within {}", self.facts.stretch(allowed));
+        let says = format!("{name} began at {clock}, expected {expected}");
+        let finding = Finding::new(FindingKind::TopicLate, name, at, says);
+        let span = Span {
+            start: whole.start,
+            end: heard.start,
+        };
+        let mut finding = finding.saw(format!("at {clock}"), expected).at(span);
+        finding.details.extend(Self::senders(facts));
+        vec![finding]
+    }
+
+    /// The findings on whether a topic ended in the time in which it may.
+    pub(super) fn last(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
+        let whole = self.facts.mission.span;
+        let (Some(may_end), Some(heard)) = (&facts.may_end, self.facts.heard(topic)) else {
+            return Vec::new();
+        };
+        let allowed = may_end.value.on(whole);
+        let is_over = whole.end.since(heard.end) <= CLOSING_NS;
+        if is_over || allowed.start <= heard.end && heard.end <= allowed.end {
+            return Vec::new();
+        }
+        let name = self.facts.topic(topic);
+        let clock = self.facts.clock(heard.end);
+        let expected = format!("to end within {}", self.facts.stretch(allowed));
+        let says = format!("{name} ended at {clock}, expected {expected}");
+        let around = Span {
+            start: heard.end.plus(-CLOSING_NS),
+            end: heard.end.plus(CLOSING_NS),
+        };
+        let mut finding = Finding::new(FindingKind::TopicGone, name, at, says)
+            .saw(format!("ended at {clock}"), expected)
+            .at(Span {
+                start: heard.end,
+                end: whole.end,
+            });
+        finding.details.extend(Self::senders(facts));
+        finding.cause = self.facts.cause_for_topic(topic, around);
+        vec![finding]
+    }
+
     /// The findings where no window is judged: none for a condition that never held, else that it cannot be told.
     fn no_window(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
         if facts.whilst.is_some() {
@@ -57,7 +153,7 @@ impl Judge<'_> {
     fn judged(&self, topic: TopicId, facts: &TopicFacts) -> Vec<Rate> {
         let whole = self.facts.mission.span;
         let during = facts.during.map_or(whole, |d| d.on(whole));
-        let mut rates = self.facts.rates(topic, facts.may_end, during);
+        let mut rates = self.facts.rates(topic, facts.may_end.is_some(), during);
         if let Some(whilst) = &facts.whilst {
             let holds = self.holds(whilst);
             rates.retain(|rate| holds.get(rate.window) == Some(&true));
@@ -147,7 +243,7 @@ impl Judge<'_> {
         };
         let whole = self.facts.mission.span;
         let during = facts.during.map_or(whole, |d| d.on(whole));
-        let silences = self.facts.silences(topic, facts.may_end, during);
+        let silences = self.facts.silences(topic, facts.may_end.is_some(), during);
         let longest = silences.iter().max_by_key(|silence| silence.nanos);
         let Some(TopicSilence { span, nanos }) = longest.filter(|s| s.nanos > most) else {
             return Vec::new();

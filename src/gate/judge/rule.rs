@@ -66,12 +66,15 @@ impl Judge<'_> {
                 && self.facts.nodes(&name.value).is_empty()
             {
                 let span = self.facts.mission.span;
-                if span.start.plus(within.value) > span.end {
-                    self.note(title, name.at, vec![self.too_short(name, within.value)]);
+                if within.value.is_beyond(span) {
+                    self.note(title, name.at, vec![self.too_short(name)]);
                     continue;
                 }
                 let is_there = NodeFacts {
-                    may_end: true,
+                    may_end: Some(At {
+                        at: name.at,
+                        value: During::WHOLE,
+                    }),
                     ..NodeFacts::default()
                 };
                 let found = self.presence(&name.value, name.at, &is_there);
@@ -83,12 +86,10 @@ impl Judge<'_> {
     }
 
     /// The finding that the mission ended before a node had to be there.
-    fn too_short(&self, name: &At<Pattern>, within: i64) -> Finding {
+    fn too_short(&self, name: &At<Pattern>) -> Finding {
         let (name, at) = (name.value.as_str(), name.at);
         let long = words::duration(self.facts.mission.span.nanos());
-        let within = words::duration(within);
-        let says =
-            format!("cannot tell whether {name} appears within {within}: the mission lasts {long}");
+        let says = format!("cannot tell whether {name} appears in time: the mission lasts {long}");
         Finding::unknown(FindingKind::NodeLate, name, at, says)
     }
 
@@ -99,7 +100,9 @@ impl Judge<'_> {
             self.note(title, name.at, found);
             return;
         }
-        if self.facts.topics(&name.value).is_empty() {
+        let topics = self.facts.topics(&name.value);
+        let needs = facts.whilst.is_none() && self.is_owed(facts);
+        if topics.is_empty() || needs && !self.is_sent(&topics) {
             let found = self.topic_presence(&name.value, name.at, facts);
             self.note(title, name.at, found);
             return;

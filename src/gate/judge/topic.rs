@@ -1,5 +1,6 @@
 //! The judgement of topics: to be there, with their type, publishers, subscribers and quality of service.
 
+use super::node::limited;
 use super::{Judge, absence};
 use crate::base::words;
 use crate::evidence::Degree;
@@ -9,7 +10,7 @@ use crate::gate::pattern::Pattern;
 use crate::graph::TopicId;
 
 /// The number of names that are told in one line.
-const NAMED: usize = 6;
+pub(super) const NAMED: usize = 6;
 
 impl Judge<'_> {
     /// Judges a topic of the file.
@@ -41,7 +42,10 @@ impl Judge<'_> {
             ("type", facts.kind.as_ref().map(|k| k.at)),
             ("by", facts.by.as_ref().map(|b| b.at)),
             ("to", facts.to.as_ref().map(|t| t.at)),
+            ("within", facts.within.as_ref().map(|w| w.at)),
+            ("may_end", facts.may_end.as_ref().and_then(limited)),
             ("hz", facts.hz.as_ref().map(|h| h.at)),
+            ("mean_hz", facts.mean_hz.as_ref().map(|h| h.at)),
             ("max_gap", facts.max_gap.as_ref().map(|g| g.at)),
             ("latched", facts.latched.as_ref().map(|l| l.at)),
             ("qos", facts.qos.as_ref().map(|q| q.at)),
@@ -49,7 +53,12 @@ impl Judge<'_> {
         for (key, place) in wanted {
             let Some(place) = place else { continue };
             let title = format!("{title} {key}");
-            if topics.is_empty() {
+            let is_of_messages = matches!(key, "within" | "may_end" | "hz" | "mean_hz" | "max_gap");
+            let is_timed = matches!(key, "within" | "may_end" | "mean_hz");
+            if topics.is_empty()
+                || is_timed && self.is_part
+                || is_of_messages && !self.is_sent(&topics)
+            {
                 self.moot(title, place);
                 continue;
             }
@@ -57,7 +66,10 @@ impl Judge<'_> {
                 "type" => self.kind(*topic, facts, place),
                 "by" => self.publishers(*topic, facts),
                 "to" => self.subscribers(*topic, facts),
+                "within" => self.first(*topic, facts, place),
+                "may_end" => self.last(*topic, facts, place),
                 "hz" => self.rate(*topic, facts, place),
+                "mean_hz" => self.mean(*topic, facts, place),
                 "max_gap" => self.gap(*topic, facts, place),
                 "latched" => self.latched(*topic, facts, place),
                 _ => self.qos(*topic, facts, place),
@@ -85,24 +97,59 @@ impl Judge<'_> {
         at: YamlPlace,
         facts: &TopicFacts,
     ) -> Vec<Finding> {
-        if facts.optional || !self.facts.topics(pattern).is_empty() {
+        let topics = self.facts.topics(pattern);
+        let is_there = match self.is_owed(facts) {
+            true => self.is_sent(&topics),
+            false => !topics.is_empty(),
+        };
+        if facts.optional || is_there {
             return Vec::new();
         }
         let name = pattern.as_str();
+        let is_named = !topics.is_empty();
         let topics = self.facts.mission.elements.topics.iter();
         let names = topics.map(|t| t.name.as_str()).filter(|n| *n != name);
         let near = self.near(pattern, names);
-        let says = format!("{name} is not in the bag");
+        let (says, seen, expected) = match is_named {
+            true => (
+                format!("{name} has no message in the bag"),
+                "no message",
+                "messages",
+            ),
+            false => (format!("{name} is not in the bag"), "absent", "present"),
+        };
         let mut finding =
-            Finding::new(FindingKind::TopicMissing, name, at, says).saw("absent", "present");
+            Finding::new(FindingKind::TopicMissing, name, at, says).saw(seen, expected);
         // Where its publisher is missing too, that is why.
         let by = facts.by.iter().flat_map(|by| &by.value);
         let mut lost = by.filter(|by| self.facts.nodes(&by.value).is_empty());
         finding.cause = lost.next().map(|by| absence(by.value.as_str()));
+        finding.details.extend(Self::senders(facts));
         vec![match near {
-            Some(near) => finding.hint(near),
-            None => finding,
+            Some(near) if !is_named => finding.hint(near),
+            _ => finding,
         }]
+    }
+
+    /// Whether a topic must have messages: something is asked of them, and the time in which they came is judged.
+    pub(super) fn is_owed(&self, facts: &TopicFacts) -> bool {
+        facts.wants_messages() && !facts.optional && !self.is_part
+    }
+
+    /// The nodes that the file says publish a topic, as a remark.
+    pub(super) fn senders(facts: &TopicFacts) -> Option<String> {
+        let by: Vec<&str> = facts
+            .by
+            .iter()
+            .flat_map(|by| &by.value)
+            .map(|p| p.value.as_str())
+            .collect();
+        (!by.is_empty()).then(|| format!("published by {}", words::some_of(&by, NAMED)))
+    }
+
+    /// Whether any of these topics has a message.
+    pub(super) fn is_sent(&self, topics: &[TopicId]) -> bool {
+        topics.iter().any(|topic| self.facts.messages(*topic) > 0)
     }
 
     fn kind(&self, topic: TopicId, facts: &TopicFacts, at: YamlPlace) -> Vec<Finding> {
