@@ -205,8 +205,8 @@ impl Times {
     /// a short mission; and as much as the runs differ. One run does not show how much that is.
     fn room(&self, times: &[i64]) -> Option<(i64, i64, i64)> {
         let (first, last) = (*times.iter().min()?, *times.iter().max()?);
-        let least = (self.shortest / 10).clamp(SECOND, CLOSING_NS);
-        let room = least.max(last / 10).max(last - first);
+        let usual = (self.shortest / 10).clamp(SECOND, CLOSING_NS);
+        let room = usual.max(last / 10).max(last - first);
         let room = if self.runs > 1 { room } else { 2 * room };
         Some((first, last, room))
     }

@@ -98,9 +98,10 @@ impl Judge<'_> {
         facts: &TopicFacts,
     ) -> Vec<Finding> {
         let topics = self.facts.topics(pattern);
-        let is_there = match self.is_owed(facts) {
-            true => self.is_sent(&topics),
-            false => !topics.is_empty(),
+        let is_there = if self.is_owed(facts) {
+            self.is_sent(&topics)
+        } else {
+            !topics.is_empty()
         };
         if facts.optional || is_there {
             return Vec::new();
@@ -110,13 +111,14 @@ impl Judge<'_> {
         let topics = self.facts.mission.elements.topics.iter();
         let names = topics.map(|t| t.name.as_str()).filter(|n| *n != name);
         let near = self.near(pattern, names);
-        let (says, seen, expected) = match is_named {
-            true => (
+        let (says, seen, expected) = if is_named {
+            (
                 format!("{name} has no message in the bag"),
                 "no message",
                 "messages",
-            ),
-            false => (format!("{name} is not in the bag"), "absent", "present"),
+            )
+        } else {
+            (format!("{name} is not in the bag"), "absent", "present")
         };
         let mut finding =
             Finding::new(FindingKind::TopicMissing, name, at, says).saw(seen, expected);
