@@ -218,6 +218,7 @@ fn each_fault_of_the_warehouse_breaks_what_it_should_and_nothing_else() {
             |run| crash(run, "/robot1/imu_driver", 200),
             &[
                 "node-gone /robot1/imu_driver",
+                "topic-gap /robot1/imu/data",
                 "topic-rate-low /bond",
                 "topic-rate-low /robot1/imu/data",
             ],
@@ -242,6 +243,7 @@ fn each_fault_of_the_warehouse_breaks_what_it_should_and_nothing_else() {
             |run| join(run, "/teleop", "/robot1/cmd_vel", (200, 220)),
             &[
                 "publisher-unexpected /robot1/cmd_vel",
+                "topic-rate-high /robot1/cmd_vel",
                 "unexpected-node /teleop",
             ],
         ),

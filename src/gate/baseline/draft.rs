@@ -21,6 +21,8 @@ const MEAN_SHARE: f64 = 0.15;
 const FEWEST_OF_MEAN: u64 = 40;
 /// A silence may be so many times as long as the longest of the runs.
 const GAPS: i64 = 2;
+/// It may be so many usual intervals long besides: one or two messages are lost now and then.
+const INTERVALS: i64 = 4;
 /// The number of times the spread between windows by which a rate may differ besides.
 const SPREADS: f64 = 3.0;
 
@@ -355,7 +357,19 @@ fn longest(seen: &[TopicInRun<'_>], may_end: bool) -> Option<i64> {
         all.iter().map(|silence| silence.nanos).max()
     };
     let longest = seen.iter().map(silence).collect::<Option<Vec<i64>>>()?;
-    let gap = longest.into_iter().max()?.saturating_mul(GAPS).max(GAP_NS);
+    let usual = |s: &TopicInRun<'_>| {
+        let mean = s.facts.mean(s.id)?;
+        i64::try_from(mean.count)
+            .ok()
+            .map(|count| mean.span.nanos() / count)
+    };
+    let usual = seen
+        .iter()
+        .filter_map(usual)
+        .max()?
+        .saturating_mul(INTERVALS);
+    let longest = longest.into_iter().max()?.saturating_mul(GAPS);
+    let gap = longest.max(usual).max(GAP_NS);
     let life = seen
         .iter()
         .filter_map(|s| s.facts.heard(s.id))
