@@ -328,6 +328,21 @@ impl Elements {
         }
     }
 
+    /// The only publication of each topic; `None` where none or several are known, or where the bag counts publishers
+    /// that it does not name.
+    pub(crate) fn sole_publishers(&self) -> Vec<Option<EdgeId>> {
+        let mut found = vec![(0, None); self.topics.len()];
+        for (id, edge) in (0..).zip(&self.publishes) {
+            if let Some(found) = found.get_mut(edge.topic as usize) {
+                *found = (found.0 + 1, Some(id));
+            }
+        }
+        let is_all = |topic: &Topic| topic.unknown_publishers.unwrap_or(0) == 0;
+        let each = self.topics.iter().zip(found);
+        each.map(|(topic, (many, id))| id.filter(|_| many == 1 && is_all(topic)))
+            .collect()
+    }
+
     /// The first and the last sign of life of an element, where known.
     pub fn life(&self, element: Element) -> (Option<Stamp>, Option<Stamp>) {
         match element {

@@ -241,6 +241,22 @@ pub enum Mark {
 }
 
 impl Mark {
+    /// Its word in SVG: what exactly happened.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Added => "added",
+            Self::Removed => "removed",
+            Self::Faster => "faster",
+            Self::Slower => "slower",
+            Self::HandedOver => "handed-over",
+            Self::Restarted => "restarted",
+            Self::Paused => "paused",
+            Self::Changed => "changed",
+            Self::Inside => "inside",
+            Self::Away => "away",
+        }
+    }
+
     /// The class in SVG: `added`, `removed`, `away` or `changed`.
     pub fn class(self) -> &'static str {
         match self {
@@ -269,7 +285,8 @@ pub struct Shown {
     pub steady_hz: Option<f64>,
     /// Messages per second before and after, where `mark` is `Faster` or `Slower`.
     pub rates: Option<(f64, f64)>,
-    /// Whether it is silent or away all through the window, with a beginning and an end in the ledger.
+    /// Whether it is silent or away all through the window, with a beginning and an end in the ledger, or no message
+    /// came yet.
     pub is_paused: bool,
     /// The headlines behind `mark`, sorted: places in the ledger.
     pub entries: Vec<EntryId>,
@@ -277,12 +294,35 @@ pub struct Shown {
     pub topics: usize,
     /// The number of equal namespaces it stands for in the window; 0 for all else.
     pub each: usize,
+    /// The nodes and topics in a folded namespace in the graph of the window; none for all else.
+    pub members: Members,
     /// The number of headlines of each kind about elements inside a folded namespace or a bundle; `None` without any.
     pub inside: Option<Box<Counts>>,
     /// The number of messages in the window, if known.
     pub count: Option<u64>,
     /// The lifecycle state of a node, if it has one.
     pub lifecycle: Option<Arc<str>>,
+}
+
+/// The numbers of nodes and topics in a folded namespace that are in the graph of a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Members {
+    /// The number of nodes.
+    pub nodes: usize,
+    /// The number of topics.
+    pub topics: usize,
+}
+
+impl Members {
+    /// The number that the box gives: of its nodes, or of its topics where it has no node; `None` for no folded
+    /// namespace.
+    pub(crate) fn number(self) -> Option<(usize, &'static str)> {
+        match (self.nodes, self.topics) {
+            (0, 0) => None,
+            (0, topics) => Some((topics, "topic")),
+            (nodes, _) => Some((nodes, "node")),
+        }
+    }
 }
 
 impl Shown {
@@ -300,6 +340,7 @@ impl Shown {
             entries: Vec::new(),
             topics: 0,
             each: 0,
+            members: Members::default(),
             inside: None,
             count: None,
             lifecycle: None,

@@ -10,6 +10,7 @@
 
 mod architecture;
 mod board;
+mod boxes;
 mod ci;
 mod cli;
 mod counts;

@@ -38,6 +38,29 @@ impl<'a> Collapse<'a> {
         found
     }
 
+    /// Opens the namespaces that would fold fewer than two of these names, and those in which a single node would be
+    /// left beside what is kept open: a box that stands for one thing has the name of that.
+    pub(crate) fn open_single(&mut self, nodes: &BTreeSet<&str>, topics: &BTreeSet<&str>) {
+        let mut folded: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
+        for (at, names) in [nodes, topics].into_iter().enumerate() {
+            for space in names.iter().filter_map(|name| self.of(name)) {
+                folded.entry(space).or_default()[at] += 1;
+            }
+        }
+        let is_rest = |space: &str| {
+            let mut open = self.expand.iter();
+            open.any(|name| {
+                name.strip_prefix(space)
+                    .is_some_and(|rest| rest.starts_with('/'))
+            })
+        };
+        let single = folded
+            .into_iter()
+            .filter(|(space, [nodes, topics])| nodes + topics < 2 || *nodes == 1 && is_rest(space));
+        let single: Vec<&str> = single.map(|(space, _)| space).collect();
+        self.collapse.retain(|space| !single.contains(space));
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.collapse.is_empty()
     }
@@ -225,6 +248,21 @@ mod tests {
         assert_eq!(boxes, [("/a/y", 1), ("/a/u", 1), ("/a", 3)]);
         let homes: BTreeSet<Option<usize>> = view.items.iter().map(|item| item.cluster).collect();
         assert_eq!(homes, [Some(0)].into());
+    }
+
+    #[test]
+    fn a_fold_has_two_members() {
+        let mission = mission(&["/a/x /b/y /b/z>/b/u", "/a/x /b/z>/b/u"]);
+        let names = |options: &ViewOptions| -> Vec<String> {
+            let view = outline(&mission, options);
+            view.items
+                .iter()
+                .map(|item| item.name.to_string())
+                .collect()
+        };
+        assert_eq!(names(&options(&["/a", "/b"], &[])), ["/a/x", "/b"]);
+        let kept = options(&["/a", "/b"], &["/b/y"]);
+        assert_eq!(names(&kept), ["/a/x", "/b/y", "/b/z", "/b/u"]);
     }
 
     #[test]

@@ -57,14 +57,15 @@ pub(crate) fn frames(mission: &Mission, options: &ViewOptions, viewed: &Viewed) 
     }
 }
 
-/// For each window, whether it is the first, or an entry of the ledger begins or ends in it or in the window before: in
-/// all others everything stays as it is.
+/// For each window, whether it is the first, or an entry of the ledger begins or ends in it or in the window before, or
+/// the first message of a topic comes: in all others everything stays as it is.
 fn turns(mission: &Mission) -> Vec<bool> {
     let windows = &mission.windows;
     let mut turns = vec![false; windows.len()];
     let entries = mission.ledger.entries.iter();
     let times = entries.flat_map(|entry| [Some(entry.time), entry.until]);
-    for time in times.flatten() {
+    let first = mission.elements.topics.iter().map(|topic| topic.first);
+    for time in times.chain(first).flatten() {
         let from = windows.partition_point(|w| w.span.end <= time);
         let to = windows.partition_point(|w| w.span.start <= time) + 1;
         for turn in turns.iter_mut().take(to).skip(from) {
@@ -538,6 +539,18 @@ mod tests {
             seen(&windows, &open),
             seen(&windows, &ViewOptions::default())
         );
+    }
+
+    #[test]
+    fn a_sole_publisher_carries_the_rate_of_its_topic() {
+        let hz = |window: &str| {
+            let (view, _) = view(&mission(&[window]), &ViewOptions::default());
+            let seen = view.seen(0).arrows;
+            seen.iter().map(|arrow| arrow.hz).collect::<Vec<_>>()
+        };
+        assert_eq!(hz("=/t@63 /a>/t"), [Some(63.0)]);
+        assert_eq!(hz("=/t@63 /a>/t /b>/t"), [None, None]);
+        assert_eq!(hz("=/t@63 /a>/t@60 /b>/t"), [Some(60.0), None]);
     }
 
     #[test]

@@ -103,7 +103,7 @@ impl Viewed {
     }
 
     fn set_items(&mut self, elements: &Elements, options: &ViewOptions, groups: &Groups) {
-        let collapse = Collapse::new(options);
+        let mut collapse = Collapse::new(options);
         let seen = |reasons: &[Option<_>], at: usize| reasons.get(at) == Some(&None);
         let mut names: Vec<Arc<str>> = if options.exact_names {
             elements.nodes.iter().map(|n| n.name.shared()).collect()
@@ -114,6 +114,17 @@ impl Viewed {
             if let Some(stand_in) = self.fleets.stand_in(name) {
                 *name = stand_in;
             }
+        }
+        if !collapse.is_empty() {
+            let shown = |(at, name)| seen(&self.selection.nodes, at).then_some(name);
+            let folded = names
+                .iter()
+                .map(|name| &**name)
+                .enumerate()
+                .filter_map(shown);
+            let topics = elements.topics.iter().map(|topic| topic.name.as_str());
+            let topics = topics.filter(|_| options.mode != Mode::Nodes);
+            collapse.open_single(&folded.collect(), &topics.collect());
         }
         let nodes: Vec<Option<ItemKey>> = (elements.nodes.iter().zip(&names).enumerate())
             .map(|(at, (_, name))| {

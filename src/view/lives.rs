@@ -61,12 +61,14 @@ impl<'a> ItemTurns<'a> {
 
     /// The elements that live just before a moment.
     pub(crate) fn before(&self, at: Stamp) -> Alive {
-        self.alive(|turns| lives_at(turns, turns.partition_point(|t| t.0 < at)))
+        self.alive(at, |turns| {
+            lives_at(turns, turns.partition_point(|t| t.0 < at))
+        })
     }
 
     /// The elements that live at any time of a window.
     pub(crate) fn during(&self, span: Span) -> Alive {
-        self.alive(|turns| {
+        self.alive(span.end, |turns| {
             let first = turns.partition_point(|t| t.0 < span.start);
             let inside = turns[first..].iter().take_while(|t| t.0 < span.end);
             lives_at(turns, first) || inside.into_iter().any(|t| t.1)
@@ -101,9 +103,9 @@ impl<'a> ItemTurns<'a> {
         })
     }
 
-    /// `own` says whether an element lives by its own beginnings and ends. An edge lives with its node; a topic without
-    /// turns of its own lives with its edges.
-    fn alive(&self, own: impl Fn(&[(Stamp, bool)]) -> bool) -> Alive {
+    /// `own` says whether an element lives by its own beginnings and ends, the last of them before `end`. An edge lives
+    /// with its node; a topic without turns of its own lives with its edges, without any from its first message on.
+    fn alive(&self, end: Stamp, own: impl Fn(&[(Stamp, bool)]) -> bool) -> Alive {
         let own = |what| {
             let turns = self.turns.of(what).filter(|turns| !turns.is_empty())?;
             Some(own(turns))
@@ -126,8 +128,10 @@ impl<'a> ItemTurns<'a> {
         }
         for (id, carried) in (0..).zip(carried) {
             let topic = Element::Topic(id);
-            if let (None, Some(carried), Some(is)) = (own(topic), carried, alive.of_mut(topic)) {
-                *is = carried;
+            let first = self.elements.topics.get(id as usize).and_then(|t| t.first);
+            let lives = carried.unwrap_or(first.is_none_or(|first| first < end));
+            if let (None, Some(is)) = (own(topic), alive.of_mut(topic)) {
+                *is = lives;
             }
         }
         alive

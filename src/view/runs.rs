@@ -271,7 +271,12 @@ impl<F: Fn(&Shown, Option<&Arrow>) -> String> RunRecorder<'_, F> {
                 let from = window;
                 life.turns.push(Run { from, value });
             }
-            let lifecycle = shown.lifecycle.as_deref().unwrap_or_default();
+            let members = shown
+                .members
+                .number()
+                .map(|(n, word)| words::count(n, word));
+            let lifecycle = shown.lifecycle.as_deref().or(members.as_deref());
+            let lifecycle = lifecycle.unwrap_or_default();
             if !lifecycle.is_empty() || !life.lifecycles.is_empty() {
                 let place = self.labels.place(lifecycle.to_owned());
                 push(&mut life.lifecycles, window, place);

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Shown;
+use super::{Members, Shown};
 use crate::evidence::Degree;
 use crate::graph::State;
 
@@ -71,7 +71,7 @@ const FEW: usize = 4;
 type LookKey = (
     (State, Degree, bool),
     [Option<u64>; 3],
-    (usize, usize),
+    (usize, usize, Members),
     Option<Arc<str>>,
 );
 
@@ -136,7 +136,7 @@ fn key(shown: &Shown) -> LookKey {
     (
         (shown.state, shown.degree, shown.is_paused),
         [bits(shown.hz), bits(shown.steady_hz), shown.count],
-        (shown.topics, shown.each),
+        (shown.topics, shown.each, shown.members),
         shown.lifecycle.clone(),
     )
 }

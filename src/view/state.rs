@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use super::items::{EdgePlace, Viewed};
 use super::lives::Alive;
-use super::{Arrow, ArrowKind, Item, ItemKind, Mode, Shown, ViewOptions};
+use super::{Arrow, ArrowKind, Item, ItemKind, Members, Mode, Shown, ViewOptions};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
-use crate::graph::{Element, PerElement, Row, State};
+use crate::graph::{EdgeId, Element, PerElement, Row, State, TopicId};
 use crate::mission::Mission;
 
 /// Takes in an element of an item or arrow: the liveliest state and the strongest degree count, rates and counts are
@@ -116,21 +116,31 @@ pub(crate) struct Now<'a> {
     lives: (Alive, Alive),
     /// The row of the graph for each element that is in it, by element.
     rows: PerElement<Option<Row>>,
+    /// The only publication of each topic, if there is but one.
+    sole: Vec<Option<EdgeId>>,
+    /// The publications of each topic.
+    senders: Vec<Vec<EdgeId>>,
 }
 
 impl<'a> Now<'a> {
     /// The state before the first window, in which nothing is known.
     pub(crate) fn new(mission: &'a Mission, options: &'a ViewOptions, viewed: &'a Viewed) -> Self {
+        let mut senders = vec![Vec::new(); mission.elements.topics.len()];
+        for (id, (_, topic)) in (0..).zip(&viewed.published) {
+            senders[*topic as usize].push(id);
+        }
         Self {
             mission,
             options,
             viewed,
+            senders,
             span: Span {
                 start: Stamp(0),
                 end: Stamp(0),
             },
             lives: (Alive::default(), Alive::default()),
             rows: PerElement::new(&mission.elements, |_| None),
+            sole: mission.elements.sole_publishers(),
         }
     }
 
@@ -162,12 +172,52 @@ impl<'a> Now<'a> {
         alive.is(what).then(|| {
             let row = self.rows.of(what).and_then(Option::as_ref);
             let mut one = row.map_or(One::UNHEARD, heard);
+            if let (None, Some(row)) = (one.hz, self.row_of_sole(what)) {
+                (one.hz, one.count) = (row.hz(self.span), row.count);
+            }
             if paused.is(what) {
                 one.is_paused = true;
                 one.state = one.state.max(State::Silent);
             }
+            if let Some(topic) = self.waits_for(what) {
+                one.is_paused = true;
+                one.state = self.state_of_waiting(topic).max(one.state);
+            }
             one
         })
+    }
+
+    /// For the only publication of a topic, the row of the topic: all its messages come from there.
+    fn row_of_sole(&self, what: Element) -> Option<&Row> {
+        let Element::Publish(id) = what else {
+            return None;
+        };
+        let (_, topic) = self.viewed.published.get(id as usize)?;
+        let sole = self.sole.get(*topic as usize)?;
+        sole.filter(|sole| *sole == id)?;
+        self.rows.of(Element::Topic(*topic))?.as_ref()
+    }
+
+    /// The topic of an element, if its first message comes only after the window. One that is latched needs none.
+    fn waits_for(&self, what: Element) -> Option<TopicId> {
+        let (_, topic) = self.mission.elements.ends(what);
+        let first = self.mission.elements.topics.get(topic? as usize)?.first;
+        let row = self
+            .rows
+            .of(Element::Topic(topic?))
+            .and_then(Option::as_ref);
+        let is_latched = row.is_some_and(|row| row.state == State::Latched);
+        topic.filter(|_| !is_latched && first.is_some_and(|first| first >= self.span.end))
+    }
+
+    /// The state of a topic before its first message: wished for only, where nothing is known to publish it.
+    fn state_of_waiting(&self, topic: TopicId) -> State {
+        let mut senders = self.senders.get(topic as usize).into_iter().flatten();
+        if senders.any(|id| self.lives.0.is(Element::Publish(*id))) {
+            State::Silent
+        } else {
+            State::Declared
+        }
     }
 
     fn node(&self, id: u32) -> Option<One> {
@@ -207,7 +257,23 @@ impl<'a> Now<'a> {
         if !item.is_replica {
             shown.each = 0;
         }
+        if item.kind == ItemKind::Namespace {
+            shown.members = self.members(item);
+        }
         Some(shown)
+    }
+
+    /// The members of a folded namespace that are in the window's graph.
+    fn members(&self, item: &Item) -> Members {
+        let mut members = Members::default();
+        let is_there = |what: &Element| self.rows.of(*what).is_some_and(Option::is_some);
+        for member in item.members.iter().filter(|what| is_there(what)) {
+            match member {
+                Element::Node(_) => members.nodes += 1,
+                _ => members.topics += 1,
+            }
+        }
+        members
     }
 
     /// The look of an arrow, whether or not its ends are there.
@@ -299,7 +365,7 @@ impl<'a> Now<'a> {
             Element::Node(id) => (self.viewed.node.get(id as usize).copied().flatten(), &[]),
             Element::Topic(id) => {
                 let item = self.viewed.topic.get(id as usize).copied().flatten();
-                (item, if is_direct { carriers() } else { &[] })
+                (item, carriers())
             }
             Element::Publish(id) => (None, edge(self.viewed.publish.get(id as usize))),
             Element::Subscribe(id) => (None, edge(self.viewed.subscribe.get(id as usize))),

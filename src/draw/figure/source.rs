@@ -7,7 +7,7 @@ use crate::base::name::{is_quiet, last_part};
 use crate::base::time::{Span, Stamp};
 use crate::evidence::Degree;
 use crate::graph::history::Sender;
-use crate::graph::{EdgeId, Element, Node, NodeId, TopicId};
+use crate::graph::{Edge, EdgeId, Element, Node, NodeId, TopicId};
 use crate::mission::Mission;
 use crate::mission::ledger::Phase;
 use crate::mission::phases::knows_publishers;
@@ -23,6 +23,8 @@ pub(crate) struct FigureSource<'a> {
     topics: Vec<bool>,
     /// Per node, its publications on shown topics.
     published: Vec<Vec<EdgeId>>,
+    /// The only publication of each topic, if there is but one.
+    sole: Vec<Option<EdgeId>>,
     /// The phases; none if there is only one.
     pub(crate) phases: &'a [Phase],
     /// Whether their names are the user's.
@@ -60,6 +62,7 @@ impl<'a> FigureSource<'a> {
             roles,
             topics,
             published,
+            sole: mission.elements.sole_publishers(),
             phases: if phases.len() > 1 { phases } else { &[] },
             is_named,
         }
@@ -112,12 +115,25 @@ impl<'a> FigureSource<'a> {
         own
     }
 
-    /// The messages of some publications. One that is latched stands for its node by its message, and is not busy.
+    /// The messages of some publications; of the only one of its topic, all that are not known to come from others. One
+    /// that is latched stands for its node by its message, and is not busy.
     pub(crate) fn senders(&self, edges: &[EdgeId]) -> Vec<&'a Sender> {
         let edges = edges
             .iter()
-            .filter_map(|id| self.mission.elements.publishes.get(*id as usize));
-        let senders = edges.filter_map(|e| self.mission.sending.of_edge(e.node, e.topic));
+            .filter_map(|id| Some((*id, self.mission.elements.publishes.get(*id as usize)?)));
+        let sending = &self.mission.sending;
+        let sender = |(id, edge): (EdgeId, &Edge)| {
+            let own = sending.of_edge(edge.node, edge.topic);
+            let is_sole = self.sole.get(edge.topic as usize) == Some(&Some(id));
+            let rest = || {
+                sending
+                    .of_topic(edge.topic)
+                    .iter()
+                    .find(|s| s.node.is_none())
+            };
+            own.or_else(|| rest().filter(|_| is_sole))
+        };
+        let senders = edges.filter_map(sender);
         senders.filter(|sender| !sender.is_latched).collect()
     }
 

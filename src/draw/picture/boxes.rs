@@ -109,7 +109,7 @@ impl Boxes<'_> {
         let mut group = Group {
             id: card.id.clone(),
             class: class(item.kind.word(), shown),
-            data: told(vec![("name", item.name.to_string())], shown),
+            data: self::data(item, shown),
             title: title(item, shown),
             ..Group::default()
         };
@@ -121,7 +121,7 @@ impl Boxes<'_> {
             self.latch(&mut group, inner, body);
         }
         let second = second_line(shown, card.tells);
-        let second = second.unwrap_or_else(|| card.label.silence(shown, card.tells));
+        let second = second.unwrap_or_else(|| card.label.silence(shown, card.tells).to_owned());
         self.lines(&mut group, &card.label, &second, inner, body, &look);
         if let Some(text) = pendant(shown, card.tells) {
             let (below, size) = self.below(place);
@@ -275,6 +275,18 @@ pub(super) fn corners(kind: ItemKind, place: Rect, scale: f64) -> [Point; 4] {
         _ => (place.w / 2.0 - 2.0 * scale, place.h / 2.0 - scale),
     };
     [(x, -y), (-x, -y), (x, y), (-x, y)].map(|(x, y)| Point::new(middle.x + x, middle.y + y))
+}
+
+/// The attributes of a box.
+fn data(item: &Item, shown: &Shown) -> Vec<(&'static str, String)> {
+    let mut data = vec![
+        ("name", item.name.to_string()),
+        ("state", shown.state.word().to_owned()),
+    ];
+    data.extend(shown.mark.map(|mark| ("mark", mark.word().to_owned())));
+    let members = shown.members.number();
+    data.extend(members.map(|(number, _)| ("members", number.to_string())));
+    told(data, shown)
 }
 
 /// The attributes of an element, with the places in the ledger of its headlines in this window.

@@ -5,7 +5,7 @@ use crate::base::geometry::Size;
 use crate::base::words;
 use crate::draw::style::{Body, Style};
 use crate::draw::text::{Fonts, Weight};
-use crate::graph::{Element, State};
+use crate::graph::State;
 use crate::layout::{self, Link, Outline, Plan, Vertex};
 use crate::view::showing::both;
 use crate::view::{Arrow, ArrowKind, Item, ItemKind, Mark, Showing, Shown, View};
@@ -27,21 +27,18 @@ pub(crate) struct Label {
     pub(crate) name: String,
     /// Whether a smaller line stands below it in some window.
     pub(crate) second: bool,
-    /// The smaller line where it is the same in all windows.
-    pub(crate) fixed: String,
     /// The name as it is, where the font lacks some of its characters.
     pub(crate) unshown: Option<String>,
 }
 
 impl Label {
-    /// The smaller line in a window without news of the box: the one of all windows, or that no message came.
-    pub(crate) fn silence(&self, shown: &Shown, tells: Tells) -> String {
-        let speaks = self.second && self.fixed.is_empty() && tells == Tells::Rates;
+    /// The smaller line of a topic in a window without a message.
+    pub(crate) fn silence(&self, shown: &Shown, tells: Tells) -> &'static str {
         match (shown.mark, shown.state) {
-            (Some(Mark::Removed), _) => self.fixed.clone(),
-            (_, State::Latched) if speaks => "latched".to_owned(),
-            _ if speaks => NO_MESSAGE.to_owned(),
-            _ => self.fixed.clone(),
+            (Some(Mark::Removed), _) => "",
+            _ if !self.second || tells != Tells::Rates => "",
+            (_, State::Latched) => "latched",
+            _ => NO_MESSAGE,
         }
     }
 }
@@ -157,7 +154,6 @@ impl Measurer<'_> {
         let ways = item.hub.map(|_| self.ways(item)).unwrap_or_default();
         let mut name = self.fonts.shown(whole).into_owned();
         let unshown = (name != whole).then(|| words::visible(whole).into_owned());
-        let mut fixed = String::new();
         if item.kind == ItemKind::Namespace {
             let is_rest = &*item.name == inside;
             name = if is_rest {
@@ -165,13 +161,11 @@ impl Measurer<'_> {
             } else {
                 name + "/…"
             };
-            fixed = members(item);
         }
         let name = self.fonts.fit(&name, body.size, body.weight(), WIDEST);
         Label {
             name: format!("{}{name}{}", ways[0], ways[1]),
-            second: second || !fixed.is_empty(),
-            fixed,
+            second,
             unshown,
         }
     }
@@ -193,8 +187,7 @@ impl Measurer<'_> {
     fn size(&self, item: &Item, label: &Label, second: f64) -> Size {
         let body = self.body(item);
         let width = self.fonts.width(&label.name, body.size, body.weight());
-        let fixed = self.fonts.width(&label.fixed, body.small, Weight::Regular);
-        let width = width.max(second).max(fixed);
+        let width = width.max(second);
         let small = if label.second { body.small * LINE } else { 0.0 };
         let height = body.size * LINE + small;
         let depth = match item.kind {
@@ -366,6 +359,9 @@ pub(crate) fn second_line(shown: &Shown, tells: Tells) -> Option<String> {
     if shown.mark == Some(Mark::Removed) {
         return None;
     }
+    if let Some((number, word)) = shown.members.number() {
+        return Some(words::count(number, word));
+    }
     if let Some(state) = &shown.lifecycle {
         return Some(state.to_string());
     }
@@ -406,19 +402,6 @@ fn short_name<'a>(name: &'a str, inside: &str) -> &'a str {
         Some(rest) if !inside.is_empty() && !rest.is_empty() => rest,
         _ => name,
     }
-}
-
-/// The number of nodes and topics in a box: `5 nodes, 12 topics`.
-fn members(item: &Item) -> String {
-    let count = |is: fn(&Element) -> bool| item.members.iter().filter(|m| is(m)).count();
-    let nodes = count(|m| matches!(m, Element::Node(_)));
-    let topics = count(|m| matches!(m, Element::Topic(_)));
-    let parts = [(nodes, "node"), (topics, "topic")];
-    let parts = parts
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, word)| words::count(*n, word));
-    parts.collect::<Vec<_>>().join(", ")
 }
 
 /// The titles of the namespaces: the part of their names inside the namespace around them.

@@ -124,7 +124,7 @@ impl Picture<'_> {
             .map(|(at, ((item, card), marks))| {
                 let label = &card.label;
                 let is_latched = item.kind != ItemKind::Node && latched.contains(&at);
-                let is_live = label.second && label.fixed.is_empty();
+                let is_live = label.second;
                 let mut shown = plain(is_live.then_some(1.0));
                 // Whatever it tells, it is a line to be filled.
                 shown.lifecycle = is_live.then(|| "-".into());
