@@ -123,7 +123,7 @@ impl Viewed {
                 .enumerate()
                 .filter_map(shown);
             let topics = elements.topics.iter().map(|topic| topic.name.as_str());
-            let topics = topics.filter(|_| options.mode != Mode::Nodes);
+            let topics = topics.filter(|_| !options.mode.is_direct());
             collapse.open_single(&folded.collect(), &topics.collect());
         }
         let nodes: Vec<Option<ItemKey>> = (elements.nodes.iter().zip(&names).enumerate())
